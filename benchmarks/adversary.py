@@ -41,22 +41,21 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
-from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.scenarios.box_pushing.world.bodies import BoxSpec
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.api.study import load
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store import durable
-from nested_agents.studies.store.store import DATABASE, LOCK, Store
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.store.database import DATABASE
+from nested_agents.studies.store.store import LOCK, Store
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
-from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.session import check, run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
-from nested_agents.studies.workers.runner import save
-from nested_agents.studies.workers.worker import Outcome, RunTrial
+from nested_agents.studies.workers.runner import Outcome, RunTrial, save
 
 from . import misbehaving
 
@@ -67,8 +66,8 @@ SPEC = Spec.of(
 EXPLAIN = "explain"
 TEAM = "na.load(...).team()"
 """No command: what a user reads in Python."""
-SLOW = 10.0
-"""Seconds after which an input counts as one that stalls the program."""
+SLOW, BLOCKED = 10.0, 60.0
+"""Seconds, of the processor and by the clock, after which an input counts as one that stalls."""
 
 Said = tuple[int, str, str]
 """Exit status, output and errors of a command."""
@@ -402,7 +401,7 @@ def hostile(number: int, rng: random.Random, folder: Path) -> Counter[str]:
         kind = list(makers)[attempt % len(makers)]
         tally[kind] += 1
         attack = next(makers[kind])
-        begin = time.monotonic()
+        begin, used = time.monotonic(), time.process_time()
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
             try:
@@ -410,7 +409,7 @@ def hostile(number: int, rng: random.Random, folder: Path) -> Counter[str]:
             except BaseException:
                 print(f"{kind}:\n{traceback.format_exc()}", file=sys.stderr)
                 became = "traceback"
-        if time.monotonic() - begin > SLOW:
+        if time.monotonic() - begin > BLOCKED or time.process_time() - used > SLOW:
             became = "stalled"
         if any(issubclass(w.category, RuntimeWarning) for w in warned):
             became = "warned"

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from nested_agents.core.learners.td import TDLambda
-from nested_agents.core.numerics.arrays import FloatArray, IntArray
+from nested_agents.core.numerics import FloatArray, IntArray
 
 from .situations import Moment
 

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from nested_agents.core.agents.loop import control_loop, policy_seed, world_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import EpisodeRecorder
+from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot
-from nested_agents.studies.trials.episodes import Stopwatch
+from nested_agents.studies.trials.trial import Stopwatch
 
 
 def main() -> None:

@@ -25,17 +25,19 @@ from rich.table import Table
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import Decision
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
     Deliberation,
     Evaluator,
+    ExactEnumeration,
+    Sampling,
+    SamplingSettings,
     Teammates,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.learners.learner import Decision
+from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
 from .situations import ADDITIVE, situation

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 
 from .baselines import Baselines
 from .situations import ADDITIVE, COMPACT, DENSE, Moment, situation

@@ -16,11 +16,11 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import Trial
-from nested_agents.studies.workers.worker import Outcome, RunTrial, attempt
+from nested_agents.studies.workers.runner import Outcome, RunTrial, attempt
 
 FIRED = "NESTED_AGENTS_FAULT"
 """Environment variable that a fault sets when it comes true."""
@@ -32,9 +32,12 @@ ACTS = (
     "raise ValueError('two\\nlines')", "raise Mute", "return None", "return 'text'", "return 0",
     "return np.zeros((9, 9))", "return np.full((2, 2), np.nan)", "return np.full((2, 2), np.inf)",
     "return np.full((2, 2), 1e300)", "return [[0.0], [0.0, 1.0]]",
+    "return replace(super().step(*arguments), reward='1.0')",
+    "return replace(super().step(*arguments), reward=np.nan)",
 )  # fmt: skip
 SCENARIO = """
 import os, sys
+from dataclasses import replace
 import numpy as np
 import nested_agents as na
 from nested_agents.scenarios.line_up import LineUp

@@ -13,7 +13,7 @@ from typing import Any
 import Box2D
 import numpy as np
 
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.world.world import (
     POSITION_ITERATIONS,
     SUBSTEPS,
@@ -71,7 +71,7 @@ class NaiveWorld(World):
         self.contact_time = touched / periods
 
     def _drive(self, r: int, speeds: list[float]) -> None:
-        """Apply the forces of a robot's wheels, see `scenarios.box_pushing.world.robots`."""
+        """Apply the forces of a robot's wheels, see `scenarios.box_pushing.world.bodies`."""
         body, model = self._bodies[r], self._wheels
         vx, vy = body.linearVelocity
         omega = body.angularVelocity

@@ -11,10 +11,10 @@ import numpy as np
 
 from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.hierarchy import Hierarchy
-from nested_agents.core.interface.prediction import Prediction
+from nested_agents.core.interface.spaces import Prediction
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.td import TDLambda
-from nested_agents.core.numerics.arrays import FloatArray, IntArray
+from nested_agents.core.numerics import FloatArray, IntArray
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 

@@ -11,19 +11,18 @@ from pathlib import Path
 import click
 
 import nested_agents
-from nested_agents.core.interface.measures import Measure
+from nested_agents.core.interface.scenario import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.adapters.adapted import AdaptedWorld
 from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.results.results import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
 from nested_agents.studies.spec.keys import tables
-from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.presets import PRESETS
+from nested_agents.studies.spec.tables import dumps
 
 BESIDE = {
     "*swept keys*": ("", "a column for every swept key, and `name` if there are overrides"),
@@ -54,43 +53,33 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "interface.hierarchy", "interface.spaces", "interface.prediction",
-        "interface.scenario", "interface.measures", "agents.team",
-        "adaptation.mirror", "agents.loop", "decision.settings",
-        "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base",
-        "learners.learner", "learners.td", "learners.batch", "learners.one_step",
-        "evaluators.evaluator", "evaluators.exact", "evaluators.best_response",
-        "evaluators.coordination", "evaluators.cross_entropy",
-        "coordination.maximisers", "adaptation.self_model",
-        "adaptation.calibration", "agents.cost", "plugins.registry",
-        "plugins.settings", "numerics.streams", "numerics.ties",
+        "interface.hierarchy", "interface.spaces", "interface.scenario", "agents.team",
+        "adaptation.predictors", "agents.loop", "decision.exploration",
+        "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
+        "learners.batch", "evaluators.evaluator", "evaluators.best_response",
+        "evaluators.coordination", "coordination.graphs", "adaptation.self_model",
+        "agents.cost", "plugins.registry", "plugins.settings", "numerics",
         "policies.settings", "policies.peer",
     )),
-    "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
+    "topologies": ("Who is above whom.", ("builders", "config", "drawing", )),
     "scenarios": ("Where agents act.", (
-        "box_pushing.config", "box_pushing.world.settings", "box_pushing.prediction.settings",
-        "box_pushing.scenario", "box_pushing.environments", "adapters.passing_down",
-        "adapters.adapted", "adapters.settings",
-        "box_pushing.world.reward", "box_pushing.world.starts", "box_pushing.states.relational",
-        "box_pushing.states.state_spaces",
-        "box_pushing.prediction.predictors", "box_pushing.world.boxes",
-        "box_pushing.world.robots", "box_pushing.world.world",
+        "box_pushing.config", "box_pushing.world.settings",
+        "box_pushing.prediction.settings", "box_pushing.scenario",
+        "box_pushing.environments", "adapters.passing_down", "adapters.adapted",
+        "adapters.settings", "box_pushing.states.relational",
+        "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
+        "box_pushing.world.bodies", "box_pushing.world.world",
         "box_pushing.pictures.rendering", "box_pushing.options.config",
-        "box_pushing.options.pushing", "box_pushing.options.scenario",
-        "kinematic_chain.config", "kinematic_chain.scenario",
-        "kinematic_chain.variables", "matrix_games.scenario",
-        "line_up", "faults.settings", "faults.actuators",
-        "faults.carried", "faults.wrappers",
-        "state_variables", "checking.checker", "checking.sensing",
+        "box_pushing.options.scenario", "kinematic_chain.config",
+        "kinematic_chain.scenario", "kinematic_chain.variables", "matrix_games.scenario",
+        "line_up", "faults.settings", "faults.wrappers", "state_variables",
+        "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.teams", "api.planning", "cost.table", "api.comparison", "api.recovery",
-        "api.run_study", "api.tuning",
-        "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
-        "trials.arrangement", "trials.session",
+        "api.study", "api.teams", "api.running", "api.recovery", "api.tuning",
+        "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.comparison", "results.aggregates", "results.marl_eval",
-        "results.power", "results.summary", "catalogue.study", "cost.cost",
+        "results.contrasts", "results.published", "results.power", "catalogue.study", "cost.cost",
         "claims.claims",
     )),
 }  # fmt: skip
@@ -225,9 +214,11 @@ def commands() -> Iterator[str]:
     yield "In a checkout, `./dev exec` goes before every command. The exit status is 0 if all went"
     yield "well, 1 if a trial failed, 2 if there is something for you to mend, which one line on"
     yield "standard error names, and 130 after Ctrl-C.\n"
-    yield from table(("command", "purpose"), ((f"[`{n}`](#{n})", t) for n, t in COMMANDS.items()))
-    for name in COMMANDS:
-        command = import_module(f"nested_agents.studies.cli.commands.{name}").command
+    yield from table(
+        ("command", "purpose"), ((f"[`{n}`](#{n})", t) for n, (_, t) in COMMANDS.items())
+    )
+    for name, (module, _) in COMMANDS.items():
+        command = getattr(import_module(f"nested_agents.studies.cli.commands.{module}"), name)
         yield f"## {name}\n"
         if isinstance(command, click.Group):
             for below, one in command.commands.items():

@@ -14,9 +14,11 @@ Examples
 ('0',)
 """
 
-from .scenarios.faults.actuators import (
+from .scenarios.faults.wrappers import (
     ActuatorFault,
     Delayed,
+    FaultyEnv,
+    FaultyParallelEnv,
     Free,
     Noisy,
     Reversed,
@@ -24,7 +26,6 @@ from .scenarios.faults.actuators import (
     Stuck,
     Weak,
 )
-from .scenarios.faults.wrappers import FaultyEnv, FaultyParallelEnv
 from .studies.api.recovery import RandomPolicy, RecoveryTable, recovery_table
 
 __all__ = [

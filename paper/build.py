@@ -13,11 +13,12 @@ import jinja2
 
 import nested_agents as na
 from nested_agents.studies.benchmark import push_n
+from nested_agents.studies.catalogue.chain_order import order_tests
 from nested_agents.studies.claims import claims
 from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results import published
-from nested_agents.studies.results.comparison import order_tests
-from nested_agents.studies.results.summary import Summary, two_figures
+from nested_agents.studies.results.analysis import Summary
+from nested_agents.studies.results.statistics import two_figures
 
 FOLDER = Path(__file__).parent
 

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..core.interface.spaces import StateSpace, Variable
-from ..core.numerics.arrays import FloatArray
+from ..core.numerics import FloatArray
 from ..core.plugins.registry import Registry
 
 StateFunction = Callable[[Any, int], FloatArray]

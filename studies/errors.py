@@ -6,6 +6,8 @@ from decimal import Decimal
 
 LONGEST = 1200
 """Characters of a message; of a longer one the middle is left out."""
+WIDTH = 80
+"""Of a line that is printed [characters]."""
 
 
 class SpecError(ValueError):

@@ -4,10 +4,12 @@ An edge leads from a superior to its subordinate, and every agent is a node; an 
 joins neighbours. Agents are given in agent order; *bodies* are the agents of one body each, such as
 the wheels of a robot. Keyword-only parameters are the settings of a topology, as they stand in the
 ``[topology]`` table of a spec. A graph becomes a `Hierarchy` in `nested_agents.topologies.build`.
+Checks name the culprit: which agent is unknown, missing or named twice.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from itertools import chain as concatenated
 from itertools import zip_longest
@@ -17,12 +19,92 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import TypeAliasType
 
-from ..core.coordination import shapes
-from ..core.coordination.shapes import Shape
+from ..core.coordination import graphs
+from ..core.coordination.graphs import Shape
 from ..core.interface.hierarchy import Hierarchy
-from ..core.plugins.deferred import nx
+from ..core.numerics import nx
 from ..core.plugins.settings import Fraction, unwritten
-from .checks import check_names, with_edges
+
+
+def check_names(
+    names: Sequence[str], agents: Sequence[str], what: str, *, all_needed: bool = True
+) -> None:
+    """Refuse `names` that are not the agents, each once.
+
+    Parameters
+    ----------
+    names
+        The names to check.
+    agents
+        The agents there are.
+    what
+        The argument that `names` stands in, for the message.
+    all_needed
+        Whether every agent must be among the names.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, occurs twice or is missing.
+    """
+    known = set(agents)
+    for name, times in Counter(names).items():
+        if name not in known:
+            raise ValueError(f"unknown agent {shown(name)} in {what}, known: {listed(agents)}")
+        if times > 1:
+            raise ValueError(f"agent {shown(name)} occurs more than once in {what}")
+    missing = known.difference(names)
+    if all_needed and missing:
+        first = next(agent for agent in agents if agent in missing)
+        raise ValueError(f"agent {first!r} is missing from {what}")
+
+
+def check_legible(names: Iterable[object]) -> None:
+    """Refuse what is no name: neither text nor a whole number, empty, or not to be printed.
+
+    Raises
+    ------
+    ValueError
+        If a name is so; escaped and shortened.
+    """
+    for name in names:
+        is_name = isinstance(name, str | int) and not isinstance(name, bool)
+        if not is_name or not str(name) or not str(name).isprintable():
+            raise ValueError(f"{shown(name)} is no name of an agent, allowed: printable text")
+
+
+def shown(value: object, most: int = 60) -> str:
+    r"""Return a value for a message, in `most` characters at most, none of them special.
+
+    Examples
+    --------
+    >>> shown("a\nb"), shown("n" * 100, most=10)
+    ("'a\\nb'", "'nnnnnn...")
+    """
+    text = ascii(value) if not isinstance(value, str) or not value.isprintable() else repr(value)
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def with_edges(graph: nx.DiGraph, edges: Iterable[Sequence[str]]) -> nx.DiGraph:
+    """Add (superior, subordinate) pairs to a graph, which is modified; refuse one given twice."""
+    for superior, subordinate in edges:
+        if graph.has_edge(superior, subordinate):
+            raise ValueError(f"edge {superior} -> {subordinate} is given more than once")
+        graph.add_edge(superior, subordinate)
+    return graph
+
+
+def listed(names: Iterable[str], most: int = 12) -> str:
+    """Return names for a message, the first `most` of them.
+
+    Examples
+    --------
+    >>> listed("abcd", most=2)
+    'a, b, ... (4)'
+    """
+    names = list(names)
+    return ", ".join(names[:most]) + (f", ... ({len(names)})" if len(names) > most else "")
+
 
 Names: TypeAlias = Sequence[str]
 Bodies: TypeAlias = Sequence[Names]
@@ -198,13 +280,13 @@ def coordination_graph(
     if edges is None:
         if shape == "scenario":
             raise ValueError("shape = 'scenario': the scenario has no interactions of its agents")
-        graph = nx.relabel_nodes(shapes.shaped(shape, len(agents)), dict(enumerate(agents)))
+        graph = nx.relabel_nodes(graphs.shaped(shape, len(agents)), dict(enumerate(agents)))
     else:
         pairs = [(min(a, b), max(a, b)) for a, b in edges]
         Hierarchy(agents, [], pairs)  # raises and names what is wrong
         graph = nx.empty_graph(agents)
         graph.add_edges_from(pairs)
-    return graph if others is None else shapes.others(graph, others)
+    return graph if others is None else graphs.others(graph, others)
 
 
 def from_edges(

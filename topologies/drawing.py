@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.interface.hierarchy import Hierarchy
-from ..core.numerics.arrays import FloatArray
-from ..core.plugins.deferred import nx
+from ..core.numerics import FloatArray, nx
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,12 +9,11 @@ from decimal import Decimal
 from typing import Literal
 
 from ..core.agents.cost import below_counts
-from ..core.agents.joint_agents import Agents, joint_blocks
+from ..core.agents.loop import Agents, joint_blocks
 from ..core.agents.messages import MessageFailure
 from ..core.interface.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, parse
-from .builders import names_of
-from .checks import check_legible
+from .builders import check_legible, names_of
 from .config import ARGUMENTS, read
 
 Form = Literal["table", "json"]

@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from nested_agents.core.numerics.arrays import BoolArray, FloatArray, IntArray
-from nested_agents.scenarios.box_pushing.options.pushing import CLEARANCE, Drivers, paths
+from nested_agents.core.numerics import BoolArray, FloatArray, IntArray
+from nested_agents.scenarios.box_pushing.options.scenario import CLEARANCE, Drivers, paths
 from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.world.geometry import wrap
 

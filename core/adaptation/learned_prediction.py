@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ..interface.prediction import Blocks, first_alike
-from ..numerics.arrays import FloatArray, IntArray
+from ..interface.spaces import Blocks, first_alike
+from ..numerics import FloatArray, IntArray
 
 
 class LearnedPrediction:

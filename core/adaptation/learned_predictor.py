@@ -21,13 +21,11 @@ from typing import Any, cast
 import numpy as np
 
 from ..interface.scenario import Scenario, Transition, groups_of, roles_of
-from ..numerics.arrays import BoolArray, FloatArray, IntArray
+from ..numerics import BoolArray, FloatArray, IntArray
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
-from .driven import Bodies, driven_states
 from .learned_prediction import LearnedPrediction, TabulatedPrediction
-from .mirror import Mirror
-from .predictors import LearnedPredictorSettings
+from .predictors import Bodies, LearnedPredictorSettings, Mirror, driven_states
 
 INTERVAL = 100
 """Decisions of an episode after which is regressed without waiting for its end."""

@@ -5,17 +5,44 @@
 3. *Servo control*: the scenario turns it into wheel speeds and moves the robots.
 
 Recording, progress and plotting consume the records; none of them enters the loop.
+
+Who the agents are: one for every actuator, one for every body, or one for the whole team.
+
+A scenario has an agent for every actuator: a wheel, a joint, a player of a game. `join_agents`
+shows it as one of fewer agents. The action of each of these is the actions of all agents of its
+block at once, their digits read as one number, so that joint actions keep their indices.
+Everything else of this package, hierarchies too, works on it unchanged.
+
+`body`
+    One agent for every body: the mapping that the paper's one agent per wheel stands against (X-B).
+    Its state is the own variables of its actuators and the variables that they share.
+`team`
+    The one agent that Section VII compares with (Eq. 23). Its state is the states of all agents one
+    after the other, its action one of ``|A| ** n``: practicable for few agents only.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 
-from ..interface.scenario import Actors, Scenario, Transition
-from ..numerics.arrays import FloatArray, IntArray
+from ..interface.scenario import (
+    Actors,
+    EmbodiedScenario,
+    Scenario,
+    Transition,
+    check_reward,
+    groups_of,
+    measures_of,
+    roles_of,
+)
+from ..interface.spaces import ActionSet, Blocks, Prediction, StateSpace, Variable
+from ..numerics import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -100,7 +127,7 @@ def control_loop(
     ------
     ValueError
         If the scenario does not predict what the team decides by, see `Team.check`, or its states
-        cannot be learned from, see `StateSpace.checked`.
+        or rewards cannot be learned from, see `StateSpace.checked` and `check_reward`.
     """
     first_world = first_episode if first_world is None else first_world
     explore = learn if explore is None else explore
@@ -122,6 +149,7 @@ def control_loop(
             transition = scenario.step(joint_action)
             last = transition.terminated or transition.truncated or step == steps - 1
             space.checked(transition.states, agents)
+            check_reward(transition.reward, agents)
             moved = perf_counter()
             if learn:
                 team.adapt(prediction, joint_action, transition)
@@ -137,3 +165,223 @@ def control_loop(
             states = transition.states
             if last:
                 break
+
+
+Agents = Literal["actuator", "body", "team"]
+"""What there is one agent for."""
+Names = tuple[str, ...]
+MOST_ACTIONS = {"body": 4**4, "team": 4**6}
+"""The most actions of a body, those of four wheels, and of a team."""
+OF_JOINT_ACTIONS = ("rewards", "commands", "slips", "outcomes")
+"""What a prediction may offer whose first argument are joint actions."""
+OF_BODIES = ("nominal_effects", "constants", "levers")
+"""What a scenario open to self-models, and perhaps to calibration, tells of its bodies."""
+
+
+def join_agents(scenario: Scenario, agents: Agents) -> Scenario:
+    """Return a scenario as one of an agent for each of these; with ``actuator`` as it is.
+
+    Raises
+    ------
+    ValueError
+        As `joint_blocks`.
+    """
+    return scenario if agents == "actuator" else JointAgents(scenario, agents)
+
+
+def joint_blocks(
+    agents: Sequence[str], groups: Sequence[Sequence[int]], n_actions: int, each: Agents
+) -> tuple[Names, tuple[tuple[int, ...], ...]]:
+    """Return the names of those who act, and which agents of a scenario each acts for.
+
+    Parameters
+    ----------
+    agents, groups
+        Names of the scenario's agents, and these by body.
+    n_actions
+        Actions of each of them.
+    each
+        What there is one agent for.
+
+    Raises
+    ------
+    ValueError
+        If bodies differ in their number of actuators, or there are more actions than
+        `MOST_ACTIONS`.
+
+    Examples
+    --------
+    >>> joint_blocks(["a.left", "a.right", "b.left", "b.right"], [(0, 1), (2, 3)], 4, "body")
+    (('a', 'b'), ((0, 1), (2, 3)))
+    """
+    if each == "actuator":
+        return tuple(agents), tuple((i,) for i in range(len(agents)))
+    blocks = (tuple(range(len(agents))),) if each == "team" else tuple(map(tuple, groups))
+    sizes = sorted({len(block) for block in blocks})
+    if len(sizes) > 1:
+        raise ValueError(f"agents = 'body': bodies of {sizes} actuators, allowed: equally many")
+    if n_actions ** sizes[0] > MOST_ACTIONS[each]:
+        raise ValueError(
+            f"agents = {each!r}: {n_actions} ** {sizes[0]} actions each, allowed: "
+            f"{MOST_ACTIONS[each]} or fewer"
+        )
+    names = ("single",) if each == "team" else tuple(body_of(agents[b[0]]) for b in blocks)
+    return names, blocks
+
+
+def body_of(agent: str) -> str:
+    """Return the body's part of an actuator's name, or the name if it has none.
+
+    >>> body_of("robot1.front-left"), body_of("a")
+    ('robot1', 'a')
+    """
+    return agent.rpartition(".")[0] or agent
+
+
+class JointAgents:
+    """A scenario seen as that of one agent per block of agents; see `join_agents`.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of all agents.
+    each
+        What there is one agent for. One for the team perceives every variable of each; what the
+        agents of a body share is perceived once.
+    """
+
+    def __init__(self, scenario: Scenario, each: Agents) -> None:
+        single, space, groups = scenario.action_set, scenario.state_space, groups_of(scenario)
+        self.agents, self.blocks = joint_blocks(scenario.agents, groups, len(single), each)
+        self.scenario, self.whole, n_block = scenario, each == "team", len(self.blocks[0])
+        self.measures = measures_of(scenario)
+        self.horizon = getattr(scenario, "horizon", 1)
+        self.groups = tuple((i,) for i in range(len(self.agents)))
+        self._n_each = space.n_variables if self.whole else space.n_own
+        of_block = [scenario.agents[i] for i in self.blocks[0]]
+        if self.whole:
+            self.roles = self.agents
+        else:
+            of_block = [agent.rpartition(".")[2] for agent in of_block]
+            roles = roles_of(scenario)
+            self.roles = tuple("+".join(roles[i] for i in block) for block in self.blocks)
+        own = _named(of_block, space.variables[: self._n_each])
+        self.state_space = StateSpace(
+            f"joint {space.name}" if self.whole else f"bodies' {space.name}",
+            (*own, *space.variables[self._n_each :]),
+            0 if self.whole else len(own),
+        )
+        # Row c holds the actions of a block's agents of index c.
+        shape = (len(single),) * n_block
+        self._local = np.indices(shape).reshape(n_block, -1).T.copy()
+        names = tuple("+".join(single.names[a] for a in row) for row in self._local)
+        neutral = int(np.ravel_multi_index((single.neutral,) * n_block, shape))
+        zeros = (0.0,) * len(names)
+        self.action_set = ActionSet(names, zeros, zeros, neutral)
+        if hasattr(scenario, "predict"):
+            self.predict = self._predict
+        if not self.whole and isinstance(scenario, EmbodiedScenario):
+            for name in OF_BODIES:
+                if hasattr(scenario, name):
+                    setattr(self, name, getattr(scenario, name))
+            self.predict_with = self._predict_with
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Start an episode; return the states of those who act."""
+        return self._states(self.scenario.reset(seed, episode))
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Carry out the actions of those who act."""
+        transition = self.scenario.step(self.actions(joint_action))
+        reward = transition.reward
+        if np.ndim(reward):  # each acts for the mean reward of its agents
+            reward = np.array([np.take(reward, block).mean() for block in self.blocks])
+        return replace(transition, states=self._states(transition.states), reward=reward)
+
+    def _predict(self) -> JointPrediction:
+        """Predict from the present state."""
+        return JointPrediction(cast(Any, self.scenario).predict(), self)
+
+    def _predict_with(self, *beliefs: Any) -> JointPrediction:
+        """Predict from the present state, believing in effects, and in constants if given."""
+        return JointPrediction(cast(Any, self.scenario).predict_with(*beliefs), self)
+
+    def actions(self, joint_actions: IntArray) -> IntArray:
+        """Return the actions ``(..., n)`` of all agents for those of who acts for them."""
+        shape = (*joint_actions.shape[:-1], len(self.scenario.agents))
+        return self._local[joint_actions].reshape(shape)
+
+    def every(self) -> IntArray:
+        """Return all actions ``(A, 1)`` of one who acts alone."""
+        return np.arange(len(self._local))[:, None]
+
+    def joined(self, parts: Sequence[FloatArray]) -> FloatArray:
+        """Return states of who acts for the states of its agents, variables last."""
+        own = [part[..., : self._n_each] for part in parts]
+        return np.concatenate([*own, parts[0][..., self._n_each :]], axis=-1)
+
+    def _states(self, states: FloatArray) -> FloatArray:
+        return np.array([self.joined([states[i] for i in block]) for block in self.blocks])
+
+
+class JointPrediction:
+    """The prediction of a scenario of all agents, for those who act for blocks of them.
+
+    It can do what the scenario's own can; one who acts for all has tables of next states, too.
+
+    Parameters
+    ----------
+    prediction
+        The scenario's own.
+    joint
+        The scenario as those who act see it.
+    """
+
+    def __init__(self, prediction: Prediction, joint: JointAgents) -> None:
+        self._prediction, self._joint = prediction, joint
+        for name in OF_JOINT_ACTIONS:
+            if hasattr(prediction, name):
+                setattr(self, name, partial(_ask, getattr(prediction, name), joint))
+        if hasattr(prediction, "groups"):
+            self.groups = prediction.groups
+        if joint.whole:
+            self.blocks = partial(_whole_blocks, prediction, joint)
+            if hasattr(prediction, "rewards"):
+                self.reward_table = partial(_ask, prediction.rewards, joint, joint.every())
+        elif hasattr(prediction, "reward_table"):  # which the tables of next states are used with
+            self.blocks = partial(_body_blocks, prediction, joint)
+            self.reward_table = prediction.reward_table
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of who acts for a block, for actions ``(m, M)``."""
+        actions = self._joint.actions(joint_actions)
+        block = self._joint.blocks[agent]
+        return self._joint.joined([self._prediction.states(i, actions) for i in block])
+
+
+# Without references to the prediction that they serve, which would keep it until collected.
+
+
+def _ask(
+    question: Callable[..., FloatArray], joint: JointAgents, joint_actions: IntArray, *rest: Any
+) -> FloatArray:
+    """Return what a scenario's own prediction says of the actions of those who act."""
+    return question(joint.actions(joint_actions), *rest)
+
+
+def _whole_blocks(prediction: Prediction, joint: JointAgents, agent: int) -> Blocks:
+    """Return the next states of one who acts for all, of which no variable is its own alone."""
+    actions = joint.actions(joint.every())
+    states = joint.joined([prediction.states(i, actions) for i in joint.blocks[agent]])
+    return Blocks(np.zeros((1, 0)), states, 1)
+
+
+def _body_blocks(prediction: Any, joint: JointAgents, agent: int) -> Blocks:
+    """Return the next states of who acts for a body, for all joint actions."""
+    blocks = [prediction.blocks(i) for i in joint.blocks[agent]]
+    own = [b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks]
+    return replace(blocks[0], own=np.concatenate(own, axis=1), own_rows=np.zeros(0, dtype=np.int64))
+
+
+def _named(agents: Iterable[str], variables: Sequence[Variable]) -> tuple[Variable, ...]:
+    return tuple(replace(v, name=f"{agent}.{v.name}") for agent in agents for v in variables)

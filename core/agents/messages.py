@@ -4,7 +4,7 @@ An agent is told the actions that those above it have decided. A failure of mess
 named agents say: it is lost, late, wrong, or not said at all because the agent is absent; or an
 agent is told by others than it was. All that is random here has a stream of its own, so that worlds
 and policies stay paired. How an agent reads what it was not told is the team's own business, see
-`nested_agents.core.decision.settings`.
+`nested_agents.core.learners.learner`.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,7 @@ from numpy.random import Generator
 from pydantic import Field
 
 from ..interface.hierarchy import Hierarchy
-from ..numerics.arrays import BoolArray, IntArray
-from ..numerics.streams import stream_of
+from ..numerics import BoolArray, IntArray, stream_of
 from ..plugins.scheduled import Names, Scheduled
 from ..plugins.settings import Fraction
 

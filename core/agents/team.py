@@ -9,20 +9,16 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..adaptation.calibration import Calibration
-from ..adaptation.mirror import Mirror
-from ..adaptation.predictors import GivenPredictor
-from ..adaptation.self_model import SelfModel
+from ..adaptation.predictors import GivenPredictor, Mirror
+from ..adaptation.self_model import Calibration, SelfModel
 from ..decision.exploration import Explorer
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from ..interface.hierarchy import Hierarchy
-from ..interface.prediction import NOT_EXPLORING, Prediction
 from ..interface.scenario import Actors, EmbodiedScenario, Scenario, Transition, groups_of, rows_of
+from ..interface.spaces import NOT_EXPLORING, Prediction
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
-from ..numerics.arrays import FloatArray, IntArray
-from ..numerics.streams import set_words, words_of
-from ..numerics.ties import greatest
+from ..numerics import FloatArray, IntArray, greatest, set_words, words_of
 from .messages import MessageFailure, Messages
 
 DECIDED = ("rule", "teammates", "value_of", "unseen", "plan")

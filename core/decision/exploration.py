@@ -13,9 +13,8 @@ from typing import Annotated, Any, ClassVar, Literal, Protocol
 import numpy as np
 from pydantic import Field
 
-from ..interface.prediction import Exploring
-from ..numerics.arrays import FloatArray
-from ..numerics.ties import greatest
+from ..interface.spaces import Exploring
+from ..numerics import FloatArray, greatest
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import Fraction, NonNegative, PartSettings, Positive
 

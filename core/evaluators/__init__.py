@@ -7,22 +7,6 @@ mean (uniform), or their mean weighted with how often the agents below were seen
 (empirical frequencies). Evaluators differ in which joint actions they try.
 """
 
-from ..plugins.registry import SettingsRegistry
-from .evaluator import EvaluatorSettings
-
-EVALUATORS = SettingsRegistry(
-    "evaluator",
-    {
-        "auto": f"{__name__}.exact:AutoSettings",
-        "exact": f"{__name__}.exact:ExactEnumeration",
-        "sampling": f"{__name__}.exact:SamplingSettings",
-        "variable-elimination": f"{__name__}.coordination:VariableEliminationSettings",
-        "max-plus": f"{__name__}.coordination:MaxPlusSettings",
-        "best-response": f"{__name__}.best_response:BestResponseSettings",
-        "cross-entropy": f"{__name__}.cross_entropy:CrossEntropySettings",
-    },
-    EvaluatorSettings,
-)
-"""Evaluators by name."""
+from .evaluator import EVALUATORS, EvaluatorSettings
 
 __all__ = ["EVALUATORS", "EvaluatorSettings"]

@@ -15,7 +15,7 @@ away.
 
 Whom an agent neither considers nor is told of is *unseen*: it is taken to perform the neutral
 action, maintain, even if it has decided, unless the team reads the unseen otherwise (see
-`nested_agents.core.decision.settings`). In the paper's chain nobody is unseen.
+`nested_agents.core.learners.learner`). In the paper's chain nobody is unseen.
 
 *Neighbours* are joined by an undirected edge: they decide at the same time. Each considers all
 actions of the other, as if it were below, and neither is told what the other does. Neighbours make
@@ -29,7 +29,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator
 
-from ..plugins.deferred import nx
+from ..numerics import nx
 
 ARROW, LINE = "{} -> {}", "{} - {}"
 """How a superior and its subordinate are written, and two neighbours."""

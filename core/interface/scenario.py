@@ -1,15 +1,17 @@
 """What a learner may know of the world: what a scenario promises, and what a step of it returns.
 
-Conventions are those of `prediction`.
+A scenario also declares what is measured of an episode: the columns of results. Conventions are
+those of `spaces`.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from .spaces import ActionSet, StateSpace
 
 
@@ -36,6 +38,23 @@ class Transition:
     if not, its reward is received once, as in Gymnasium."""
 
 
+def check_reward(reward: object, agents: Sequence[str]) -> None:
+    """Check that the reward of some agents can be learned from.
+
+    Raises
+    ------
+    ValueError
+        If it is neither a finite number nor one for each of them.
+    """
+    array = np.asarray(reward)
+    is_number = array.dtype.kind in "biuf" and np.isfinite(array).all()
+    if not is_number or array.shape not in ((), (len(agents),)):
+        raise ValueError(
+            f"reward = {reward!r:.60}, allowed: a finite number, or one for each of "
+            f"{len(agents)} agents"
+        )
+
+
 @runtime_checkable
 class Scenario(Protocol):
     """A world with a task. Everything a learner may know of it.
@@ -53,7 +72,7 @@ class Scenario(Protocol):
         = "scenario"`` joins.
     ``partners()``
         For every agent the one in whose place it stands in the mirror, or a ValueError of one line
-        if an agent has none: experience can be mirrored, see `core.adaptation.mirror`.
+        if an agent has none: experience can be mirrored, see `core.adaptation.predictors`.
     ``horizon``
         Decisions that its predictions look ahead, while nobody changes what it does after the
         first; 1 without. By that a check judges how far they are off. Then all are neutral; where
@@ -294,3 +313,61 @@ class Actors(Protocol):
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return what they have learned."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number that describes an episode: a column of results."""
+
+    name: str
+    """Of the column; ``success`` is the one by which scenarios are compared."""
+    title: str
+    """Its heading in tables and figures."""
+    unit: str = "1"
+    """In words of the SI, ``"1"`` for a pure number."""
+    source: str = ""
+    """Where it is taken from at every step: a key of `Transition.info`, or ``terminated``; empty:
+    the key of its own name."""
+    gathering: Literal["last", "mean", "sum", "max"] = "last"
+    """How the steps of an episode make one number: their ``last``, ``mean``, ``sum`` or ``max``."""
+    better: Literal["higher", "lower"] | None = None
+    """Which way is better, if one is."""
+    is_rate: bool = False
+    """Whether an episode has it or has it not: 1 or 0."""
+    least: float | None = None
+    """What it cannot be below, if there is such; intervals end there."""
+    greatest: float | None = None
+    """What it cannot be above, if there is such; intervals end there."""
+
+    def __post_init__(self) -> None:
+        """Take it from the key of its own name, if no other is given."""
+        object.__setattr__(self, "source", self.source or self.name)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest value, infinite where none is known."""
+        least = -math.inf if self.least is None else self.least
+        return least, math.inf if self.greatest is None else self.greatest
+
+    @property
+    def heading(self) -> str:
+        """Title and unit.
+
+        >>> Measure("final_distance_m", "distance", "m").heading
+        'distance [m]'
+        """
+        return self.title if self.unit == "1" else f"{self.title} [{self.unit}]"
+
+
+SUCCESS = Measure("success", "success", source="terminated", better="higher", is_rate=True)
+"""Whether the episode ended with the task solved: success, unless a scenario says otherwise."""
+
+
+def measures_of(scenario: Scenario) -> tuple[Measure, ...]:
+    """Return what is measured of an episode of a scenario, success first.
+
+    Of a scenario without ``measures`` it is success alone, see `SUCCESS`.
+    """
+    declared: tuple[Measure, ...] = tuple(getattr(scenario, "measures", ()))
+    own = [m for m in declared if m.name == SUCCESS.name] or [SUCCESS]
+    return (*own, *(m for m in declared if m.name != SUCCESS.name))

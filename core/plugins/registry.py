@@ -25,8 +25,7 @@ from pydantic import Field, create_model
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
-from .messages import closest
-from .settings import Settings, tuples
+from .settings import Settings, closest, tuples
 
 MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
 """A parameter in a docstring: its name, and what is said of it, indented."""

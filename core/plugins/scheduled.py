@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Self, cast
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..numerics.arrays import BoolArray
+from ..numerics import BoolArray
 from .settings import Settings
 
 Index = Annotated[int, Field(ge=0)]

@@ -6,13 +6,21 @@ report the study elsewhere. What a file means is its syntax tree: comments and l
 
 Names are resolved by the `Sources` that are *active*, see `Sources.active`; outside of any study
 these are the files below the working directory.
+
+A study keeps the files that its spec names, and runs them again when it is explained or continued.
+Of a study that came from somebody else, nothing may be run unasked; a digest inside it would
+protect nobody. So every file that is run from a spec in hand is noted, by the SHA-256 of its text,
+in a list outside of all studies: ``$XDG_STATE_HOME/nested-agents/trusted``, by default below
+``~/.local/state``. What a study brings along is run if the list has it.
 """
 
 from __future__ import annotations
 
 import ast
+import contextlib
 import hashlib
 import linecache
+import os
 import sys
 import traceback
 from collections.abc import Iterator, Mapping
@@ -22,7 +30,39 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from . import trust
+_here: set[str] = set()
+"""What this process trusts, also where no list can be written."""
+
+
+def trusted_list() -> Path:
+    """Return where the list is."""
+    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    return Path(state) / "nested-agents" / "trusted"
+
+
+def is_trusted(text: str) -> bool:
+    """Tell whether a file of this text may be run."""
+    digest = _sha256(text)
+    if digest in _here:
+        return True
+    try:
+        return digest in trusted_list().read_text(encoding="ascii").split()
+    except (OSError, ValueError):
+        return False
+
+
+def trust(text: str) -> None:
+    """Allow a file of this text to be run from now on; if no list can be written, only for now."""
+    if is_trusted(text):
+        return
+    digest = _sha256(text)
+    _here.add(digest)
+    path = trusted_list()
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "a", encoding="ascii") as file:
+            file.write(f"{digest}\n")
+
 
 FOLDER = "sources"
 """Where a study keeps copies, below its own directory."""
@@ -46,7 +86,7 @@ class Sources:
         those of `folder`, if that is a study too.
     brought_by
         What brought the `texts` along, if they are not the user's own: these are run only if they
-        are trusted, see `nested_agents.core.plugins.trust`.
+        are trusted, see `is_trusted`.
 
     Examples
     --------
@@ -173,16 +213,16 @@ class Sources:
 
     def _module(self, name: str) -> ModuleType:
         text = self.text(name)
-        key = f"_nested_agents_{_sha256(name + chr(0) + text)}"
+        key = f"_nested_agents_{_sha256(name + chr(0) + text)[:16]}"
         if key in sys.modules:
             return sys.modules[key]
-        if name in self._brought and not trust.is_trusted(text):
+        if name in self._brought and not is_trusted(text):
             raise ValueError(
                 f"{name} came with {self._brought[name]} and was not run from a spec of yours: it "
                 "can do whatever you can; --trust runs it"
             )
         if not self._was_sent:
-            trust.trust(text)
+            trust(text)
         module = ModuleType(key)
         path = None if self.folder is None else self.folder / name
         # Compiled code can be cached beside a file that exists.
@@ -274,12 +314,12 @@ def meaning(text: str, name: str) -> str:
         If it is called so, and is none.
     """
     if not name.endswith(".py"):
-        return _sha256(text)
+        return _sha256(text)[:16]
     try:
         tree = ast.dump(ast.parse(text, name))
     except (SyntaxError, ValueError, RecursionError) as error:
         raise ValueError(f"{name} cannot be run: {format_error(error)}") from None
-    return _sha256(tree)
+    return _sha256(tree)[:16]
 
 
 def imported(text: str) -> set[str]:
@@ -326,4 +366,4 @@ def message(error: BaseException) -> str:
 
 
 def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    return hashlib.sha256(text.encode()).hexdigest()

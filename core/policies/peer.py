@@ -18,7 +18,7 @@ import numpy as np
 
 from ..interface.hierarchy import Hierarchy
 from ..interface.scenario import Actors, Scenario, groups_of
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ class PPOSettings(PolicyGradientSettings):
     """PPO (Schulman et al. 2017): one centralised policy sees all states and acts for all."""
 
     kind: Literal["ppo"] = "ppo"
-    factory: ClassVar[str] = f"{__package__}.ppo:CentralPPO"
+    factory: ClassVar[str] = f"{__package__}.networks:CentralPPO"
     weights: ClassVar[str] = "all"
     numbered: ClassVar[bool] = True
     critic: ClassVar[str] = "own"
@@ -82,7 +82,7 @@ class PPOSettings(PolicyGradientSettings):
 class MultiAgentPPOSettings(PolicyGradientSettings):
     """What the settings of PPO with a policy for every agent share."""
 
-    factory: ClassVar[str] = f"{__package__}.ppo:HierarchyPPO"
+    factory: ClassVar[str] = f"{__package__}.networks:HierarchyPPO"
     weights: Annotated[Literal["all", "role", "own"], unwritten("all")] = "all"
     """Whether all agents share the weights of one policy and one critic, those of a role do, or
     every agent has its own."""
@@ -121,7 +121,7 @@ class DQNSettings(NetworkSettings):
     """DQN (Mnih et al. 2015) for one agent, such as that of ``agents = "team"``."""
 
     kind: Literal["dqn"] = "dqn"
-    factory: ClassVar[str] = f"{__package__}.dqn:DeepQ"
+    factory: ClassVar[str] = f"{__package__}.networks:DeepQ"
     memory: Count = 50_000
     """Transitions in the replay memory."""
     begin: Count = 500

@@ -21,16 +21,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ..interface.prediction import Blocks
-from ..interface.spaces import StateSpace
-from ..numerics.arrays import FloatArray, IntArray
+from ..interface.spaces import Blocks, StateSpace
+from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Positive, Settings
-from .kernels.compact import active_compact, each_compact, total_compact
-from .kernels.dense import values_dense
-from .kernels.enumeration import Tried, enumerate_dense, enumerate_looked_up
-from .kernels.fuzzy import Partition
-from .kernels.layout import layout, unpack
-from .kernels.updates import each_dense
+from .kernels.dense import Tried, enumerate_dense, enumerate_looked_up, values_dense
+from .kernels.fuzzy import Partition, layout, unpack
+from .kernels.states import active_compact, each_compact, each_dense, total_compact
 
 
 class RuleBaseSettings(Settings):
@@ -231,7 +227,7 @@ class RuleBase:
     ) -> FloatArray:
         """Return the summed value ``(m,)`` of some agents, each thing shared valued once.
 
-        Arguments as of `core.rules.kernels.compact.total_compact`. Shapes are trusted: an evaluator
+        Arguments as of `core.rules.kernels.states.total_compact`. Shapes are trusted: an evaluator
         calls this many times at every decision. Where all rules are active, each agent is valued by
         itself.
         """

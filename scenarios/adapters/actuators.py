@@ -8,8 +8,8 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete
 
 from ...core.interface.spaces import ActionSet
-from ...core.numerics.arrays import FloatArray, IntArray
-from ..faults.carried import limits_of
+from ...core.numerics import FloatArray, IntArray
+from ..faults.wrappers import limits_of
 
 
 class Actuators:

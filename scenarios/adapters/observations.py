@@ -9,7 +9,7 @@ from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
 from gymnasium.spaces.utils import flatten, flatten_space
 
 from ...core.interface.spaces import Variable
-from ...core.numerics.arrays import FloatArray
+from ...core.numerics import FloatArray
 from .settings import AdaptedSettings, Direction
 
 MOST_BOUND = 1e6

@@ -39,7 +39,7 @@ NEAREST_GOAL = 1e-4
 class BoxTaskSettings(ScenarioSettings):
     """Robots, box, task and servo layer: what all scenarios of box pushing have in common."""
 
-    player: ClassVar[str] = f"{__package__}.pictures.player"
+    player: ClassVar[str] = f"{__package__}.pictures.rendering"
     robots: Annotated[int, Field(ge=1), team_size(7.5e-7, agents=2)] = 2
     """Number of robots, as many as memory and time allow by estimate."""
     robot: str | RobotSettings = "e-puck"

@@ -24,7 +24,7 @@ from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo import ParallelEnv
 
 from ...core.interface.scenario import EpisodeRecorder, Transition
-from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray
 from .config import BoxPushingSettings
 from .scenario import BoxPushing
 

@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.agents.team import Team
-from ...core.interface.measures import SUCCESS, Measure
-from ...core.interface.scenario import Transition
+from ...core.interface.scenario import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet
-from ...core.numerics.arrays import FloatArray, IntArray
-from ...core.numerics.streams import stream_of
+from ...core.numerics import FloatArray, IntArray, stream_of
 from .config import BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
@@ -27,13 +25,10 @@ from .prediction.settings import BeliefSettings
 from .prediction.situation import Premises, Situation
 from .states.relational import View
 from .states.state_spaces import state_space_for
-from .world.boxes import box_for, growth
+from .world.bodies import box_for, growth, nominal_effect, robot_for
 from .world.geometry import wrap
-from .world.reward import Task, reward
-from .world.robots import nominal_effect, robot_for
-from .world.settings import CONTROL_PERIOD
-from .world.starts import place
-from .world.world import WheelFailures, World
+from .world.settings import CONTROL_PERIOD, Task, reward
+from .world.world import WheelFailures, World, place
 
 if TYPE_CHECKING:
     from .pictures.policy import Policy

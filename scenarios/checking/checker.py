@@ -2,27 +2,169 @@
 
 Whole episodes of random actions are played and compared to the last bit: states, reward, end of the
 episode, twists and measurements of every step. Not compared are the measured times, ``seconds``.
-What is said of variables is held against what is met (see `variables`). Predictions are held
+What is said of variables is held against what is met (see `met_variables`). Predictions are held
 against each other (see `predictions`), and, of scenarios that can be predicted exactly, against
-what is then sensed (see `sensing`); of others it is shown by how much they are off. What a scenario
-need not have, such as measures or tables, is checked where it is there. A further check is one
-function and one line in `CHECKS`; it yields what is wrong, a line each, of which the first counts,
-and notes what it could not check. What a scenario raises is what is wrong with it.
+what is then sensed (see `faults_of_sensing`); of others it is shown by how much they are off. What
+a scenario need not have, such as measures or tables, is checked where it is there. A further check
+is one function and one line in `CHECKS`; it yields what is wrong, a line each, of which the first
+counts, and notes what it could not check. What a scenario raises is what is wrong with it.
+
+Predictions need not come true, so that of most scenarios no more can be said than by how much they
+are off. But one that is predicted exactly (``with_exact_prediction``) must sense what was
+predicted. What differs then is a variable that is computed in two ways.
 """
 
 import random
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product, zip_longest
+from math import isnan
 from pathlib import Path
 from traceback import extract_tb
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...core.agents.loop import world_seed
 from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, lacking, roles_of
+from ...core.numerics import FloatArray, IntArray
 from .frames import Examination, Frame, at, bits, differences, fields, measured, opening
-from .predictions import faults_of_prediction, faults_of_sharing, has_tables, too_many
-from .sensing import Findings, faults_of_sensing, met_variables, predicted_steps
+from .predictions import apart, faults_of_prediction, faults_of_sharing, has_tables, too_many
+
+TOLERANCE = 1e-6
+"""Difference of sensed and predicted variables that rounding may make, relative to their range."""
+SMALL = 0.02
+"""Error of prediction, in ranges of the variable, of which no word is lost."""
+FAR = 10
+"""Ranges beyond its own at which a variable looks as if it were in another unit."""
+
+
+class MetVariable(NamedTuple):
+    """What was met of a variable, or of the reward, beside what is said of it."""
+
+    name: str
+    """Of the variable, or ``reward``."""
+    unit: str
+    """In words of the SI."""
+    low: float
+    """Where its range begins; the reward has none: NaN."""
+    high: float
+    """Where it ends."""
+    least: float
+    """The least value that was sensed."""
+    greatest: float
+    """The greatest."""
+    error: float
+    """Root mean square error of what was predicted; NaN: it is not predicted."""
+    persistence: float
+    """The same, had it been predicted that all stays as it is."""
+
+
+def predicted_steps(
+    scenario: Scenario, seed: int, episode: int, joint_actions: IntArray, ahead: int = 1
+) -> FloatArray:
+    """Return states before some steps, as predicted, and after: ``(m, 3, n, d + 1)``.
+
+    Behind the variables stands the reward, the mean of all agents: that of the step before, 0 at
+    the start, that predicted, NaN if none is, and that received.
+
+    Parameters
+    ----------
+    scenario
+        Played; modified.
+    seed, episode
+        As in the control loop.
+    joint_actions
+        ``(steps, n)``; the episode may end earlier.
+    ahead
+        Decisions that predictions look ahead; after each joint action all are neutral for the rest,
+        or do the same again in a scenario that ``repeats``.
+    """
+    steps, paid = [], 0.0
+    repeats = getattr(scenario, "repeats", False)
+    neutral: IntArray = np.full(len(scenario.agents), scenario.action_set.neutral)
+    states = np.array(scenario.reset(world_seed(seed, episode), episode))
+    for action in joint_actions:
+        before = _with_reward(states, paid)
+        predicted = _predicted(scenario, action, before)
+        for joint in [action, *[action if repeats else neutral] * (ahead - 1)]:
+            transition = scenario.step(joint)
+            states, paid = np.array(transition.states), float(np.mean(transition.reward))
+            if transition.terminated or transition.truncated:
+                break
+        steps.append([before, predicted, _with_reward(states, paid)])
+        if transition.terminated or transition.truncated:
+            break
+    return np.array(steps)
+
+
+def _predicted(scenario: Scenario, joint_action: IntArray, before: FloatArray) -> FloatArray:
+    """Return states and reward after a joint action, NaN where they are not predicted."""
+    if not hasattr(scenario, "predict"):
+        return np.full_like(before, np.nan)
+    prediction, action = scenario.predict(), joint_action[None]
+    states = [prediction.states(i, action)[0] for i in range(len(joint_action))]
+    rewards = getattr(prediction, "rewards", None)
+    return _with_reward(states, np.nan if rewards is None else rewards(action)[0])
+
+
+def _with_reward(states: FloatArray | list[FloatArray], reward: float) -> FloatArray:
+    return np.column_stack([np.asarray(states), np.full(len(states), reward)])
+
+
+def faults_of_sensing(scenario: Scenario, steps: FloatArray) -> Iterator[str]:
+    """Yield which variable is not sensed as it was predicted, step by step the farthest off.
+
+    Parameters
+    ----------
+    scenario
+        Whose steps they are.
+    steps
+        ``(m, 3, n, d + 1)`` of an episode, see `predicted_steps`.
+    """
+    variables = scenario.state_space.variables
+    _, predicted, after = np.moveaxis(steps[..., : len(variables)], 1, 0)
+    allowed = TOLERANCE * np.array([variable.high - variable.low for variable in variables])
+    off = np.abs(apart(scenario, after, predicted)) / allowed
+    for step in np.flatnonzero((off > 1).any(axis=(1, 2))):
+        i, j = np.unravel_index(off[step].argmax(), off[step].shape)
+        yield (
+            f"{variables[j].name} of agent {i} is {after[step, i, j]:.6g}, predicted "
+            f"{predicted[step, i, j]:.6g}, {at(int(step) + 1)}"
+        )
+
+
+def met_variables(scenario: Scenario, steps: FloatArray) -> tuple[MetVariable, ...]:
+    """Return what was met of every variable, and of the reward, in steps ``(m, 3, n, d + 1)``."""
+    before, predicted, after = np.moveaxis(steps, 1, 0)
+    error, persistence = (
+        np.sqrt((apart(scenario, after, guess) ** 2).mean(axis=(0, 1)))
+        for guess in (predicted, before)
+    )
+    numbers = np.stack([after.min(axis=(0, 1)), after.max(axis=(0, 1)), error, persistence], 1)
+    claims = [(v.name, v.unit, v.low, v.high) for v in scenario.state_space.variables]
+    claims.append(("reward", "1", np.nan, np.nan))
+    return tuple(MetVariable(*c, *row) for c, row in zip(claims, numbers.tolist(), strict=True))
+
+
+class Findings(NamedTuple):
+    """What came of a check that found no fault."""
+
+    passed: tuple[str, ...]
+    """Names of the checks that were passed."""
+    unchecked: Mapping[str, str]
+    """Why something was not checked, by its name."""
+    variables: tuple[MetVariable, ...]
+    """What was met of every variable and of the reward."""
+
+    def warnings(self) -> Iterator[str]:
+        """Yield what is allowed and looks wrong, a line each."""
+        for v in self.variables:
+            width = v.greatest - v.least if isnan(v.low) else v.high - v.low
+            if v.error >= max(v.persistence, SMALL * width) > 0:
+                yield f"{v.name} is predicted no better than if it stayed as it is"
+            if max(v.low - v.least, v.greatest - v.high) > FAR * width:
+                yield f"{v.name} goes more than {FAR} times its range beyond it"
+
 
 STEPS = 5
 """Steps after which measurements are looked at, and predictions."""

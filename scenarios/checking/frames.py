@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.agents.loop import world_seed
 from ...core.interface.scenario import Scenario, Transition
-from ...core.numerics.arrays import IntArray
+from ...core.numerics import IntArray
 
 Frame = dict[str, Any]
 """What one step gave, by dotted name; without the measured times."""

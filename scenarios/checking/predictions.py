@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.prediction import Blocks, states_by_group
 from ...core.interface.scenario import Scenario, groups_of
-from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ...core.interface.spaces import Blocks, states_by_group
+from ...core.numerics import BoolArray, FloatArray, IntArray
 
 MOST_JOINT_ACTIONS = 4**8
 """Joint actions beyond which no tables are asked for: they might not fit into memory."""

@@ -25,8 +25,7 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field, create_model
 
-from ...core.numerics.arrays import BoolArray, FloatArray
-from ...core.numerics.streams import stream_of
+from ...core.numerics import BoolArray, FloatArray, stream_of
 from ...core.plugins.scheduled import Scheduled
 
 

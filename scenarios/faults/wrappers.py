@@ -1,25 +1,286 @@
-"""Wrappers that put faults into any Gymnasium environment and any PettingZoo parallel one.
+"""Faults of the actuators of any Gymnasium environment and any PettingZoo parallel one.
+
+The kinds are those of `nested_agents.scenarios.faults.settings`; what is added is the field that
+names actuators. A fault names them by pattern, ``"0"``, ``"walker_0.*"``, or by number. The policy
+is not informed of it.
+
+What an action commands decides what a fault can do to it. An *effort*, such as a torque, is zero at
+a free actuator, but none holds a joint; a *velocity* is zero at a seized one, but none lets it
+coast; a *position* is held by a seized one, and none gives way. What an action cannot express is
+left to a `Mechanism`, or refused.
+
+Actions of any Box or Discrete space are numbers along a scale. Each entry of a Box is an actuator,
+whose scale is that of the action. Each discrete choice is one, too: its actions are taken to be in
+order along a scale, as left, none, right are, with rest in the middle. What a fault makes of them
+may lie between two actions; then one of these is drawn, with the probabilities whose mean is the
+place between.
 
 Examples
 --------
 From episode 3 on, the motor of a pendulum does a third of what it is commanded.
 
 >>> import numpy as np
->>> from nested_agents.scenarios.faults.actuators import Weak
+>>> from nested_agents.scenarios.faults.wrappers import Weak
 >>> env = FaultyEnv(gymnasium.make("Pendulum-v1"), [Weak(actuators=0, gain=0.33, episode=3)])
 >>> _ = env.reset(seed=0, options={"fault_episode": 3})
 >>> env.step(np.array([2.0], dtype=np.float32))[4], env.carried
 ({}, array([0.66], dtype=float32))
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Literal
 
 import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo.utils import BaseParallelWrapper
 
-from .actuators import ActuatorFault
-from .carried import Carried, Commands, Mechanism
+from ...core.numerics import BoolArray, FloatArray
+from ...core.plugins.scheduled import Names
+from . import settings
+from .settings import Failures, FailureSettings, befalling
+
+
+class ActuatorFault(FailureSettings):
+    """From when to when actuators are faulty, see `nested_agents.scenarios.faults.settings`."""
+
+    part: ClassVar[str] = "actuators"
+
+    actuators: Names
+    """Actuators by name, pattern or number, one or a list."""
+    kind: str = ""
+    """What is wrong with them."""
+
+
+KINDS = befalling(ActuatorFault, **settings.KINDS)
+"""The kinds of fault by name."""
+Seized, Free, Weak, Reversed, Stuck, Delayed, Noisy = KINDS.values()
+
+
+def limits_of(space: gymnasium.Space[Any], name: str) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest value ``(k,)`` of each entry of a space's actions.
+
+    Raises
+    ------
+    ValueError
+        If the space, called by its name, is of another kind or is not bounded; one line.
+    """
+    if isinstance(space, Box) and space.is_bounded():
+        return space.low.ravel(), space.high.ravel()
+    if isinstance(space, Discrete | MultiDiscrete):
+        counts = space.n if isinstance(space, Discrete) else space.nvec
+        return np.ravel(space.start), np.ravel(space.start) + np.ravel(counts) - 1
+    raise ValueError(
+        f"{name}: {space}, allowed: Box, Discrete or MultiDiscrete, of finite bounds; where it has "
+        "none, wrap it in RescaleAction or ClipAction"
+    )
+
+
+class ActionScale:
+    """The actuators that an action space has, each with its scale.
+
+    Parameters
+    ----------
+    space
+        The action space: a bounded Box, Discrete or MultiDiscrete.
+    rest
+        The action in which actuators rest; None: 0 where a Box has it, else the middle.
+    name
+        What the space is called in complaints.
+
+    Attributes
+    ----------
+    limits
+        ``(k,)`` how far from rest each scale reaches.
+
+    Raises
+    ------
+    ValueError
+        If the space is of another kind, is not bounded or does not hold `rest`; one line.
+
+    Examples
+    --------
+    >>> scale = ActionScale(Discrete(3))
+    >>> [float(scale.place(action)[0]) for action in range(3)]
+    [-1.0, 0.0, 1.0]
+    >>> int(scale.action(np.array([-0.2]), 2, np.array([True]), np.array([0.1])))
+    1
+    """
+
+    def __init__(
+        self, space: gymnasium.Space[Any], rest: Any = None, name: str = "action space"
+    ) -> None:
+        self.space = space
+        self._low, self._high = (ends.astype(float) for ends in limits_of(space, name))
+        if rest is None:
+            has_zero = isinstance(space, Box) & (self._low <= 0) & (self._high >= 0)
+            self._rest = np.where(has_zero, 0.0, (self._low + self._high) / 2)
+        elif space.contains(rest):
+            self._rest = np.ravel(rest).astype(float)
+        else:
+            raise ValueError(f"rest = {rest!r}: no action of {space}")
+        self.limits: FloatArray = np.maximum(self._high - self._rest, self._rest - self._low)
+
+    def __len__(self) -> int:
+        """Return the number of actuators."""
+        return len(self.limits)
+
+    def place(self, action: Any) -> FloatArray:
+        """Return where an action lies from rest, ``(k,)``."""
+        return np.ravel(action).astype(float) - self._rest
+
+    def action(self, place: FloatArray, chosen: Any, changed: BoolArray, drawn: FloatArray) -> Any:
+        """Return the action at a place.
+
+        Parameters
+        ----------
+        place
+            ``(k,)`` from rest; what is out of bounds is cut.
+        chosen
+            The action that was chosen; of its entries remain those that are not `changed`.
+        changed
+            ``(k,)`` which do not.
+        drawn
+            ``(k,)`` uniform random numbers for what lies between two actions.
+        """
+        if not changed.any():
+            return chosen
+        values = np.clip(self._rest + place, self._low, self._high)
+        if not isinstance(self.space, Box):
+            below = np.floor(values + 1e-12)
+            values = below + (drawn < values - below)
+        elif np.issubdtype(self.space.dtype, np.integer):
+            values = np.rint(values)
+        action = np.array(chosen, dtype=self.space.dtype)
+        action.ravel()[changed] = values[changed].astype(action.dtype)
+        return action[()]  # a number, not an array, of Discrete
+
+
+Commands = Literal["effort", "velocity", "position"]
+"""What actions command."""
+Mechanism = Callable[[Any, dict[str, str]], None]
+"""Is called before every step with the environment beneath and the faults that no action expresses,
+kinds by actuator, as long as there are some, and once more when there are none."""
+
+INEXPRESSIBLE: Mapping[Commands, str] = {"effort": "seized", "velocity": "free", "position": "free"}
+"""What no action expresses, by what actions command."""
+
+
+class Carried:
+    """The actuators of one or more action spaces under a schedule of faults.
+
+    Parameters
+    ----------
+    spaces
+        Action spaces by the prefix of their actuators' names.
+    faults
+        The schedule.
+    seed
+        Of what noise and draws follow, with the seed of the environment and the episode's number.
+    commands
+        What actions command.
+    rest
+        Actions at rest, by the same prefixes; see `ActionScale`.
+    mechanism
+        See `Mechanism`.
+
+    Raises
+    ------
+    ValueError
+        If a fault names no actuator, or cannot be expressed.
+    """
+
+    def __init__(
+        self,
+        spaces: Mapping[str, gymnasium.Space[Any]],
+        faults: Sequence[ActuatorFault],
+        seed: int,
+        commands: Commands,
+        rest: Mapping[str, Any],
+        mechanism: Mechanism | None,
+    ) -> None:
+        if commands not in INEXPRESSIBLE:
+            raise ValueError(f"commands = {commands!r}, allowed: {', '.join(INEXPRESSIBLE)}")
+        for i, fault in enumerate(faults):
+            if fault.kind == INEXPRESSIBLE[commands] and mechanism is None:
+                raise ValueError(
+                    f"faults[{i}]: no {commands} makes an actuator {fault.kind}; give a "
+                    f"mechanism that does, or say what else actions command"
+                )
+        self.scales: dict[str, ActionScale] = {}
+        self._spans: dict[str, slice] = {}
+        names: list[str] = []
+        for prefix, space in spaces.items():
+            scale = ActionScale(space, rest.get(prefix), f"action space {prefix}".rstrip())
+            self.scales[prefix] = scale
+            self._spans[prefix] = slice(len(names), len(names) + len(scale))
+            names += [f"{prefix}.{i}" if prefix else str(i) for i in range(len(scale))]
+        self.names = tuple(names)
+        limits = np.concatenate([scale.limits for scale in self.scales.values()])
+        self._failures = Failures(faults, self.names, limits, "faults")
+        self._commands, self._mechanism, self._seed = commands, mechanism, seed
+        self._world, self._episode = 0, -1
+        self._hooked = False
+        self._begin(0, 0)
+
+    def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> dict[str, Any] | None:
+        """Start the next episode; a seed starts their count afresh. Return the options left.
+
+        The option ``fault_episode`` sets the number of the episode, by which faults are scheduled.
+        """
+        rest = dict(options or {})
+        if seed is not None:
+            self._world, self._episode = seed, -1
+        self._begin(self._world, int(rest.pop("fault_episode", self._episode + 1)))
+        return rest if rest else None
+
+    def _begin(self, world: int, episode: int) -> None:
+        self._world, self._episode, self._step = world, episode, 0
+        root = np.random.SeedSequence([self._seed, world, episode])
+        self._failures.begin(root, episode)
+        self._rng = np.random.default_rng(root)
+        self._held = np.zeros(len(self.names))
+
+    def carry(self, actions: Mapping[str, Any], environment: Any) -> dict[str, Any]:
+        """Return what is carried out of the actions of one step, by prefix.
+
+        Spaces whose action is missing rest.
+        """
+        self._failures.strike(self._step)
+        self._step += 1
+        places = np.zeros(len(self.names))
+        for prefix, action in actions.items():
+            places[self._spans[prefix]] = self.scales[prefix].place(action)
+        drawn = self._rng.random(len(places))  # as many whatever fails: runs stay paired
+        driven = self._failures.driven(places, 1)[0]
+        changed = self._failures.failed
+        for fault, mask in self._failures.active():
+            if fault.kind == "free":
+                driven[mask] = 0.0
+            elif fault.kind == "seized" and self._commands == "position":
+                driven[mask] = self._held[mask]
+        self._held = np.where(changed, driven, places)
+        unexpressed = {
+            name: kind for name, kind in self.now().items() if kind == INEXPRESSIBLE[self._commands]
+        }
+        if self._mechanism is not None and (unexpressed or self._hooked):
+            self._mechanism(environment, unexpressed)
+        self._hooked = bool(unexpressed)
+        return {
+            prefix: self.scales[prefix].action(
+                driven[span], action, changed[span], drawn[span]
+            )
+            for prefix, action in actions.items()
+            for span in [self._spans[prefix]]
+        }  # fmt: skip
+
+    def now(self) -> dict[str, str]:
+        """Return the kind of the fault of every actuator that has one; of several, the last."""
+        return {
+            self.names[i]: fault.kind
+            for fault, mask in self._failures.active()
+            for i in np.flatnonzero(mask)
+        }
 
 
 class FaultyEnv(gymnasium.Wrapper):
@@ -39,7 +300,7 @@ class FaultyEnv(gymnasium.Wrapper):
     seed
         Of the noise of faults, beside the seed of the environment.
     commands
-        What actions command; see `nested_agents.scenarios.faults.carried`.
+        What actions command; see `nested_agents.scenarios.faults.wrappers`.
     rest
         The action in which actuators rest; None: 0 where they can, else the middle of their range.
     mechanism

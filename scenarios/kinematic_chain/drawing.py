@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.patches import Circle
 
-from ...core.numerics.arrays import FloatArray
+from ...core.numerics import FloatArray
 from ..movies import Scene, film
 from .variables import postures_of
 

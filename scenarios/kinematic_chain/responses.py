@@ -17,9 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.numerics.arrays import FloatArray, IntArray
-from ...core.numerics.compiling import njit
-from ...core.numerics.ties import SAME
+from ...core.numerics import SAME, FloatArray, IntArray, njit
 
 SMALL = 0.1
 """A change of a bearing [rad] below which it passes one centre at most, and its tangent's series

@@ -25,7 +25,7 @@ from pydantic import Field
 
 from ...core.evaluators import EvaluatorSettings
 from ...core.evaluators.evaluator import Counts, DecisionProblem, Deliberation
-from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray
 from .scenario import ChainPrediction
 from .variables import ends_of, jacobian_of
 

@@ -27,8 +27,7 @@ from math import pi
 import numpy as np
 
 from ...core.interface.spaces import Variable
-from ...core.numerics.arrays import FloatArray
-from ...core.numerics.compiling import njit
+from ...core.numerics import FloatArray, njit
 from ...core.plugins.registry import Registry
 from ..state_variables import filled, find_variable, fixed, space_of, state_variable
 

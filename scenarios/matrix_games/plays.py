@@ -22,11 +22,9 @@ import numpy as np
 from ...core.agents.loop import EpisodeSummary
 from ...core.agents.team import Team
 from ...core.decision.exploration import Boltzmann, EpsilonDecreasingBoltzmann
-from ...core.evaluators.exact import ExactEnumeration
-from ...core.learners.one_step import FMQ, OptimisticTD
-from ...core.learners.td import Frozen, TDLambda
-from ...core.numerics.arrays import FloatArray, IntArray
-from ...core.numerics.compiling import njit
+from ...core.evaluators.evaluator import ExactEnumeration
+from ...core.learners.td import FMQ, Frozen, OptimisticTD, TDLambda
+from ...core.numerics import FloatArray, IntArray, njit
 
 BEST, UNIFORM, EMPIRICAL, CONDITIONAL = range(4)
 """Teammate models."""
@@ -179,7 +177,7 @@ def _choose(values, exploring, clock, rng) -> int:  # type: ignore[no-untyped-de
 
 @njit(cache=True)
 def _greatest(values, rng) -> int:  # type: ignore[no-untyped-def]
-    """Return the greatest value's place, see `nested_agents.core.numerics.ties.greatest`."""
+    """Return the greatest value's place, see `nested_agents.core.numerics.greatest`."""
     top = values.max()
     best = np.flatnonzero(values >= top - 1e-12 * max(1.0, abs(top)))
     return best[0] if len(best) == 1 else best[rng.integers(0, len(best))]

@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ...core.numerics.arrays import FloatArray
-from ...scenarios.faults.actuators import ActuatorFault
-from ...scenarios.faults.wrappers import FaultyEnv, FaultyParallelEnv
+from ...core.numerics import FloatArray
+from ...scenarios.faults.wrappers import ActuatorFault, FaultyEnv, FaultyParallelEnv
 from ..presentation.tables import SummaryTable, tabulate
+from ..results.analysis import Summary
 from ..results.statistics import NOT_NEGATIVE, bootstrap, rate
-from ..results.summary import Summary
 
 BLOCK = 5
 """Episodes that a level is measured over."""

@@ -15,18 +15,17 @@ from typing import Any
 import numpy as np
 
 from ...core.interface.scenario import roles_of
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ..errors import SpecError, show
-from ..presentation.progress import Terminal
-from ..presentation.words import count
+from ..presentation.progress import Terminal, count
 from ..results.results import Results, read
-from ..spec.overlay import TomlTable, dumps, nested, overlay
 from ..spec.spec import Spec
+from ..spec.tables import TomlTable, dumps, nested, overlay
 from ..store import durable
-from ..trials.arrangement import check
+from ..trials.session import check
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer
-from .run_study import run_study
+from .running import run_study
 from .study import StudyResults, load
 
 FIRST_SEED = 10_000
@@ -155,10 +154,10 @@ def tune(
             for trial in everything
             if trial.condition in wanted and trial.seed < first_seed + n_seeds
         }
-        observer.note(f"{count(len(names), 'configuration')} on {count(n_seeds, 'seed')}")
+        title = f"{count(len(names), 'configuration')} on {count(n_seeds, 'seed')}"
         with run_study(
             study, out, jobs=jobs, backend=backend, address=address, accept_code=accept_code,
-            observer=observer, chosen=list(planned.values()),
+            observer=observer, chosen=list(planned.values()), title=title,
         ) as store:  # fmt: skip
             results = read(store)
         table = _table(results, points, range(first_seed, first_seed + n_seeds))

@@ -28,9 +28,9 @@ from ..api.study import run
 from ..claims.claims import PUBLISHED
 from ..errors import SpecError
 from ..results import published
+from ..results.analysis import Summary
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, bootstrap, rate
-from ..results.summary import Summary
 from ..spec.spec import Spec
 from ..trials.session import EVALUATION_WORLDS
 
@@ -92,7 +92,10 @@ def load_entry(path: Path) -> Entry:
         If it cannot be read or breaks a rule; one line.
     """
     try:
-        return Entry(**tuples(json.loads(path.read_text(encoding="utf-8"))))
+        entry = tuples(json.loads(path.read_text(encoding="utf-8")))
+        if not isinstance(entry, dict):
+            raise TypeError("must be one table with the keys of an entry")
+        return Entry(**entry)
     except (ValueError, TypeError, RecursionError) as error:  # of JSON, or of a rule
         raise SpecError(f"{path}: {error}") from None
 

@@ -11,14 +11,22 @@ from typing import Any
 import numpy as np
 
 from ...core.agents.cost import Problem
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
+from ..catalogue.chain_order import order_tests
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..results.comparison import BySeed, difference, order_tests, paired_difference, ratio, shared
+from ..results.analysis import (
+    EVALUATED,
+    BySeed,
+    Sizes,
+    difference,
+    paired_difference,
+    ratio,
+    shared,
+)
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
-from ..results.summary import EVALUATED, Sizes
-from ..store.schema import EVALUATION
+from ..store.database import EVALUATION
 
 CONTACT = "contact_fraction"
 VALUE_OF = "learner.decision.value_of"

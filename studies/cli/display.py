@@ -54,10 +54,9 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
     int
         1 if any trial failed, else 0.
     """
-    from ...topologies.checks import listed
+    from ...topologies.builders import listed
     from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
-    from ..presentation.progress import say
-    from ..presentation.words import count
+    from ..presentation.progress import count, say
 
     directory = study.directory
     print_study(study)

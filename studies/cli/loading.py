@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...core.plugins.trust import is_trusted
-from ...core.plugins.trust import trust as trust_text
+from ...core.plugins.sources import is_trusted
+from ...core.plugins.sources import trust as trust_text
 from ..presentation.progress import say
 from ..spec.outline import other_spec
 from ..store.store import Store

@@ -124,7 +124,7 @@ changes = click.option(
     metavar="KEY=VALUE...",
     help='Lay values over the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
 )
-"""Assignments laid over a spec, see `nested_agents.studies.spec.overlay.assignment`."""
+"""Assignments laid over a spec, see `nested_agents.studies.spec.tables.assignment`."""
 
 figures = click.option(
     "--figures",
@@ -154,7 +154,7 @@ where = click.option(
     metavar="CHOICE",
     help="Only the trials of a choice, a query of pandas: \"robots == 8 and box == 'circle'\".",
 )
-"""A part of the trials, see `nested_agents.studies.results.selection.chosen`."""
+"""A part of the trials, see `nested_agents.studies.results.results.chosen`."""
 
 
 def formats(*choices: str, text: str = "How to print it.") -> Decorator:

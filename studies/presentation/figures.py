@@ -13,10 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import ArrayLike
 
-from ..results.aggregates import Aggregates
-from ..results.comparison import Difference
-from ..results.paired_tests import LEVEL
-from ..results.statistics import Estimate, stacked
+from ..results.analysis import Difference
+from ..results.contrasts import Aggregates
+from ..results.statistics import LEVEL, Estimate, stacked
 from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")

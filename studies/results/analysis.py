@@ -1,18 +1,272 @@
-"""What a study makes of its results: a table, words about it, and what its figures show."""
+"""What a study makes of its results: a table, words about it, and what its figures show.
 
-from collections.abc import Iterator, Mapping, Sequence
+The table has conditions against estimates. Conditions are compared with a reference seed by seed,
+on the worlds that both have met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from .comparison import Difference
-from .paired_tests import LEVEL
-from .power import SMALLEST, WANTED, detectable, deviation_of, seeds_for, seeds_needed
-from .statistics import Estimate
-from .summary import Summary, two_figures
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core.interface.scenario import SUCCESS
+from ...core.numerics import pd
+from ..errors import WIDTH
+from .power import SMALLEST, deviation_of, power_text
+from .results import Results
+from .statistics import LEVEL, Array, Estimate, bootstrap, holm, paired_permutation, rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+EVALUATED = "evaluation success"
+"""Title of the success of a trained team in the scenario of its condition."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A line of the table."""
+
+    condition: str
+    """Label of the condition."""
+    seeds: int
+    """Number of seeds that have finished."""
+    estimates: dict[str, Estimate]
+    """Estimates of no dimension by title."""
+
+
+def evaluated(results: Results, condition: str) -> dict[str, Estimate]:
+    """Return the success of a condition's trained teams by title, in its own scenario and others.
+
+    Those of `[evaluations]` are called ``success, NAME``.
+    """
+    if not results.has(condition, "evaluation", SUCCESS.name):
+        return {}
+    others = results.other_evaluations(condition).items()
+    phases = {EVALUATED: "evaluation", **{f"success, {name}": phase for name, phase in others}}
+    return {title: rate(results.success(condition, phase)) for title, phase in phases.items()}
+
+
+UNKNOWN = "agent groups"
+"""What bodies are called if their number is not swept."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Numbers of bodies.
+
+    Examples
+    --------
+    >>> joints = Sizes({"2": 2, "8": 8}, ("scenario.joints",))
+    >>> joints.shown(1), joints.shown(8), Sizes({"chain": 3, "star": 5}).shown(3)
+    ('1 joint', '8 joints', '3 agent groups')
+    >>> Sizes({"chain": 3, "star": 3}).shown(3)
+    ''
+    """
+
+    counts: Mapping[str, int]
+    """By condition."""
+    keys: Sequence[str] = ()
+    """Swept keys that are this number, whatever the scenario calls it."""
+
+    @classmethod
+    def of(cls, results: Results, conditions: Iterable[str]) -> Sizes:
+        """Return those of conditions whose trials have counted them."""
+        counts = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
+        swept = {c: results.columns.get(c, {}) for c in counts}
+        keys = dict.fromkeys(key for row in swept.values() for key in row)
+        own = (k for k in keys if all(str(swept[c].get(k)) == str(n) for c, n in counts.items()))
+        return cls(counts, tuple(own))
+
+    @property
+    def word(self) -> str:
+        """What bodies are called, in the plural."""
+        names = (k.removeprefix("scenario.") for k in self.keys if k.startswith("scenario."))
+        return next(names, UNKNOWN)
+
+    def shown(self, number: int) -> str:
+        """Return a number in words; nothing if it is the same everywhere, and nobody named it."""
+        if not self.keys and len(set(self.counts.values())) == 1:
+            return ""
+        return f"{number} {self.word.removesuffix('s') if number == 1 else self.word}"
+
+
+PHASES = {"training success": "training", EVALUATED: "evaluation"}
+"""Measures that conditions are compared by: success rates in these phases."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A condition minus the reference."""
+
+    condition: str
+    """What is compared with the reference."""
+    measure: str
+    """By what it is compared."""
+    seeds: int
+    """How many seeds both have finished."""
+    estimate: Estimate
+    """The mean difference with its 95 % bootstrap interval."""
+    raw: float
+    """p of no difference, by permutation of signs."""
+    p: float
+    """The same, adjusted over all that were compared together, see `adjusted`."""
+    sample: Array = field(repr=False, compare=False)
+    """The differences of single seeds ``(n_seeds,)``."""
+
+    @property
+    def shown(self) -> str:
+        """Value, interval, p as it is and adjusted, as text."""
+        e = self.estimate
+        interval = f"{_signed(e.value)} [{_signed(e.low)}, {_signed(e.high)}]"
+        return f"{interval}, {_p(self.p)} ({_p(self.raw, '')} unadjusted)"
+
+
+def _signed(value: ArrayLike) -> str:
+    """Return a difference with its sign, which rounding errors about 0 have not."""
+    text = f"{float(np.asarray(value)):+.2f}"
+    return "0.00" if text in ("+0.00", "-0.00") else text
+
+
+def _p(value: float, name: str = "p ") -> str:
+    if value < 0.001:
+        return f"{name}< .001"
+    return f"{name}{'= ' if name else ''}{value:.2g}"
+
+
+BySeed: TypeAlias = "pd.Series | pd.DataFrame"
+"""Values with their seeds as index."""
+Pair = tuple[str, str, BySeed, BySeed]
+"""What is compared, by which measure, and the values of it and of its reference, by seed."""
+
+
+def differences(
+    groups: Mapping[str, Iterable[Pair]], *, of_rates: bool = True
+) -> dict[str, tuple[Difference, ...]]:
+    """Compare conditions with their references; p is adjusted over all groups by Holm's method.
+
+    Parameters
+    ----------
+    groups
+        What is compared, by a name of what it has in common. Pairs that share fewer than two seeds
+        are left out.
+    of_rates
+        Whether values are rates.
+    """
+    names, compared = [], []
+    for group, pairs in groups.items():
+        for condition, measure, *values in pairs:
+            own, base = shared(values)
+            if len(own) >= 2:
+                names.append(group)
+                estimate = paired_difference(own, base, of_rates=of_rates)
+                compared.append((condition, measure, own, base, estimate))
+    made = list(zip(names, adjusted(compared), strict=True))
+    return {g: tuple(d for name, d in made if name == g) for g in groups}
+
+
+def adjusted(
+    compared: Sequence[tuple[str, str, Array, Array, Estimate]],
+) -> tuple[Difference, ...]:
+    """Return what is compared, by which measure, of pairs ``(n_seeds,)`` with an estimate.
+
+    p is adjusted over all of them by Holm's method.
+    """
+    raw = [paired_permutation(own, base) for _, _, own, base, _ in compared]
+    return tuple(
+        Difference(condition, measure, len(own), estimate, p, float(q), own - base)
+        for (condition, measure, own, base, estimate), p, q in zip(
+            compared, raw, holm(raw), strict=True
+        )
+    )
+
+
+def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
+    """Return the mean difference of paired values ``(n_seeds,)`` with its 95 % interval.
+
+    By bootstrap over seeds; of rates that differ alike for every seed, as of independent ones: the
+    interval of a bootstrap would have no width.
+    """
+    if of_rates and np.ptp(own - base) == 0.0:
+        return difference(own[:, None], base[:, None])
+    return bootstrap(own - base, bounds=(-1.0, 1.0) if of_rates else (-np.inf, np.inf))
+
+
+def shared(values: Sequence[BySeed]) -> list[Array]:
+    """Return values ``(n_seeds, ...)`` of the seeds that all have, of those by seed.
+
+    Examples
+    --------
+    >>> shared([pd.Series([0.0, 0.1, 0.2], [0, 1, 2]), pd.Series([1.2, 1.1], [2, 1])])
+    [array([0.1, 0.2]), array([1.1, 1.2])]
+    """
+    seeds = values[0].index
+    for other in values:
+        seeds = seeds.intersection(other.index, sort=False)
+    return [own.loc[seeds].to_numpy() for own in values]
+
+
+def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Estimate:
+    """Return the first success rate less the second, from outcomes ``(n_runs, n_episodes)``.
+
+    The interval combines those of the two rates (Newcombe 1998; Zou and Donner 2008). It takes the
+    rates for independent, which is careful where runs are paired; and unlike a bootstrap it has a
+    width even if all runs ended alike.
+
+    Examples
+    --------
+    >>> e = difference(np.ones((8, 5)), np.zeros((8, 5)))
+    >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
+    '1.00 [0.54, 1.00]'
+    """
+    a, b = rate(first, level), rate(second, level)
+    value = a.value - b.value
+    low = value - np.hypot(a.value - a.low, b.high - b.value)
+    return Estimate(value, low, value + np.hypot(a.high - a.value, b.value - b.low))
+
+
+def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> Estimate:
+    """Return the ratio of two success rates, from outcomes ``(n_runs, n_episodes)``.
+
+    The interval combines those of the two rates as `difference` does (Donner and Zou 2012). Where
+    the denominator may be zero there is no upper end; a ratio to zero is not a number.
+
+    Examples
+    --------
+    >>> e = ratio([[1, 1, 0, 1]] * 20, np.ones((20, 4)))
+    >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
+    '0.75 [0.63, 0.92]'
+    """
+    a, b = rate(numerator, level), rate(denominator, level)
+    if not b.value > 0.0:
+        return Estimate(*(np.asarray(np.nan) for _ in range(3)))
+    product = a.value * b.value
+    low_scale = b.high * (2.0 * b.value - b.high)
+    high_scale = b.low * (2.0 * b.value - b.low)
+    low, high = np.asarray(0.0), np.asarray(np.inf)
+    if low_scale > 0.0:
+        root = product**2 - a.low * (2.0 * a.value - a.low) * low_scale
+        low = np.asarray((product - np.sqrt(np.maximum(root, 0.0))) / low_scale)
+    if high_scale > 0.0:
+        root = product**2 - a.high * (2.0 * a.value - a.high) * high_scale
+        high = np.asarray((product + np.sqrt(np.maximum(root, 0.0))) / high_scale)
+    return Estimate(a.value / b.value, low, high)
+
+
+def phases_of(results: Results) -> dict[str, str]:
+    """Return those of `PHASES` that all trained conditions have."""
+    conditions = results.of_phase("training")
+    return {
+        title: phase
+        for title, phase in PHASES.items()
+        if all(results.has(condition, phase) for condition in conditions)
+    }
+
 
 Figures: TypeAlias = "dict[str, Figure]"
 """The figures of an analysis by name."""
@@ -43,32 +297,27 @@ class Analysis:
     """What was compared, by measure or by setting, p adjusted over all."""
 
 
-WIDTH = 80
-"""Of a line [characters]."""
-
-
 NOTHING = "Nothing to compare: no two conditions share two seeds."
-WORDS = ("worse", "better")
-"""What a significantly lower and a higher success rate are called."""
 
 
 def verdict_lines(
-    differences: Sequence[Difference], words: tuple[str, str] = WORDS
+    differences: Sequence[Difference], better: str | None = "higher"
 ) -> Iterator[str]:
     """Yield a line for every difference of one measure: the significant ones first, sorted.
 
-    `words` are what lower and higher values are called.
+    `better` are higher or lower values, or None: then they are called so.
     """
+    words = {"higher": ("worse", "better"), "lower": ("better", "worse"), None: ("lower", "higher")}
     for d in sorted(differences, key=lambda d: (d.p >= LEVEL, float(d.estimate.value))):
         is_higher = bool(d.estimate.value > 0)
-        word = words[is_higher] if d.p < LEVEL else "no significant difference"
+        word = words[better][is_higher] if d.p < LEVEL else "no significant difference"
         text = f"  {word}: {d.condition}, {d.shown}"
         yield from wrap(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def verdicts(
     groups: Mapping[str, Sequence[Difference]],
-    words: tuple[str, str] = WORDS,
+    better: str | None = "higher",
     *,
     of_rates: bool = True,
 ) -> list[str]:
@@ -81,7 +330,7 @@ def verdicts(
     for head, group in groups.items():
         if group:
             lines += wrap(f"{head}:", WIDTH, break_on_hyphens=False)
-            lines += verdict_lines(group, words)
+            lines += verdict_lines(group, better)
     if compared:
         counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
         lines.append(f"p: permutation of signs over seeds, adjusted over {counted} (Holm).")
@@ -114,43 +363,3 @@ def power_lines(differences: Sequence[Difference], *, of_rates: bool = True) -> 
     seeds = min(d.seeds for d in differences)
     deviation = deviation_of([d.sample for d in differences], of_rates=of_rates)
     return power_text(seeds, len(differences), deviation, SMALLEST if of_rates else None)
-
-
-def power_text(
-    seeds: int, comparisons: int, deviation: float | None, smallest: float | None
-) -> list[str]:
-    r"""Return lines on what paired seeds can tell, given the deviation of their differences.
-
-    Examples
-    --------
-    >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
-    Power: 5 seeds and 2 comparisons cannot give an adjusted p below .05, whatever
-      the outcome. It needs at least 7 seeds; for a difference of .20, about 18.
-    >>> print(*power_text(20, 1, 0.25, 0.2), sep="\n")
-    Power: with 20 seeds, a difference of .17 is found with probability .80. For a
-      difference of .20 it takes about 15 seeds.
-    """
-    counted = f"{seeds} seed{'s' * (seeds != 1)}"
-    among = f" and {comparisons} comparisons" if comparisons > 1 else ""
-    needed = seeds_needed(comparisons)
-    wanted = None
-    if smallest is not None and deviation is not None:
-        wanted = seeds_for(smallest, deviation, comparisons)
-    if seeds < needed:
-        text = (
-            f"{counted}{among} cannot give an adjusted p below .05, whatever the outcome. "
-            f"It needs at least {needed} seeds"
-        )
-        if smallest is not None and wanted is not None:
-            text += f"; for a difference of {two_figures(smallest)}, about {wanted}"
-        text += "."
-    elif deviation is None:
-        text = f"{counted}{among} that deviate by nothing: how small a difference they would find "
-        text += "cannot be determined."
-    else:
-        least = two_figures(detectable(deviation, seeds, comparisons))
-        text = f"with {counted}{among}, a difference of {least} is found with probability "
-        text += f"{two_figures(WANTED)}."
-        if smallest is not None and wanted is not None:
-            text += f" For a difference of {two_figures(smallest)} it takes about {wanted} seeds."
-    return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)

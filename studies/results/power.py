@@ -11,14 +11,14 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations
+from textwrap import wrap
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ...core.plugins.deferred import special
-from .paired_tests import EXACT, LEVEL
-
-Array = NDArray[np.float64]
+from ...core.numerics import special
+from ..errors import WIDTH
+from .statistics import EXACT, LEVEL, two_figures
 
 WANTED = 0.8
 """The power that studies are planned for (Cohen 1988)."""
@@ -234,3 +234,43 @@ def _simulated(effect: float, seeds: int, extreme: int) -> float:
         members[list(chosen), column] = 1.0
     reached = ((sizes @ members) <= negative[:, None] + 1e-12).sum(axis=1)
     return float((reached <= extreme).mean())
+
+
+def power_text(
+    seeds: int, comparisons: int, deviation: float | None, smallest: float | None
+) -> list[str]:
+    r"""Return lines on what paired seeds can tell, given the deviation of their differences.
+
+    Examples
+    --------
+    >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
+    Power: 5 seeds and 2 comparisons cannot give an adjusted p below .05, whatever
+      the outcome. It needs at least 7 seeds; for a difference of .20, about 18.
+    >>> print(*power_text(20, 1, 0.25, 0.2), sep="\n")
+    Power: with 20 seeds, a difference of .17 is found with probability .80. For a
+      difference of .20 it takes about 15 seeds.
+    """
+    counted = f"{seeds} seed{'s' * (seeds != 1)}"
+    among = f" and {comparisons} comparisons" if comparisons > 1 else ""
+    needed = seeds_needed(comparisons)
+    wanted = None
+    if smallest is not None and deviation is not None:
+        wanted = seeds_for(smallest, deviation, comparisons)
+    if seeds < needed:
+        text = (
+            f"{counted}{among} cannot give an adjusted p below .05, whatever the outcome. "
+            f"It needs at least {needed} seeds"
+        )
+        if smallest is not None and wanted is not None:
+            text += f"; for a difference of {two_figures(smallest)}, about {wanted}"
+        text += "."
+    elif deviation is None:
+        text = f"{counted}{among} that deviate by nothing: how small a difference they would find "
+        text += "cannot be determined."
+    else:
+        least = two_figures(detectable(deviation, seeds, comparisons))
+        text = f"with {counted}{among}, a difference of {least} is found with probability "
+        text += f"{two_figures(WANTED)}."
+        if smallest is not None and wanted is not None:
+            text += f" For a difference of {two_figures(smallest)} it takes about {wanted} seeds."
+    return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)

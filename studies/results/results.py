@@ -1,12 +1,14 @@
 """What the finished trials of a study measured, as two tidy frames: episodes and trials.
 
 Tables, comparisons, figures, reports and exported files are functions of these frames. A column's
-unit and meaning stand in ``frame.attrs["columns"]`` by its name.
+unit and meaning stand in ``frame.attrs["columns"]`` by its name. A part
+of a study's trials can be chosen, and several studies put together.
 """
 
 from __future__ import annotations
 
 import tomllib
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -16,11 +18,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.interface.measures import SUCCESS, Measure
-from ...core.plugins.deferred import pd
-from ..store.reading import NamesAndRows
-from ..store.schema import EVALUATION
-from ..store.store import Store
+from ...core.interface.scenario import SUCCESS, Measure
+from ...core.numerics import pd
+from ...core.plugins import sources
+from ..errors import SpecError
+from ..spec.labels import label
+from ..spec.tables import flat
+from ..store.database import EVALUATION
+from ..store.store import NamesAndRows, Store
+from ..trials.trial import joined as joined_measures
 
 Array = NDArray[Any]
 
@@ -263,34 +269,12 @@ NOTHING = partial(from_arrays, {}, {}, {}, {}, {}, (SUCCESS,))
 """Returns results of no trials."""
 
 
-def select(results: Results, keep: NDArray[np.bool_]) -> Results:
-    """Return the results of those trials, of the rows of the frame `trials`, that are kept."""
-    keys = ["condition", "seed"]
-    trials = results.trials[keep].reset_index(drop=True)
-    chosen = pd.MultiIndex.from_frame(trials[keys])
-    episodes = results.episodes[pd.MultiIndex.from_frame(results.episodes[keys]).isin(chosen)]
-    columns = {c: results.columns[c] for c in results.columns if c in set(trials["condition"])}
-    episodes = episodes.reset_index(drop=True)
-    return replace(results, episodes=episodes, trials=trials, columns=columns)
-
-
-def join(
+def _joined_results(
     parts: Sequence[Results],
     labels: Sequence[Mapping[str, str]],
     columns: Mapping[str, Mapping[str, Any]],
-    measures: tuple[Measure, ...],
 ) -> Results:
-    """Return results below each other.
-
-    Parameters
-    ----------
-    parts
-        The results.
-    labels
-        For each of them, what its conditions are called in the whole.
-    columns, measures
-        Of the whole, see `Results`.
-    """
+    """Return results below each other, by what each one's conditions are called in the whole."""
     frames: dict[str, list[pd.DataFrame]] = {"episodes": [], "trials": []}
     for part, new in zip(parts, labels, strict=True):
         for name, kept in frames.items():
@@ -303,6 +287,7 @@ def join(
             kept.append(frame.assign(condition=label, **swept))
     phases = dict.fromkeys(phase for part in parts for phase in part.phases)
     usage = (name for part in parts for name in part.usage)
+    measures = joined_measures(part.measures for part in parts)
     return assemble(frames["episodes"], frames["trials"], phases, columns, measures, usage)
 
 
@@ -332,3 +317,104 @@ def shown(name: str) -> tuple[Measure, float]:
         return Measure(name, _TITLES[name], "ms", better="lower", least=0.0), 1e3
     unit = "s" if name.startswith("seconds.") else "1"
     return Measure(name, name, NUMBERS[name][0] if name in NUMBERS else unit), 1.0
+
+
+DIRECTORY = "directory"
+"""Column that tells from which study a condition came, where there are several."""
+
+
+def chosen(results: Results, choice: str, settings: Mapping[str, Any]) -> Results:
+    """Return the results of the trials of a choice, such as ``robots == 8 and box == "circle"``.
+
+    Parameters
+    ----------
+    results
+        Of any studies.
+    choice
+        As `pandas.DataFrame.query` has it, over `condition`, `seed`, and what is set and swept: by
+        the last part of the key, or, where several keys end so, by the whole in backticks.
+    settings
+        By condition, as tables; what is swept goes before them.
+
+    Raises
+    ------
+    SpecError
+        If it is no choice, or names what trials have not; one line.
+    """
+    trials = results.trials[["condition", "seed"]]
+    set_ = [dict(flat(settings.get(c, {}))) for c in trials["condition"]]
+    swept = results.columns.get
+    known = [
+        own | {k: _plain(v) for k, v in swept(c, {}).items() if v != ""}
+        for own, c in zip(set_, trials["condition"], strict=True)
+    ]
+    frame = pd.DataFrame(known, index=trials.index).assign(**trials)
+    ends = [name.rpartition(".")[2] for name in frame]
+    names = {end: name for end, name in zip(ends, frame, strict=True) if ends.count(end) == 1}
+    frame = frame.assign(**{end: frame[name] for end, name in names.items()})
+    try:
+        keep = frame.query(choice).index
+    except Exception as error:  # of pandas, of Python's parser, of what is compared
+        problem = f"{sources.message(error)}; must be such as robots == 8 and box == 'circle'"
+        raise SpecError(f"where = {choice!r}: {problem}") from None
+    keys, trials = ["condition", "seed"], results.trials.loc[keep].reset_index(drop=True)
+    kept = pd.MultiIndex.from_frame(trials[keys])
+    episodes = results.episodes[pd.MultiIndex.from_frame(results.episodes[keys]).isin(kept)]
+    columns = {c: results.columns[c] for c in results.columns if c in set(trials["condition"])}
+    episodes = episodes.reset_index(drop=True)
+    return replace(results, episodes=episodes, trials=trials, columns=columns)
+
+
+def _apart(name: str, tables: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return labels of conditions of one name, by one or two settings that tell all apart; or none.
+
+    Examples
+    --------
+    >>> _apart("default", [{"scenario": {"robots": n, "box": "disc"}} for n in (2, 4)])
+    ['default, robots=2', 'default, robots=4']
+    """
+    own = [dict(flat(table)) for table in tables]
+    keys = dict.fromkeys(key for table in own for key in table)
+    other = [key for key in keys if len({repr(table.get(key)) for table in own}) > 1]
+    labels = [label({key: table.get(key, "") for key in other}, name) for table in own]
+    return labels if len(other) <= 2 and len(set(labels)) == len(labels) else []
+
+
+def together(
+    studies: Sequence[tuple[str, Results]], settings: Sequence[Mapping[str, Any]] = ()
+) -> tuple[Results, list[dict[str, str]]]:
+    """Return the results of several studies as those of one, and the new labels of each.
+
+    Conditions whose label occurs more than once are told apart by their `settings`, where one or
+    two of these differ, else by the name of their study. Their columns tell it, too, as
+    `DIRECTORY`.
+
+    Raises
+    ------
+    SpecError
+        If two studies mean different things by the name of a measure.
+    """
+    times = Counter(condition for _, results in studies for condition in results.columns)
+    several = [condition for condition, count in times.items() if count > 1]
+    labels = [
+        {c: f"{c} ({name})" if c in several else c for c in results.columns}
+        for name, results in studies
+    ]
+    for condition in several if settings else ():
+        at = [i for i, (_, results) in enumerate(studies) if condition in results.columns]
+        apart = _apart(condition, [settings[i].get(condition, {}) for i in at])
+        if not times.keys() & set(apart):
+            for i, text in zip(at, apart, strict=False):
+                labels[i][condition] = text
+    keys = dict.fromkeys(k for _, r in studies for row in r.columns.values() for k in row)
+    columns = {
+        new[condition]: {**{key: row.get(key, "") for key in keys}, DIRECTORY: name}
+        for (name, results), new in zip(studies, labels, strict=True)
+        for condition, row in results.columns.items()
+    }
+    return _joined_results([results for _, results in studies], labels, columns), labels
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of a column as what it stands for: ``true`` is a truth value there."""
+    return value == "true" if value in ("true", "false") else value

@@ -19,22 +19,20 @@ from typing import Annotated, Any, NamedTuple, cast
 
 from pydantic import AfterValidator, Field, ValidationError
 
-from ...core.agents.joint_agents import Agents, join_agents
+from ...core.agents.loop import Agents, join_agents
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario, groups_of
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
-from ...core.plugins.messages import closest
 from ...core.plugins.registry import Plugged
-from ...core.plugins.settings import ScenarioSettings, Settings, tuples, unwritten
+from ...core.plugins.settings import ScenarioSettings, Settings, closest, tuples, unwritten
 from ...scenarios import DEFAULT, SCENARIOS
 from ...topologies import build
 from ...topologies.config import Topology, parse
 from ..errors import SpecError, refused, show
 from .labels import label, scalar
-from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS
-from .refused import explain
+from .tables import TomlTable, explain, nested, overlay
 
 SECTIONS = ("scenario", "topology", "learner")
 

@@ -6,6 +6,7 @@ trial, its bits are the same: each trial has a process to itself, linear algebra
 
 import os
 import time
+import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -14,11 +15,10 @@ from typing import Any, get_args
 from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from ...core.plugins.messages import closest
+from ...core.plugins.settings import closest
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .runner import Backend, Workers
-from .worker import ONE_THREAD, Outcome, RunTrial, attempt, begin, cores
+from .runner import ONE_THREAD, Backend, Outcome, RunTrial, Workers, attempt, begin, cores
 
 
 def check_jobs(jobs: int) -> None:
@@ -75,6 +75,9 @@ def start_workers(
 QUIET = "ignore:resource_tracker:UserWarning"
 """The process that tidies up after a killed run would complain at length of what it tidies up."""
 
+REPLACED = "A worker stopped while some jobs were given to the executor"
+"""What loky says when it replaces a process that has grown by 300 MB, as PyTorch makes it grow."""
+
 THREADS = ("BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 """What tells other libraries to use one thread, beside `ONE_THREAD`."""
 
@@ -103,6 +106,7 @@ class LokyWorkers(Workers):
     def __init__(self, jobs: int) -> None:
         self.processes = jobs
         self._executor: Any = None
+        warnings.filterwarnings("ignore", REPLACED)
         filters = os.environ.get("PYTHONWARNINGS", "")
         if QUIET not in filters:  # processes that are started from here on inherit it
             os.environ["PYTHONWARNINGS"] = f"{filters},{QUIET}".lstrip(",")

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.measures import measures_of
-from nested_agents.core.interface.scenario import RecordedScenario, roles_of
+from nested_agents.core.interface.scenario import RecordedScenario, measures_of, roles_of
 from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings

@@ -32,6 +32,7 @@ LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
         ("peers-arm-long", LONG),
         ("peers-tuning", ("success, 12", "evaluation success")),
         ("peers-tuning-arm", ("success, 12", "evaluation success", SAMPLED)),
+        ("peers-tuning-arm-ours", ("success, 12", "evaluation success")),
         ("peers-predictors", PREDICTORS),
         ("peers-plans", PREDICTORS),
     ],

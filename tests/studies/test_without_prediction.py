@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.joint_agents import join_agents
-from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.agents.loop import control_loop, join_agents, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.learners.td import FrozenSettings
 from nested_agents.core.policies.settings import DQNSettings

@@ -8,26 +8,307 @@ States are pairs of a situation and a choice: the bearing of the goal from the b
 the box, when the robots chose, and the points that they chose. So their values are the action
 values of Q-learning, and predictions need no model: the choice is all that an agent can tell
 beforehand.
+
+Where a robot may stand to push a box is computed from the outline of the box. This is how box
+pushing is made easy by those who assign one agent to a robot (Wang and de Silva 2006): where to
+push is given, and what remains to be learned is which point to push at. The points are numbered by
+where they are on the outline. What is learned of a point is learned of its number, and means
+something else where the outline is another.
+
+A robot gets to a place by a short search over sequences of its own actions, around the box and
+clear of the other robots. A decision costs at most `LONGEST_SEARCH` sequences; those that come to
+the same wheel speeds are followed once, and of the other robots only those within reach count.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import atan2, pi
+from itertools import product
+from math import atan2, cos, log, pi, sin
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from shapely.geometry import Point, Polygon
+from shapely.geometry.polygon import orient
 
 from ....core.interface.scenario import Transition
 from ....core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.numerics import FloatArray, IntArray, njit
 from ..config import BoxPushingSettings, BoxTaskSettings
+from ..prediction.predictors import push_model
 from ..scenario import MEASURES, BoxPushing
-from ..world.geometry import wrap
+from ..world.bodies import BoxSpec, nominal_effect
+from ..world.geometry import surface, wrap
+from ..world.settings import RobotSettings
 from .config import PushingPointsSettings
-from .pushing import Pushing
+
+CLEARANCE = 0.006
+"""Least gap [m] to box and other robots on the way to a slot."""
+LONGEST_SEARCH = 5000
+"""Action sequences tried per robot and decision, those that come to the same included."""
+
+
+class Drivers:
+    """What each robot of a team can do by itself.
+
+    Parameters
+    ----------
+    scenario
+        What is in the world, and what robots can do in a decision period.
+
+    Attributes
+    ----------
+    model
+        What is believed of the world.
+    seconds
+        The decision period [s].
+    choices
+        ``(k, w)`` the robot actions, the same of every robot.
+    wheels
+        Per robot: where its wheels stand among those of all.
+    """
+
+    def __init__(self, scenario: BoxPushing) -> None:
+        self.robot, self.box, self.actions = scenario.robot, scenario.box, scenario.action_set
+        self.model = push_model("push", list(scenario.world.robots), self.box)
+        self.increment = scenario.settings.speed_increment
+        self.seconds = scenario.settings.period
+        self.choices = _robot_actions(self.robot, len(self.actions))
+        self.wheels = [slice(group[0], group[-1] + 1) for group in scenario.groups]
+        self._effect = nominal_effect(self.robot)
+
+    def next(self, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k robot actions.
+
+        `speeds` is ``(m, w)``.
+        """
+        limit = np.full(speeds.shape[-1], self.robot.max_speed)
+        after = self.actions.apply(
+            speeds[:, None], self.choices[None], self.increment * limit, limit
+        )
+        return after, after @ self._effect[:, :-1].T + self._effect[:, -1]
+
+    def rest(self, robot: int, speeds: FloatArray) -> int:
+        """Return the robot action after which a robot's wheels are slowest."""
+        after, _ = self.next(speeds[self.wheels[robot]][None])
+        return int(np.abs(after[0]).sum(axis=1).argmin())
+
+    def drive(
+        self,
+        robot: int,
+        robots: FloatArray,
+        box: FloatArray,
+        speeds: FloatArray,
+        target: FloatArray,
+    ) -> int:
+        """Return the robot action that leads a robot towards a pose ``(3,)``.
+
+        `robots` ``(M, 3)`` and `box` ``(3,)`` are present poses, `speeds` ``(n,)`` those of all
+        wheels.
+        """
+        now = speeds[self.wheels[robot]][None]
+        depth = int(log(LONGEST_SEARCH) / log(len(self.choices)))
+        span = self.robot.radius + self.robot.radius + CLEARANCE
+        within = span + depth * self.seconds * self.robot.max_speed
+        near = np.hypot(*(robots[:, :2] - robots[robot, :2]).T) < within
+        near[robot] = False
+        others = robots[near, :2]
+        poses, first = robots[robot][None], None
+        cost = np.zeros(1)
+        for _ in range(depth):
+            after, twists = self.next(now)
+            row, option = np.nonzero(_distinct(after))
+            poses, cost = poses[row], cost[row]
+            first = option if first is None else first[row]
+            now, twists = after[row, option], twists[row, option]
+            for _ in range(2):
+                poses = moved(poses, twists, self.seconds / 2)
+                apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
+                cost = cost + 10.0 * np.maximum(span - apart, 0.0).sum(axis=1)
+                path = paths(
+                    poses, target[:2], box, self.model.edges, self.model.rounding,
+                    self.robot.radius + CLEARANCE, self.box.reach,
+                )  # fmt: skip
+                turn = np.abs(wrap(poses[:, 2] - target[2]))
+                cost = cost + 0.1 * (path + 0.06 * turn * np.exp(-path / 0.05))
+            arrived = path + 0.06 * turn * np.exp(-path / 0.05)
+        assert first is not None
+        return int(first[(cost + arrived).argmin()])
+
+
+def _distinct(speeds: FloatArray) -> Any:
+    """Return which of ``(m, k, w)`` wheel speeds no earlier option gives, ``(m, k)``."""
+    same = (speeds[:, :, None] == speeds[:, None]).all(axis=-1)
+    return same.argmax(axis=2) == np.arange(speeds.shape[1])
+
+
+def _robot_actions(robot: RobotSettings, n_actions: int) -> IntArray:
+    """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
+    sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
+    groups = sorted(set(sides))
+    rows = product(range(n_actions), repeat=len(groups))
+    return np.array([[row[groups.index(side)] for side in sides] for row in rows])
+
+
+def moved(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:
+    """Return poses ``(m, 3)`` after moving with constant body twists ``(m, 3)``."""
+    turn = twists[:, 2] * seconds
+    middle = poses[:, 2] + turn / 2
+    chord = seconds * np.sinc(turn / (2 * pi))
+    cosine, sine = np.cos(middle), np.sin(middle)
+    x = poses[:, 0] + chord * (cosine * twists[:, 0] - sine * twists[:, 1])
+    y = poses[:, 1] + chord * (sine * twists[:, 0] + cosine * twists[:, 1])
+    return np.stack([x, y, poses[:, 2] + turn], axis=1)
+
+
+@njit(cache=True)
+def paths(
+    poses: FloatArray,
+    target: FloatArray,
+    box: FloatArray,
+    edges: FloatArray,
+    rounding: float,
+    margin: float,
+    reach: float,
+) -> FloatArray:
+    """Return about how far ``(m,)`` it is from poses to a target, around the box.
+
+    Straight if all of the way keeps `margin` from the box, else along a circle around it. Standing
+    too close to the box is penalised.
+    """
+    out = np.empty(len(poses))
+    cos_, sin_ = np.cos(box[2]), np.sin(box[2])
+    tx, ty = target[0] - box[0], target[1] - box[1]
+    ring = reach + margin + 0.01
+    for i in range(len(poses)):
+        x, y = poses[i, 0] - box[0], poses[i, 1] - box[1]
+        here = surface(edges, rounding, cos_ * x + sin_ * y, cos_ * y - sin_ * x)[0]
+        near = max(margin - here, 0.0)
+        blocked = False
+        for k in range(1, 9):
+            px, py = x + (tx - x) * k / 8, y + (ty - y) * k / 8
+            gap = surface(edges, rounding, cos_ * px + sin_ * py, cos_ * py - sin_ * px)[0]
+            if gap < min(margin, here):
+                blocked = True
+                break
+        if blocked:
+            rho = np.sqrt(x * x + y * y)
+            turn = np.arctan2(x * ty - y * tx, x * tx + y * ty)
+            out[i] = ring * abs(turn) + abs(rho - ring) + abs(np.sqrt(tx * tx + ty * ty) - ring)
+        else:
+            out[i] = np.sqrt((tx - x) ** 2 + (ty - y) ** 2)
+        out[i] += 20.0 * near
+    return out
+
+
+ARC = 64
+"""Corners of a quarter of a circle."""
+WAITING_GAP = 0.015
+"""Gap to the box at which a robot arrives at its point [m]."""
+AHEAD, BEHIND, ASIDE, TURN = 0.04, 0.05, 0.045, 0.7
+"""How far a robot may be off its point and still pushes [m, m, m, rad]."""
+STRAIGHT = 0.1
+"""How much a radian off the direction of pushing counts [m]."""
+
+
+class Pushing:
+    """Drives robots to pushing points of a box, and straight on from there.
+
+    Parameters
+    ----------
+    world
+        The scenario whose wheels are driven.
+    points
+        How many points there are around the box.
+
+    Attributes
+    ----------
+    points
+        ``(points, 3)`` poses in the frame of the box.
+    """
+
+    def __init__(self, world: BoxPushing, points: int) -> None:
+        self.points = pushing_points(world.box, points, world.robot.radius + WAITING_GAP)
+        self._drivers = Drivers(world)
+
+    def act(self, measurements: Mapping[str, Any], chosen: IntArray) -> IntArray:
+        """Return the actions of all wheels ``(n,)`` of robots on their way to points ``(M,)``.
+
+        `measurements` are what `BoxPushing.measure` returns.
+        """
+        robots, box = measurements["robot_poses"], measurements["box_pose"]
+        speeds = measurements["wheel_speeds"]
+        actions = []
+        for robot, (pose, point) in enumerate(zip(robots, self.points[chosen], strict=True)):
+            target = _in_world(box, point)
+            if _is_at(pose, target):
+                local = self._straight_on(robot, pose, speeds, target[2])
+            else:
+                local = self._drivers.drive(robot, robots, box, speeds, target)
+            actions.append(self._drivers.choices[local])
+        return np.concatenate(actions)
+
+    def _straight_on(self, robot: int, pose: FloatArray, speeds: FloatArray, way: float) -> int:
+        """Return the robot action that pushes fastest without turning away from `way` [rad]."""
+        own = speeds[self._drivers.wheels[robot]][None]
+        twists = self._drivers.next(own)[1][0]
+        seconds = self._drivers.seconds
+        turned = np.abs(wrap(pose[2] + seconds * twists[:, 2] - way))
+        return int((STRAIGHT * turned - seconds * twists[:, 0]).argmin())
+
+
+def _in_world(box: FloatArray, point: FloatArray) -> FloatArray:
+    """Return a pose in the frame of the box as one in the world."""
+    cos_, sin_ = cos(box[2]), sin(box[2])
+    x, y = cos_ * point[0] - sin_ * point[1], sin_ * point[0] + cos_ * point[1]
+    return np.array([box[0] + x, box[1] + y, box[2] + point[2]])
+
+
+def _is_at(pose: FloatArray, target: FloatArray) -> bool:
+    """Return whether a robot is near enough to its point to push."""
+    dx, dy = pose[:2] - target[:2]
+    cos_, sin_ = cos(target[2]), sin(target[2])
+    along, aside = cos_ * dx + sin_ * dy, cos_ * dy - sin_ * dx
+    turned = abs(wrap(pose[2] - target[2]))
+    return bool(-BEHIND < along < AHEAD and abs(aside) < ASIDE and turned < TURN)
+
+
+def pushing_points(box: BoxSpec, count: int, gap: float) -> FloatArray:
+    """Return poses ``(count, 3)`` around a box from which it can be pushed, in its frame.
+
+    They lie at equal distances on the curve that a round body follows on its way around the box,
+    counter-clockwise. The first is half such a distance past the place straight ahead of the box.
+
+    Parameters
+    ----------
+    box
+        The box.
+    count
+        How many.
+    gap
+        From the centre of the body to the surface of the box [m].
+
+    Examples
+    --------
+    Four points around a square of 20 cm lie off its corners, eight have two to a side:
+
+    >>> from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+    >>> pushing_points(BOXES["square"], 8, 0.05).round(2)[1:3].tolist()
+    [[0.07, 0.15, -1.57], [-0.07, 0.15, -1.57]]
+    """
+    radius = box.outline.rounding
+    solid = Point(0, 0).buffer(radius, ARC) if box.polygon is None else box.polygon
+    around = orient(Polygon(Polygon(solid.exterior).buffer(gap, ARC).exterior)).exterior
+    first = around.project(Point(4.0 * (box.reach + gap), 0.0))
+    poses = np.empty((count, 3))
+    for k in range(count):
+        place = around.interpolate((first + (k + 0.5) / count * around.length) % around.length)
+        _, nx, ny, _, _ = surface(box.outline.edges, radius, place.x, place.y)
+        poses[k] = place.x, place.y, atan2(-ny, -nx)
+    return poses
+
 
 MOST_VALUES = 10**6
 """The most action values of an agent, of a team that learns of joint choices."""

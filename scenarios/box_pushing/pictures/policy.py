@@ -18,12 +18,12 @@ from matplotlib.patches import Circle, PathPatch
 from shapely.geometry import Point, Polygon
 
 from ....core.agents.team import Team
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ..prediction.prediction import BoxPrediction
-from ..world.boxes import BoxSpec
+from ..world.bodies import BoxSpec
 from ..world.geometry import surface, wrap
 from ..world.settings import RobotSettings
-from ..world.starts import place
+from ..world.world import place
 from .rendering import BOX_COLOUR, curve
 
 AHEAD = 0.6

@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray
-from ....core.numerics.compiling import njit
-from ..world.robots import resistance
+from ....core.numerics import FloatArray, njit
+from ..world.bodies import resistance
 from ..world.settings import RobotSettings
 from .push import PushModel, pushed
 

@@ -14,10 +14,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.prediction import Blocks, first_alike
-from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.interface.spaces import Blocks, first_alike
+from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
-from ..world.reward import reward
+from ..world.settings import reward
 from .belief import outcomes
 from .push import PushModel, push
 from .situation import Premises, Situation

@@ -20,10 +20,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
-from ..world.boxes import BoxSpec
-from ..world.robots import compliance
+from ..world.bodies import BoxSpec, compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
 from .prediction import BoxPrediction

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ....core.interface.spaces import ActionSet
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ..states.relational import View
 from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline
-from ..world.reward import Task
-from ..world.settings import InfraredSettings
+from ..world.settings import InfraredSettings, Task
 from .belief import PushBelief
 
 

@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray, IntArray
-from ....core.numerics.compiling import njit
+from ....core.numerics import FloatArray, IntArray, njit
 
 SAME_TWIST = 1e-11
 """Twists [m/s, rad/s] that differ by less are one twist."""
@@ -179,7 +178,8 @@ def speeds_of(choices: IntArray, speeds: FloatArray) -> FloatArray:
     wheels = speeds.shape[2]
     wheel_speeds = np.empty((n * wheels, m))
     for r in range(n):
-        for j in range(wheels):
-            for c in range(m):
-                wheel_speeds[r * wheels + j, c] = speeds[r, choices[c, r], j]
+        for c in range(m):
+            choice = choices[c, r]
+            for j in range(wheels):
+                wheel_speeds[r * wheels + j, c] = speeds[r, choice, j]
     return wheel_speeds

@@ -11,8 +11,7 @@ from math import pi
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray, IntArray
-from ....core.numerics.compiling import njit
+from ....core.numerics import FloatArray, IntArray, njit
 from ..world import geometry as rows
 from ..world.geometry import LANES, ON_SURFACE, nearest_points
 from .relational import ARRIVED, AWAY, CLOSE, KEPT, LEAST, STATE_VARIABLES, STILL, View

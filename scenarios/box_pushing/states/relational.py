@@ -26,8 +26,7 @@ from math import pi
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray
-from ....core.numerics.compiling import njit
+from ....core.numerics import FloatArray, njit
 from ....core.plugins.registry import Registry
 from ...state_variables import StateFunction, StateVariable, fixed, state_variable
 from ..world.geometry import Outline, surface, wrap

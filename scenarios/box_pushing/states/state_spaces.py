@@ -15,7 +15,7 @@ from math import pi
 import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ...state_variables import StateVariable, filled, find_variable, sensed, space_of
 from ..world.geometry import wrap
 from .kernels import Columns

@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray
-from ....core.numerics.compiling import njit
+from ....core.numerics import FloatArray, njit
 
 ON_SURFACE = 1e-12
 """Distance below which the direction to the nearest point is meaningless [m]."""

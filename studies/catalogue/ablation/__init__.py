@@ -9,11 +9,9 @@ conditions and both measures.
 
 from collections.abc import Sequence
 
-from ...results.analysis import Analysis, Figures, verdicts
-from ...results.comparison import Pair, differences, phases_of
+from ...results.analysis import Analysis, Figures, Pair, Summary, differences, phases_of, verdicts
 from ...results.results import Results
 from ...results.statistics import exactly, rate
-from ...results.summary import Summary
 from ..study import run_training as measure
 
 PUBLISHED = ("success",)

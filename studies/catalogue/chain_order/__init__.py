@@ -11,14 +11,14 @@ them, by evaluation success alone, and a verdict says whether they are equal but
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from ...results.analysis import Analysis, Figures
-from ...results.comparison import order_tests
+import numpy as np
+
+from ...results.analysis import Analysis, Figures, phases_of, shared
 from ...results.contrasts import Group, contrasts
-from ...results.paired_tests import LEVEL
 from ...results.results import Results
-from ...results.summary import two_figures
+from ...results.statistics import LEVEL, Friedman, friedman, holm, two_figures
 from .. import ablation
 from ..study import run_training as measure
 
@@ -52,6 +52,45 @@ def equivalence(group: Group) -> str:
         verdict = "equal" if max(-low, high) <= MARGIN else "not decided"
     ends = f"{two_figures(low)} to {two_figures(high)}"
     return f"{group.setting}, {len(lows) + 1} orders, within {MARGIN:g}: {verdict} ({ends})"
+
+
+@dataclass(frozen=True)
+class OrderTest:
+    """Whether the orders differ at all by one measure."""
+
+    title: str
+    """The measure."""
+    orders: int
+    """How many there are."""
+    seeds: int
+    """How many seeds all orders have finished."""
+    test: Friedman
+    """The test."""
+    p: float
+    """Its p, adjusted over the measures."""
+
+    @property
+    def verdict(self) -> str:
+        """What the test found, in words."""
+        differ = "differ" if self.p < LEVEL else "do not differ significantly"
+        return (
+            f"{self.title}: {self.orders} orders {differ} (Friedman {self.test.statistic:.1f}, "
+            f"p = {self.test.p:.2g}, adjusted {self.p:.2g}; W = {self.test.concordance:.3f}; "
+            f"{self.seeds} seeds)"
+        )
+
+
+def order_tests(results: Results) -> tuple[OrderTest, ...]:
+    """Return the tests of all orders together, one for each measure that all of them have."""
+    conditions = results.of_phase("training")
+    made = []
+    for title, phase in phases_of(results).items() if len(conditions) > 1 else ():
+        means = [results.means(condition, phase) for condition in conditions]
+        values = np.stack(shared(means), axis=1)
+        if len(values) >= 2:
+            made.append((title, len(conditions), len(values), friedman(values)))
+    ps = holm([test.p for *_, test in made])
+    return tuple(OrderTest(*own, float(p)) for own, p in zip(made, ps, strict=True))
 
 
 def shortened(orders: Sequence[str]) -> list[str]:

@@ -16,9 +16,9 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.interface.scenario import groups_of
-from ...results.analysis import Analysis, Figures
+from ...results.analysis import EVALUATED, Analysis, Figures, Sizes
 from ...results.results import Results
-from ...results.summary import EVALUATED, Sizes, two_figures
+from ...results.statistics import two_figures
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.session import Session

@@ -11,10 +11,9 @@ edges are compared with none, as in the study `hierarchies`.
 
 from ....core.interface.scenario import groups_of
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures
+from ...results.analysis import EVALUATED, Analysis, Figures, Sizes
 from ...results.results import Results
 from ...results.statistics import exactly, rate
-from ...results.summary import EVALUATED, Sizes
 from ...spec.labels import label
 from ...spec.spec import Spec
 from ...trials.session import Session

@@ -11,11 +11,11 @@ from collections.abc import Iterator, Sequence
 from string import ascii_uppercase
 from textwrap import wrap
 
-from ...results.analysis import WIDTH, Analysis, Case, Figures
+from ...errors import WIDTH
+from ...results.analysis import Analysis, Case, Figures, Summary
 from ...results.results import Results
-from ...results.statistics import rate
-from ...results.summary import Summary, two_figures
-from ...store.schema import EVALUATION
+from ...results.statistics import rate, two_figures
+from ...store.database import EVALUATION
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check

@@ -18,11 +18,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import SpecError
-from ...results.analysis import NOTHING, Analysis, Figures, verdicts
-from ...results.comparison import Array, Pair, differences
+from ...results.analysis import (
+    EVALUATED,
+    NOTHING,
+    Analysis,
+    Figures,
+    Pair,
+    Sizes,
+    Summary,
+    differences,
+    verdicts,
+)
 from ...results.results import Results
-from ...results.statistics import Estimate, bootstrap, exactly, rate
-from ...results.summary import EVALUATED, Sizes, Summary
+from ...results.statistics import Array, Estimate, bootstrap, exactly, rate
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ..scaling import NUMBERS, measure

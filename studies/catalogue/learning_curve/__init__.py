@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ....core.interface.measures import SUCCESS, Measure
+from ....core.interface.scenario import SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated
 from ...results.contrasts import EPISODES, STEPS
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rate, rates
-from ...results.summary import EVALUATED, Summary, evaluated
 from ..study import run_training as measure
 
 if TYPE_CHECKING:

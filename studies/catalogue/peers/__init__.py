@@ -11,11 +11,17 @@ from time import process_time
 
 import numpy as np
 
-from ...results.analysis import Analysis, Figures, verdicts
-from ...results.comparison import Array, differences
+from ...results.analysis import (
+    EVALUATED,
+    Analysis,
+    Figures,
+    Summary,
+    differences,
+    evaluated,
+    verdicts,
+)
 from ...results.results import Results
-from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, stacked
-from ...results.summary import EVALUATED, Summary, evaluated
+from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stacked
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check

@@ -19,10 +19,9 @@ from typing import Any
 import numpy as np
 
 from ....core.agents.team import of_fuzzy_agents
-from ...results.analysis import Analysis, Case, Figures
+from ...results.analysis import EVALUATED, Analysis, Case, Figures, Summary, evaluated
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, bootstrap
-from ...results.summary import EVALUATED, Summary, evaluated
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult

@@ -19,13 +19,10 @@ import numpy as np
 from ....core.agents.loop import StepRecord
 from ....core.agents.team import of_fuzzy_agents
 from ....core.interface.scenario import groups_of
-from ....core.numerics.arrays import FloatArray
-from ....core.plugins.deferred import pd
-from ...results.analysis import Analysis, Figures
-from ...results.comparison import shared
+from ....core.numerics import FloatArray, pd
+from ...results.analysis import EVALUATED, Analysis, Figures, Sizes, Summary, evaluated, shared
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
-from ...results.summary import EVALUATED, Sizes, Summary, evaluated
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.session import Session

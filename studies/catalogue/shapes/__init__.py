@@ -8,11 +8,9 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 import numpy as np
 
-from ...results.analysis import Analysis, Figures, power_lines
-from ...results.comparison import Difference, adjusted, compare_pairs, ratio
+from ...results.analysis import Analysis, Difference, Figures, Summary, adjusted, power_lines, ratio
 from ...results.results import Results
 from ...results.statistics import Estimate, bootstrap, rate
-from ...results.summary import Summary
 from ...spec.spec import Spec
 from ..study import check_evaluations
 from ..study import run_training as measure
@@ -62,7 +60,7 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
     runs = base.mean(axis=1)
     return adjusted(
         [
-            compare_pairs(box, "ratio", outcomes.mean(axis=1), runs, ratio(outcomes, base))
+            (box, "ratio", outcomes.mean(axis=1), runs, ratio(outcomes, base))
             for box, outcomes in others.items()
         ]
     )

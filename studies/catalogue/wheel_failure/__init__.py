@@ -12,8 +12,6 @@ and steps that were run, so that those columns are lower bounds. The cumulative 
 what the episodes after the onset fall short of the level before, in episodes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
@@ -24,17 +22,14 @@ import numpy as np
 from ....core.agents.team import Team, of_fuzzy_agents
 from ....core.learners.learner import LearnerSettings
 from ....core.learners.td import FrozenSettings
-from ....core.plugins.deferred import pd
+from ....core.numerics import pd
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures, verdicts
-from ...results.comparison import Array, Pair, differences
+from ...results.analysis import Analysis, Figures, Pair, Summary, differences, verdicts
 from ...results.results import Results
-from ...results.statistics import NOT_NEGATIVE, bootstrap, rate
-from ...results.summary import Summary
+from ...results.statistics import NOT_NEGATIVE, Array, bootstrap, rate
 from ...spec.labels import label_but
 from ...spec.spec import Spec
-from ...trials.arrangement import arrange
-from ...trials.session import Session
+from ...trials.session import Session, arrange
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
 

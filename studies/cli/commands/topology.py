@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ....core.agents.joint_agents import Agents
+from ....core.agents.loop import Agents
 from ....core.interface.scenario import groups_of
 from ....topologies.view import Form, HierarchyView, kinds, printed, view
 from ...errors import SpecError, refused
@@ -22,18 +22,18 @@ TOPOLOGY = {"kind", "members", "edges"}
 
 
 @click.group(no_args_is_help=False)
-def command() -> None:
+def topology() -> None:
     """List the topologies, or show one of them."""
 
 
-@command.command("list")
+@topology.command("list")
 def list_all() -> int:
     """List the topologies, built-in and installed."""
     print(kinds())
     return 0
 
 
-@command.command()
+@topology.command()
 @click.argument("topology", metavar="SPEC")
 @click.option(
     "--agents",

@@ -12,12 +12,10 @@ from nested_agents.core.adaptation.predictors import (
     Persistence,
     StaticPredictor,
 )
-from nested_agents.core.agents.joint_agents import join_agents
-from nested_agents.core.agents.loop import control_loop
+from nested_agents.core.agents.loop import control_loop, join_agents
 from nested_agents.core.agents.team import Team
-from nested_agents.core.interface.prediction import states_by_group
 from nested_agents.core.interface.scenario import Scenario, Transition, groups_of
-from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
+from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable, states_by_group
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.checking.predictions import faults_of_prediction

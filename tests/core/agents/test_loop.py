@@ -1,21 +1,38 @@
-"""The control loop: numbering, ends of episodes, paired worlds, determinism, learning."""
+"""The control loop: numbering, ends of episodes, paired worlds, determinism, learning.
+
+One agent per robot, one agent for the team: the same world, told in other words.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.loop import StepRecord, control_loop, policy_seed, world_seed
+from nested_agents.core.adaptation.self_model import SelfModelSettings
+from nested_agents.core.agents.loop import (
+    Agents,
+    JointPrediction,
+    StepRecord,
+    control_loop,
+    join_agents,
+    policy_seed,
+    world_seed,
+)
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
-from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.interface.scenario import EmbodiedScenario, Scenario, roles_of
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
 from nested_agents.core.rules.rule_base import RuleBaseSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents.scenarios.checking.checker import check_scenario
+from nested_agents.topologies import build
 
 LEARNING = TDLambdaSettings(step_size=0.1)
 
@@ -175,3 +192,183 @@ def test_a_team_learns_to_push(line_world) -> None:
 
     assert solved(settings, 10) >= 0.9
     assert solved(FrozenSettings(decision=Decision(rule="random")), 0) <= 0.3
+
+
+@pytest.fixture
+def pair(line_world):
+    """A world of two agents and the same one seen as one agent's, in the same state."""
+    world, single = line_world(2, 1), join_agents(line_world(2, 1), "team")
+    assert (single.reset(1) == world.reset(1).reshape(1, -1)).all()
+    return world, single
+
+
+def test_one_agent_with_all_joint_actions_and_variables(pair) -> None:
+    _, single = pair
+    assert (single.agents, single.groups) == (("single",), ((0,),))
+    assert len(single.action_set) == 16
+    assert single.action_set.names[:3] == (
+        "increase+increase", "increase+decrease", "increase+maintain",
+    )  # fmt: skip
+    assert single.action_set.names[single.action_set.neutral] == "maintain+maintain"
+    names = [v.name for v in single.state_space.variables]
+    assert names[:4] == ["cart0.wheel0.speed", "cart0.wheel0.phase", "cart0.wheel0.gap",
+                         "cart1.wheel0.speed"]  # fmt: skip
+    assert single.state_space.n_variables == 6
+
+
+def test_an_agent_for_every_actuator_is_the_scenario_itself(line_world) -> None:
+    world = line_world(2, 2)
+    assert join_agents(world, "actuator") is world
+
+
+def test_any_hierarchy_is_built_over_bodies(line_world) -> None:
+    bodies = join_agents(line_world(3, 2), "body")
+    assert build("star:cart1", bodies.agents).edges == ((1, 0), (1, 2))
+    assert build("tree:2", bodies.agents).edges == ((0, 1), (0, 2))
+
+
+def test_steps_are_those_of_the_world(pair) -> None:
+    world, single = pair
+    for code, joint in enumerate(product(range(4), repeat=2)):
+        expected, found = world.step(np.array(joint)), single.step(np.array([code]))
+        assert (found.states == expected.states.reshape(1, -1)).all()
+        assert (found.reward, found.info) == (expected.reward, expected.info)
+    assert single.scenario.measure() == world.measure()
+
+
+def test_predictions_are_those_of_the_world(pair) -> None:
+    world, single = pair
+    prediction, expected = single.predict(), world.predict()
+    joint = np.array(list(product(range(4), repeat=2)))
+    codes = np.arange(16)[:, None]
+    both = np.concatenate([expected.states(i, joint) for i in range(2)], axis=1)
+    assert (prediction.states(0, codes) == both).all()
+    assert (prediction.rewards(codes) == expected.rewards(joint)).all()
+    assert (prediction.reward_table() == expected.reward_table()).all()
+    blocks = prediction.blocks(0)
+    assert (blocks.states(np.arange(16)) == both).all()
+
+
+def test_a_team_of_one_acts_and_learns(pair) -> None:
+    _, single = pair
+    settings = TDLambdaSettings(rule_base=RuleBaseSettings(memberships=2, order=6), step_size=0.1)
+    team = Team(settings, single, Hierarchy(["single"], []), np.random.SeedSequence(1))
+    records = list(control_loop(single, team, episodes=2, steps=5, seed=1))
+    assert len(records) == 10
+    assert team.learner.theta.shape == (1, 2**6)
+    assert np.abs(team.learner.theta).max() > 0
+    assert team.evaluator.counts.joint_actions == 10 * 16
+
+
+class Bare:
+    """A prediction that has what it is told to have of a line world's, and the next states."""
+
+    def __init__(self, prediction, *names: str) -> None:
+        for name in ("states", *names):
+            setattr(self, name, getattr(prediction, name))
+
+
+@pytest.mark.parametrize(
+    ("names", "of_robots", "of_one"),
+    [
+        ((), set(), {"blocks"}),
+        (("rewards",), {"rewards"}, {"rewards", "blocks", "reward_table"}),
+        (("rewards", "blocks", "reward_table"),) + ({"rewards", "blocks", "reward_table"},) * 2,
+    ],
+)
+def test_predictions_can_do_what_the_scenarios_can(
+    names, of_robots: set[str], of_one: set[str], line_world
+) -> None:
+    for agents, expected in (("body", of_robots), ("team", of_one)):
+        scenario = join_agents(line_world(2, 1), agents)
+        scenario.reset(0)
+        found = JointPrediction(Bare(scenario.scenario.predict(), *names), scenario)
+        assert {n for n in ("rewards", "blocks", "reward_table") if hasattr(found, n)} == expected
+
+
+def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
+    world, robots = line_world(2, 2), join_agents(line_world(2, 2), "body")
+    assert not isinstance(robots, EmbodiedScenario)
+    assert robots.agents == ("cart0", "cart1")
+    assert len(robots.action_set) == 16
+    assert robots.action_set.names[robots.action_set.neutral] == "maintain+maintain"
+    names = [v.name for v in robots.state_space.variables]
+    assert names == ["wheel0.speed", "wheel0.phase", "wheel1.speed", "wheel1.phase", "gap"]
+    before, joined = world.reset(3), robots.reset(3)
+    assert (joined[1] == [*before[2, :2], *before[3, :2], before[2, 2]]).all()
+    one, other = world.step(np.array([0, 1, 2, 3])), robots.step(np.array([1, 11]))
+    assert (other.states[0] == [*one.states[0, :2], *one.states[1]]).all()
+    assert other.reward == one.reward
+
+
+def test_predictions_by_blocks_are_those_by_states(line_world) -> None:
+    robots = join_agents(line_world(2, 2), "body")
+    robots.reset(0)
+    robots.step(np.array([0, 5]))
+    prediction = robots.predict()
+    codes = np.arange(256)
+    joint = np.stack([codes // 16, codes % 16], axis=1)
+    for agent in range(2):
+        blocks = prediction.blocks(agent)
+        assert blocks.states(codes) == pytest.approx(prediction.states(agent, joint))
+    assert prediction.reward_table() == pytest.approx(prediction.rewards(joint))
+
+
+def test_robots_whose_wheels_have_the_same_roles_are_of_one_role(line_world) -> None:
+    world = line_world(2, 2)
+    assert roles_of(join_agents(world, "body")) == (
+        "cart0.wheel0+cart0.wheel1",
+        "cart1.wheel0+cart1.wheel1",
+    )
+    world.roles = ("front", "rear") * 2
+    assert roles_of(join_agents(world, "body")) == ("front+rear", "front+rear")
+
+
+@pytest.mark.parametrize(("agents", "n"), [("body", 2), ("team", 1)])
+def test_rewards_of_wheels_are_joined(agents: Agents, n: int) -> None:
+    settings = BoxPushingSettings.model_validate({"reward": {"of": "robot"}})
+    world = BoxPushing(settings)
+    scenario = join_agents(BoxPushing(settings), agents)
+    world.reset(0)
+    scenario.reset(0)
+    of_wheels = np.asarray(world.step(np.full(4, world.action_set.neutral)).reward)
+    joined = scenario.step(np.full(n, scenario.action_set.neutral)).reward
+    assert joined == pytest.approx(of_wheels.reshape(n, -1).mean(axis=1))
+
+
+def test_the_scenario_keeps_its_promises() -> None:
+    def make() -> Scenario:
+        return join_agents(BoxPushing(BoxPushingSettings()), "body")
+
+    assert "predictions" in check_scenario(make, steps=10).passed
+
+
+def test_both_evaluators_and_a_self_model_work_on_it() -> None:
+    settings = BoxPushingSettings()
+    weights = []
+    for evaluator in ("exact", "sampling"):
+        learner = BatchTDSettings(
+            decision=Decision(evaluator=evaluator),  # type: ignore[arg-type]
+            self_model=SelfModelSettings(enabled=True),
+        )
+        scenario = join_agents(BoxPushing(settings), "body")
+        hierarchy = build("chain", scenario.agents)
+        assert hierarchy.edges == ((0, 1),)
+        team = Team(learner, scenario, hierarchy, policy_seed(0))
+        nominal = team.self_model.effects[0].copy()
+        for record in control_loop(scenario, team, episodes=2, steps=8, seed=0):
+            assert record.joint_action.shape == (2,)
+        assert (team.self_model.effects[0] != nominal).any()
+        weights.append(team.learner.theta)
+    assert all(np.abs(theta).sum() > 0.0 for theta in weights)
+
+
+def test_what_cannot_be_is_refused(line_world) -> None:
+    with pytest.raises(ValueError, match=r"agents = 'body': 4 \*\* 5 actions each, allowed: 256"):
+        join_agents(line_world(1, 5), "body")
+    world = line_world(1, 3)
+    world.groups = ((0, 1), (2,))
+    with pytest.raises(ValueError, match=r"agents = 'body': bodies of \[1, 2\] actuators"):
+        join_agents(world, "body")
+    with pytest.raises(ValueError, match=r"agents = 'team': 4 \*\* 7 actions each, allowed: 4096"):
+        join_agents(line_world(7, 1), "team")

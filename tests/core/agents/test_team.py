@@ -9,18 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.joint_agents import join_agents
-from nested_agents.core.agents.loop import control_loop
+from nested_agents.core.agents.loop import control_loop, join_agents
 from nested_agents.core.agents.messages import AbsentAgents, LostMessages
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
-from nested_agents.core.decision.settings import Decision
-from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
-from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling
+from nested_agents.core.evaluators.evaluator import (
+    Counts,
+    EvaluatorSettings,
+    ExactEnumeration,
+    Sampling,
+)
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import carried_rows
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings
+from nested_agents.core.learners.learner import Decision
 from tests.scenarios.test_examples import Tank
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}

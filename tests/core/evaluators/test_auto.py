@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import Decision
 from nested_agents.core.evaluators.best_response import BestResponse
-from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling
+from nested_agents.core.evaluators.evaluator import ExactEnumeration, Sampling
 from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import FrozenSettings
 
 

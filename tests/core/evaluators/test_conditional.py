@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import Decision
+from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.topologies import build, parse

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from nested_agents.core.evaluators.cross_entropy import CrossEntropySettings
+from nested_agents.core.evaluators.coordination import CrossEntropySettings
 from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation, Evaluator
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable

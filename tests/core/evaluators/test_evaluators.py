@@ -13,19 +13,16 @@ from nested_agents.core.evaluators.evaluator import (
     MOST_JOINT_ACTIONS,
     DecisionProblem,
     Deliberation,
-    Rule,
-    Teammates,
-    combinations,
-)
-from nested_agents.core.evaluators.exact import (
     ExactEnumeration,
+    Rule,
     Sampling,
     SamplingSettings,
+    Teammates,
+    combinations,
     probabilities_of,
 )
 from nested_agents.core.interface.hierarchy import Hierarchy
-from nested_agents.core.interface.prediction import Blocks
-from nested_agents.core.interface.spaces import StateSpace, Variable
+from nested_agents.core.interface.spaces import Blocks, StateSpace, Variable
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 A = 4

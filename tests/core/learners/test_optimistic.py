@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.one_step import (
+from nested_agents.core.learners.td import (
     FMQ,
     FMQSettings,
     OptimisticTD,
     OptimisticTDSettings,
+    TDLambda,
+    TDLambdaSettings,
 )
-from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.learners.one_step import QLearningSettings
+from nested_agents.core.learners.td import QLearningSettings
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 PLACE = Variable("place", "1", 0, 2, centres=(0.0, 1.0, 2.0))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.one_step import (
+from nested_agents.core.learners.td import (
     SparseCooperative,
     SparseCooperativeSettings,
     ValueDecomposition,

@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.joint_agents import join_agents
-from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.agents.loop import control_loop, join_agents, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.evaluators import EVALUATORS
@@ -185,7 +184,7 @@ def test_settings_are_read_without_numba_and_scipy() -> None:
     assert len(models) >= 12
     program = """
 import sys
-import nested_agents.core.decision.settings
+import nested_agents.core.learners.learner
 from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.learners import LEARNERS

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.core.plugins import trust
+from nested_agents.core.plugins import sources
 from nested_agents.core.plugins.sources import Sources, active
 
 TEXT = "LINKS = 3\n\n\ndef twice(x):\n    return 2 * x\n"
@@ -107,7 +107,7 @@ def test_the_copy_of_a_study_stands_in_for_a_file_that_is_gone(tmp_path: Path) -
     (copies / "links.py").write_text("LINKS = 3")
     with pytest.raises(ValueError, match=r"^links\.py came with .*out and was not run from a spec"):
         Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS")
-    trust.trust("LINKS = 3")
+    sources.trust("LINKS = 3")
     assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 3
     (tmp_path / "links.py").write_text("LINKS = 4")
     assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 4

@@ -12,8 +12,7 @@ from nested_agents.core.policies.peer import FARTHEST, Inputs, Peer, RewardScale
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
-from nested_agents.studies.trials.session import Session, run_trial
+from nested_agents.studies.trials.session import Session, check, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 TABLE: dict[str, Any] = {
@@ -86,7 +85,7 @@ def test_rewards_are_scaled_by_the_spread_of_returns() -> None:
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.policies.ppo", None)
+    monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.policies.networks", None)
     with pytest.raises(SpecError, match=r"'ippo': needs the extra peers, pip install") as raised:
         check(spec_of("ippo"))
     assert "\n" not in str(raised.value)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from world_oracles import surface_numpy
 
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.prediction.push import SUBSTEPS, SWEEPS, PushModel
 from nested_agents.scenarios.box_pushing.prediction.push_lanes import CREEP, MARGIN, START_SPEED
 

@@ -10,10 +10,9 @@ import pytest
 from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import Decision
-from nested_agents.core.interface.measures import measures_of
-from nested_agents.core.interface.scenario import can_draw
+from nested_agents.core.interface.scenario import can_draw, measures_of
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing

@@ -13,20 +13,23 @@ import numpy as np
 import pytest
 
 from nested_agents import View, state_variable
-from nested_agents.core.agents.joint_agents import join_agents
-from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.core.interface.prediction import Blocks
-from nested_agents.core.interface.scenario import Scenario, Transition
-from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
+from nested_agents.core.agents.loop import join_agents
+from nested_agents.core.interface.scenario import SUCCESS, Measure, Scenario, Transition
+from nested_agents.core.interface.spaces import ActionSet, Blocks, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import (
     WheelFailure,
 )
-from nested_agents.scenarios.checking.checker import CHECKS, ScenarioError, check_scenario
+from nested_agents.scenarios.checking.checker import (
+    CHECKS,
+    ScenarioError,
+    check_scenario,
+    faults_of_sensing,
+    predicted_steps,
+)
 from nested_agents.scenarios.checking.frames import random_actions
 from nested_agents.scenarios.checking.predictions import faults_of_prediction
-from nested_agents.scenarios.checking.sensing import faults_of_sensing, predicted_steps
 from nested_agents.scenarios.line_up import (
     DISTANCE,
     LEAD,

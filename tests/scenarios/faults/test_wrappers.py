@@ -14,7 +14,7 @@ from pettingzoo import ParallelEnv
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 from nested_agents import faults
-from nested_agents.scenarios.faults.actuators import KINDS
+from nested_agents.scenarios.faults.wrappers import KINDS
 
 BOX = Box(np.array([-2.0, 0.0]), np.array([2.0, 1.0]), dtype=np.float64)
 

@@ -96,6 +96,7 @@ def test_the_same_draw_gives_the_same_configurations() -> None:
         (["--set", "tune.'rigde'=[1]"], "tune.rigde: unknown key"),
         (["--set", "tune.'learner.ridge'=[10.0]"], "tune: there is nothing to try: all are"),
         (["--set", "sweep.'learner.ridge'=[1.0, 2.0]"], "sweep, overrides: must be absent"),
+        (["--address", "tcp://localhost:8786"], "address"),
     ],
 )
 def test_what_cannot_be_tuned_is_refused_in_a_line(changes, message, tmp_path, capsys) -> None:

@@ -79,10 +79,15 @@ def test_what_breaks_a_rule(
 
 
 def test_a_file_that_is_no_entry(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for text in ("[]", "{", '{"name": "mine"}'):
+    for text, message in (
+        ("[]", "entry.json: must be one table with the keys of an entry"),
+        ("{", "entry.json: Expecting"),
+        ('{"name": "mine"}', "missing"),
+    ):
         (tmp_path / "entry.json").write_text(text)
         assert main(["benchmark", "check", str(tmp_path / "entry.json")]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
+        error = capsys.readouterr().err
+        assert (error.count("\n"), message in error) == (1, True)
 
 
 def test_the_schema_of_the_docs(entry: Any, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,8 +11,7 @@ from made_up_results import NOTHING, Arrays
 from nested_agents.studies.catalogue import chain_order as chain_order
 from nested_agents.studies.catalogue.chain_order import analyse, draw
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.analysis import Analysis
-from nested_agents.studies.results.comparison import Difference
+from nested_agents.studies.results.analysis import Analysis, Difference
 from nested_agents.studies.spec.spec import Spec
 
 STUDIES = Path(chain_order.__file__).parent

@@ -7,12 +7,7 @@ import pytest
 from made_up_results import NOTHING, hierarchies
 
 from nested_agents.studies.catalogue import hierarchies as module
-from nested_agents.studies.catalogue.hierarchies import (
-    analyse,
-    check,
-    draw,
-    measure,
-)
+from nested_agents.studies.catalogue.hierarchies import analyse, check, draw, measure
 from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
@@ -21,7 +16,7 @@ from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.power import seeds_needed
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check as measures_of
+from nested_agents.studies.trials.session import check as measures_of
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers import runner
 

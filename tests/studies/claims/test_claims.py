@@ -39,7 +39,7 @@ from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.studies import STUDIES
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 QUICK = Path(claims.__file__).parent / "quick"
 CATALOGUE = QUICK.parents[1] / "catalogue"
@@ -299,6 +299,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "wide",
         "peers-tuning",
         "peers-tuning-arm",
+        "peers-tuning-arm-ours",
         "peers-one-robot",
         "peers-four-robots",
         "peers-100",

@@ -4,8 +4,8 @@ import pytest
 import nested_agents as na
 from nested_agents.studies.cli.display import print_table, show_results
 from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.results.analysis import Summary
 from nested_agents.studies.results.statistics import Estimate
-from nested_agents.studies.results.summary import Summary
 
 TITLES = ["success", "evaluation success", "final orientation error [rad]", "time in contact"]
 LINES = [

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.core.plugins import trust
+from nested_agents.core.plugins import sources
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.store.store import SPEC_FILE
+from nested_agents.studies.store.database import SPEC_FILE
 
 SPEC = """
 study = "mine.py:STUDY"
@@ -58,7 +58,7 @@ def foreign(tmp_path: Path, mark: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     assert main(["run", str(home / "spec.toml"), "--out", str(study), "--jobs", "1"]) == 0
     mark.unlink()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "ours"))
-    monkeypatch.setattr(trust, "_here", set())
+    monkeypatch.setattr(sources, "_here", set())
     forget_modules()
     return study
 
@@ -95,7 +95,7 @@ def test_trust_is_said_once_and_kept(
     assert main(["explain", str(foreign), "--trust"]) == 0
     assert f"mine.py, which came with {foreign}, is trusted" in capsys.readouterr().err
     assert mark.exists()
-    monkeypatch.setattr(trust, "_here", set())  # as in another process
+    monkeypatch.setattr(sources, "_here", set())  # as in another process
     forget_modules()
     for command in RUNNING:
         assert main([command, str(foreign)]) == 0, command
@@ -116,10 +116,10 @@ def test_without_a_list_trust_lasts_as_long_as_the_process(
 ) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
-    assert not trust.is_trusted("x = 8")
-    trust.trust("x = 8")
-    assert trust.is_trusted("x = 8")
-    assert not trust.is_trusted("x = 9")
+    assert not sources.is_trusted("x = 8")
+    sources.trust("x = 8")
+    assert sources.is_trusted("x = 8")
+    assert not sources.is_trusted("x = 9")
 
 
 def test_the_kept_spec_runs_elsewhere_with_the_copies_beside_it(

@@ -1,8 +1,9 @@
 import numpy as np
 
 from nested_agents.core.adaptation.self_model import SelfModel, SelfModelSettings
-from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
-from nested_agents.studies.explain.text import Bodies, effects_table, verdicts
+from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS, nominal_effect
+from nested_agents.studies.explain.team import Bodies
+from nested_agents.studies.explain.text import effects_table, verdicts
 
 FOUR = nominal_effect(ROBOTS["four-wheel"])
 AGENTS = [f"robot{r}.{name}" for r in (1, 2) for name in ROBOTS["four-wheel"].wheel_names]

@@ -4,8 +4,8 @@ import io
 import numpy as np
 
 from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.results.analysis import Summary
 from nested_agents.studies.results.statistics import Estimate
-from nested_agents.studies.results.summary import Summary
 
 
 def estimate(*numbers: float) -> Estimate:

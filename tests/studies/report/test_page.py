@@ -9,7 +9,7 @@ from nested_agents import studies
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.report.page import page
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.store import DATABASE
+from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.trials.trial import trials_of
 
 

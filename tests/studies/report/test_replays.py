@@ -1,9 +1,9 @@
 import base64
 import json
 
-from nested_agents.scenarios.box_pushing.pictures import player
+from nested_agents.scenarios.box_pushing.pictures import rendering
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.studies.report.replays import replays
+from nested_agents.studies.report.page import replays
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import spec_of
 from nested_agents.studies.trials.trial import trials_of
@@ -40,13 +40,13 @@ def test_damaged_and_foreign_recordings_are_named(kept, tmp_path, monkeypatch):
     assert len(found.remarks) == 1
     assert found.remarks[0].startswith("Not shown, as the recording is missing or damaged: ")
     monkeypatch.delattr(BoxPushing, "animate")
-    monkeypatch.setattr(player, "NEEDED", ("hat",))
+    monkeypatch.setattr(rendering, "NEEDED", ("hat",))
     assert "the scenario cannot draw it" in "".join(read(directory).remarks)
 
 
 def test_what_the_canvas_cannot_play_is_drawn_by_its_scenario(kept, tmp_path, monkeypatch):
     directory = kept(tmp_path)
-    monkeypatch.setattr(player, "NEEDED", ("hat",))
+    monkeypatch.setattr(rendering, "NEEDED", ("hat",))
     found = read(directory)
     assert [(film.condition, film.seed) for film in found.films] == [("default", 0), ("frozen", 0)]
     assert all(base64.b64decode(film.data).startswith(b"GIF89a") for film in found.films)

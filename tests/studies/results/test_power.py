@@ -2,18 +2,17 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from nested_agents.studies.results.analysis import power_lines, power_text, verdict_lines
-from nested_agents.studies.results.comparison import Difference, adjusted, compare_pairs
-from nested_agents.studies.results.paired_tests import LEVEL, paired_permutation
+from nested_agents.studies.results.analysis import Difference, adjusted, power_lines, verdict_lines
 from nested_agents.studies.results.power import (
     detectable,
     deviation_of,
     power,
     power_of_t,
+    power_text,
     seeds_for,
     seeds_needed,
 )
-from nested_agents.studies.results.statistics import bootstrap
+from nested_agents.studies.results.statistics import LEVEL, bootstrap, paired_permutation
 
 
 def found_in_simulation(
@@ -77,13 +76,14 @@ def test_the_deviation_is_pooled_and_of_rates_never_zero() -> None:
     assert deviation_of([[0.5] * 3], of_rates=False) is None
 
 
-def compared(own: list[float], base: list[float], title: str = "other") -> Difference:
+def compared(own: list[float], base: list[float], *titles: str) -> tuple[Difference, ...]:
     pair = np.array(own, dtype=float), np.array(base, dtype=float)
-    return compare_pairs(title, "success", *pair, bootstrap(pair[0] - pair[1], bounds=(-1, 1)))
+    estimate = bootstrap(pair[0] - pair[1], bounds=(-1, 1))
+    return adjusted([(title, "success", *pair, estimate) for title in titles or ["other"]])
 
 
 def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
-    found = adjusted([compared([1.0] * 5, [0.0] * 5), compared([1.0] * 5, [0.0] * 5, "third")])
+    found = compared([1.0] * 5, [0.0] * 5, "other", "third")
     assert [round(d.raw, 4) for d in found] == [0.0625, 0.0625]
     text = " ".join(" ".join(verdict_lines(found)).split())
     assert "+1.00 [+0.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
@@ -98,7 +98,7 @@ def test_without_deviation_nothing_is_promised() -> None:
 
 
 def test_a_difference_of_rounding_errors_is_none() -> None:
-    assert compared([0.3, 0.1 + 0.2], [0.1 + 0.2, 0.3]).shown.startswith("0.00 [")
+    assert compared([0.3, 0.1 + 0.2], [0.1 + 0.2, 0.3])[0].shown.startswith("0.00 [")
 
 
 def test_interval_and_test_are_those_of_scipy() -> None:

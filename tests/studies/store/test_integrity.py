@@ -10,7 +10,8 @@ import pytest
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
+from nested_agents.studies.store.database import DATABASE, SPEC_FILE
+from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers.runner import save
 

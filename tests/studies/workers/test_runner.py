@@ -3,6 +3,7 @@ import subprocess
 import sys
 import textwrap
 import time
+import warnings
 from pathlib import Path
 
 import made_up
@@ -12,7 +13,7 @@ from joblib.externals.loky import get_reusable_executor
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers.runner import ATTEMPTS, run_trials
-from nested_agents.studies.workers.workers import LokyWorkers, start_workers
+from nested_agents.studies.workers.workers import REPLACED, LokyWorkers, start_workers
 
 
 def content(store):
@@ -158,3 +159,9 @@ def test_an_unknown_backend_is_refused() -> None:
     refused = pytest.raises(SpecError, match="backend = 'ray': known: dask, loky")
     with refused, start_workers("ray", 1, None, 1):  # type: ignore[arg-type]
         pass
+
+
+def test_what_loky_says_of_a_process_that_it_replaces_is_not_shown(recwarn) -> None:
+    LokyWorkers(1)
+    warnings.warn(f"{REPLACED}. This can be caused by ...", UserWarning, stacklevel=1)
+    assert not recwarn

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.options.config import PushingPointsSettings
-from nested_agents.scenarios.box_pushing.options.pushing import pushing_points
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.options.scenario import pushing_points
+from nested_agents.scenarios.box_pushing.world.bodies import BOXES
 from nested_agents.scenarios.box_pushing.world.geometry import surface
 
 GAP = 0.05

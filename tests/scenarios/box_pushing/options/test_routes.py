@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.options.pushing import moved, paths
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.options.scenario import moved, paths
+from nested_agents.scenarios.box_pushing.world.bodies import BOXES
 
 
 def test_constant_twists_lead_along_arcs() -> None:

@@ -4,7 +4,7 @@ import zlib
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.pictures.player import pack, scene_of
+from nested_agents.scenarios.box_pushing.pictures.rendering import pack, scene_of
 
 
 def unpack(packed):

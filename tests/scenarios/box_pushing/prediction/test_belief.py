@@ -5,12 +5,11 @@ import pytest
 from pydantic import ValidationError
 
 from benchmarks.scripted.controller import ScriptedController
-from nested_agents.core.adaptation.calibration import CalibrationSettings
-from nested_agents.core.agents.joint_agents import join_agents
-from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.adaptation.self_model import CalibrationSettings
+from nested_agents.core.agents.loop import control_loop, join_agents, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import Decision
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.belief import (
     CONSTANTS,

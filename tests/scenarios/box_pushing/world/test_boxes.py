@@ -15,9 +15,17 @@ from shapely.affinity import rotate, translate
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from nested_agents.scenarios.box_pushing.world.boxes import AREA, BOXES, BoxSpec, box_for, growth
-from nested_agents.scenarios.box_pushing.world.polygons import _merged, moments, polygon_edges
-from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+from nested_agents.scenarios.box_pushing.world.bodies import (
+    AREA,
+    BOXES,
+    ROBOTS,
+    BoxSpec,
+    _merged,
+    box_for,
+    growth,
+    moments,
+    polygon_edges,
+)
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 from nested_agents.scenarios.box_pushing.world.world import UNIT, World
 

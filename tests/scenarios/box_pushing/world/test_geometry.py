@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from world_oracles import ray_numpy, surface_numpy
 
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.world import geometry
 from nested_agents.scenarios.box_pushing.world.geometry import (
     Outline,

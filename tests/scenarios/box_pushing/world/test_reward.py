@@ -5,8 +5,7 @@ from math import exp
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.world.reward import Task, reward
-from nested_agents.scenarios.box_pushing.world.settings import RewardSettings
+from nested_agents.scenarios.box_pushing.world.settings import RewardSettings, Task, reward
 
 TASK = Task(RewardSettings(), tolerance=0.05, orientation_tolerance=0.25)
 

@@ -1,0 +1,329 @@
+"""The maximum of a sum of tables: exact by variable elimination, or found by max-plus.
+
+To eliminate an agent, the tables that it takes part in are added, and replaced by their maximum
+over its actions, a table over its neighbours. When all are eliminated the maximum is known; going
+back, each agent takes its best action given those that were eliminated later. The tables grow to
+``A ** (1 + width)``; the width depends on the order, which is that of least fill-in (networkx).
+
+Max-plus sends messages between agents and tables, round by round (Kok and Vlassis 2006). Every
+table sends each of its agents what each action would be worth with the best of the others, given
+the messages of these from other tables. On a tree the messages settle at the exact maximum; on
+graphs with loops they may not, so the best joint action of all rounds is kept (anytime), and
+improved by best responses, agent by agent, until none gains alone. Cost is linear in the number of
+tables, whatever the width.
+
+Shapes of undirected graphs over agents in their order, and what makes hierarchies of graphs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from math import isqrt
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ..numerics import FloatArray, IntArray, nx
+
+Scope = tuple[int, ...]
+
+
+def interaction(scopes: Sequence[Scope], n: int) -> nx.Graph:
+    """Return the graph of n agents in which those that share a scope are joined."""
+    graph = nx.Graph()
+    graph.add_nodes_from(range(n))
+    for scope in scopes:
+        graph.add_edges_from((a, b) for a in scope for b in scope if a < b)
+    return graph
+
+
+def order_of(graph: nx.Graph) -> tuple[tuple[int, ...], int]:
+    """Return an order of elimination, by the heuristic of least fill-in, and its width.
+
+    Examples
+    --------
+    A line has width 1, a ring 2, and of four agents who are all joined, three are left at first.
+
+    >>> [order_of(g)[1] for g in (nx.path_graph(5), nx.cycle_graph(5), nx.complete_graph(4))]
+    [1, 2, 3]
+    """
+    width, tree = nx.approximation.treewidth_min_fill_in(graph)
+    # Peel the decomposition from its leaves: what is in no other bag can be eliminated.
+    order: list[int] = []
+    while tree:
+        bag = min((bag for bag in tree if tree.degree(bag) <= 1), key=sorted)
+        beside = set().union(*tree[bag])
+        order += sorted(set(bag) - beside)
+        tree.remove_node(bag)
+    return tuple(order), int(width)
+
+
+class _Step(NamedTuple):
+    """The elimination of one agent."""
+
+    agent: int
+    parts: tuple[tuple[int, tuple[int, ...], tuple[int, ...]], ...]
+    """Tables that it takes part in: number, order of axes, shape among the agents concerned."""
+    beside: tuple[int, ...]
+    """The others concerned: axes of the table that is left, its own axis was the last."""
+
+
+class Elimination:
+    """Eliminates agents in an order that is found once.
+
+    Parameters
+    ----------
+    scopes
+        Of the tables; every agent is in one at least.
+    n, n_actions
+        Agents and actions.
+
+    Raises
+    ------
+    ValueError
+        If the largest table would have more than `most_entries`; before anything is allocated.
+
+    Examples
+    --------
+    Two agents who like to do the same, and one who dislikes what the second does:
+
+    >>> same, other = np.eye(2), 2.0 * (1.0 - np.eye(2))
+    >>> joint = Elimination([(0, 1), (1, 2)], 3, 2).best([same, other + [[0, 0], [1, 0]]])
+    >>> joint.tolist()
+    [1, 1, 0]
+    """
+
+    def __init__(
+        self, scopes: Sequence[Scope], n: int, n_actions: int, most_entries: int = 4**10
+    ) -> None:
+        self.n_actions = n_actions
+        self.order, self.width = order_of(interaction(scopes, n))
+        if n_actions ** (1 + self.width) > most_entries:
+            raise ValueError(
+                f"width {self.width} of the coordination graph takes tables of {n_actions} ** "
+                f"{1 + self.width} entries, allowed: {most_entries:,}; use max-plus"
+            )
+        self._n_scopes = len(scopes)
+        self._steps = tuple(self._planned(scopes))
+
+    def _planned(self, scopes: Sequence[Scope]) -> list[_Step]:
+        known: dict[int, Scope] = dict(enumerate(scopes))
+        steps = []
+        for agent in self.order:
+            mine = [k for k, scope in known.items() if agent in scope]
+            beside = tuple(sorted({a for k in mine for a in known[k]} - {agent}))
+            axes = (*beside, agent)
+            parts = []
+            for k in mine:
+                # A table's axes in the order of the concerned, 1 where it has none.
+                shape = tuple(self.n_actions if a in known[k] else 1 for a in axes)
+                places = tuple(known[k].index(a) for a in axes if a in known[k])
+                parts.append((k, places, shape))
+                del known[k]
+            steps.append(_Step(agent, tuple(parts), beside))
+            known[len(scopes) + len(steps) - 1] = beside
+        return steps
+
+    def best(self, tables: Sequence[FloatArray]) -> IntArray:
+        """Return a joint action ``(n,)`` of the greatest sum; of several, always the same one.
+
+        Parameters
+        ----------
+        tables
+            One for each scope, in their order; not modified.
+        """
+        known = dict(enumerate(tables))
+        choices = []
+        for number, step in enumerate(self._steps):
+            total: FloatArray = np.zeros(())
+            for k, places, shape in step.parts:
+                total = total + known.pop(k).transpose(places).reshape(shape)
+            choices.append(total.argmax(axis=-1))
+            known[self._n_scopes + number] = total.max(axis=-1)
+        joint = np.zeros(len(self._steps), dtype=np.int64)
+        for step, choice in zip(reversed(self._steps), reversed(choices), strict=True):
+            joint[step.agent] = choice[tuple(joint[list(step.beside)])]
+        return joint
+
+
+class MaxPlus:
+    """Passes messages for a number of rounds.
+
+    Parameters
+    ----------
+    scopes
+        Of the tables; every agent is in one at least.
+    n, n_actions
+        Agents and actions.
+    rounds
+        Most rounds; fewer are made if the messages settle.
+    damping
+        Share of a message that is kept from the round before, 0 to below 1; without loops none is.
+
+    Raises
+    ------
+    ValueError
+        If the largest table has more than `most_entries`; before anything is allocated.
+
+    Examples
+    --------
+    >>> same, other = np.eye(2), 2.0 * (1.0 - np.eye(2))
+    >>> MaxPlus([(0, 1), (1, 2)], 3, 2).best([same, other + [[0, 0], [1, 0]]]).tolist()
+    [1, 1, 0]
+    """
+
+    def __init__(
+        self,
+        scopes: Sequence[Scope],
+        n: int,
+        n_actions: int,
+        rounds: int = 100,
+        damping: float = 0.5,
+        most_entries: int = 4**10,
+    ) -> None:
+        self.n, self.n_actions, self.rounds = n, n_actions, rounds
+        # Tables over the same agents are added up: apart, they would receive their own messages.
+        apart = list(dict.fromkeys(scopes))
+        self._place = [apart.index(scope) for scope in scopes]
+        k = max(map(len, apart))
+        if n_actions**k > most_entries:
+            raise ValueError(
+                f"an agent with {k - 1} neighbours in the coordination graph takes a table of "
+                f"{n_actions} ** {k} entries, allowed: {most_entries:,}"
+            )
+        # Shorter scopes are filled up with an agent that is not there, number n.
+        self._members = np.array([(*scope, *[n] * (k - len(scope))) for scope in apart])
+        joined = nx.Graph((("table", t), i) for t, scope in enumerate(apart) for i in scope)
+        self.damping = 0.0 if nx.is_forest(joined) else damping
+        self._of = [np.argwhere(self._members == i) for i in range(n)]
+
+    def best(self, tables: Sequence[FloatArray]) -> IntArray:
+        """Return the best joint action ``(n,)`` of all rounds.
+
+        Parameters
+        ----------
+        tables
+            One for each scope, in their order; not modified.
+        """
+        members, a = self._members, self.n_actions
+        count, k = members.shape
+        full = np.zeros((count, *[a] * k))
+        for place, table in zip(self._place, tables, strict=True):
+            full[place] += self._filled(table)
+        to_agents = np.zeros((count, k, a))  # messages of tables
+        best, greatest = np.zeros(self.n, dtype=np.int64), -np.inf
+        for _ in range(self.rounds):
+            sums = np.zeros((self.n + 1, a))
+            np.add.at(sums, members, to_agents)
+            joint = np.append(sums[:-1].argmax(axis=1), 0)
+            worth = self._worth(full, joint)
+            if worth > greatest:
+                best, greatest = joint[:-1].copy(), worth
+            to_tables = sums[members] - to_agents  # what agents heard of other tables
+            to_tables[members == self.n] = 0.0
+            new = self._messages(full, to_tables)
+            change = np.abs(new - to_agents).max()
+            to_agents = self.damping * to_agents + (1.0 - self.damping) * new
+            if change < 1e-9:
+                break
+        return self._improved(full, best)
+
+    def _filled(self, table: FloatArray) -> FloatArray:
+        """Return a table over all axes, the same along those of agents that are not there."""
+        missing = self._members.shape[1] - table.ndim
+        shape = (self.n_actions,) * self._members.shape[1]
+        return np.broadcast_to(table[(..., *[None] * missing)], shape)
+
+    def _messages(self, full: FloatArray, to_tables: FloatArray) -> FloatArray:
+        """Return what tables tell their agents ``(tables, k, A)``, with the mean taken away."""
+        count, k, a = to_tables.shape
+        total = full.copy()
+        for p in range(k):
+            total += to_tables[:, p].reshape(count, *(a if q == p else 1 for q in range(k)))
+        new = np.empty_like(to_tables)
+        for p in range(k):
+            others = tuple(1 + q for q in range(k) if q != p)
+            new[:, p] = total.max(axis=others) - to_tables[:, p]
+        return new - new.mean(axis=2, keepdims=True)
+
+    def _worth(self, full: FloatArray, joint: IntArray) -> float:
+        """Return the sum of the tables at a joint action ``(n + 1,)``."""
+        return float(full[(np.arange(len(full)), *joint[self._members].T)].sum())
+
+    def _improved(self, full: FloatArray, best: IntArray) -> IntArray:
+        """Return a joint action that no agent can improve alone."""
+        joint = np.append(best, 0)
+        gained = True
+        while gained:
+            gained = False
+            for i in range(self.n):
+                values = np.zeros(self.n_actions)
+                for table, place in self._of[i]:
+                    index: list[int | slice] = list(joint[self._members[table]])
+                    index[place] = slice(None)
+                    values += full[(table, *index)]
+                if values.max() > values[joint[i]] + 1e-12 * max(1.0, abs(values.max())):
+                    joint[i], gained = int(values.argmax()), True
+        return joint[:-1]
+
+
+Shape = Literal["line", "ring", "tree", "grid"]
+"""A line; the same, closed; every agent joined with the next two that are free; rows and columns,
+as nearly a square as the number of agents allows."""
+
+
+def shaped(shape: Shape, n: int) -> nx.Graph:
+    """Return a graph of n agents.
+
+    Examples
+    --------
+    >>> [sorted(shaped(shape, 4).edges) for shape in ("tree", "grid")]
+    [[(0, 1), (0, 2), (1, 3)], [(0, 1), (0, 2), (1, 3), (2, 3)]]
+    """
+    if shape == "grid":
+        rows = next(r for r in range(isqrt(n), 0, -1) if n % r == 0)
+        graph = nx.grid_2d_graph(rows, n // rows)
+        return nx.relabel_nodes(graph, {node: k for k, node in enumerate(sorted(graph))})
+    if shape == "tree":
+        return nx.full_rary_tree(2, n)
+    return nx.cycle_graph(n) if shape == "ring" and n > 2 else nx.path_graph(n)
+
+
+def others(graph: nx.Graph, seed: int) -> nx.Graph:
+    """Return a graph of as many edges, if there are so many, none of them one of `graph`.
+
+    Examples
+    --------
+    >>> ring = shaped("ring", 8)
+    >>> wrong = others(ring, 0)
+    >>> wrong.size(), any(ring.has_edge(*edge) for edge in wrong.edges)
+    (8, False)
+    """
+    free = [pair for pair in combinations(graph, 2) if not graph.has_edge(*pair)]
+    drawn = np.random.default_rng(seed).permutation(len(free))[: graph.size()]
+    changed = nx.empty_graph(graph)
+    changed.add_edges_from(free[k] for k in drawn)
+    return changed
+
+
+def oriented(graph: nx.Graph, order: Sequence[str], *, fill_in: bool) -> nx.DiGraph:
+    """Return a graph whose edges lead from whom comes first in `order` to whom comes later.
+
+    With `fill_in`, those who are above an agent are joined, too, from the last agent to the first:
+    eliminating it makes the best that it can do depend on all of them together (Dechter 1999).
+
+    Examples
+    --------
+    >>> ring = nx.cycle_graph("abcd")
+    >>> sorted(oriented(ring, "abcd", fill_in=True).edges)
+    [('a', 'b'), ('a', 'c'), ('a', 'd'), ('b', 'c'), ('c', 'd')]
+    """
+    place = {agent: k for k, agent in enumerate(order)}
+    joined = nx.Graph(graph)
+    for agent in reversed(order) if fill_in else ():
+        above = sorted((a for a in joined[agent] if place[a] < place[agent]), key=place.__getitem__)
+        joined.add_edges_from(combinations(above, 2))
+    directed = nx.empty_graph(order, create_using=nx.DiGraph)
+    directed.add_edges_from(sorted(edge, key=place.__getitem__) for edge in joined.edges)
+    return directed

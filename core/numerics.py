@@ -1,0 +1,336 @@
+"""The numerical ground: arrays, libraries that take their time, random streams, kernels.
+
+Kernels are compiled at their first call, by one process at a time, and cached on disk.
+
+numba takes a second to import and a kernel seconds to compile, so that neither is done before a
+kernel is called: commands that only read never do. Of several processes that need the same kernel
+one compiles it and the others take it from the cache.
+
+Without the lock numba's cache is not safe: it numbers a file of code by an index that it has read
+before, so that of two processes that compile one kernel for different types each may leave the
+other's code under its own type.
+
+A kernel is compiled by a process that does nothing else, and then taken from the cache. A process
+that compiles a kernel itself holds several versions of the kernels that it calls, each rounded in
+its own way, and runs others than a process that takes the code from the cache: the last bits of the
+first run would differ from those of later ones.
+
+numba takes a cached kernel for good as long as the file of the kernel is what it was. A kernel is
+also made of the kernels that it calls and of the constants that it reads, wherever they come from:
+here the files that its own file imports, and those that these import, count as well.
+"""
+
+import atexit
+import contextlib
+import fcntl
+import gc
+import hashlib
+import importlib
+import os
+import pickle
+import re
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from functools import cache, cached_property, update_wrapper
+from pathlib import Path
+from types import CodeType, FunctionType
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+F = TypeVar("F", bound=Callable[..., Any])
+FloatArray = NDArray[np.floating[Any]]
+IntArray = NDArray[np.integer[Any]]
+BoolArray = NDArray[np.bool_]
+"""Arrays of any precision, and masks."""
+
+SAME = 1e-12
+"""Values that differ by less, times their size if that is above 1, are equal."""
+
+IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
+"""An import inside the package; the house rules know no other."""
+
+LOCK = "compiling.lock"
+"""The file beside cached kernels that a process holds while it compiles."""
+
+INNER = "-inner"
+"""What tells cached kernels for kernels from those for Python."""
+
+FROM_PYTHON = {"no_cfunc_wrapper": True}
+FROM_KERNELS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
+"""What nobody calls is not compiled: a third to a half of a small kernel is its wrappers."""
+
+DIVISION = {"error_model": "numpy"}
+"""Division by zero gives what it gives in NumPy: that compiles sooner than raising an exception."""
+
+_threads = threading.RLock()
+
+
+class Deferred:
+    """A module that is imported when something of it is first asked for.
+
+    Parameters
+    ----------
+    name
+        Its full name.
+
+    Examples
+    --------
+    >>> math = Deferred("math")
+    >>> math.floor(2.5)
+    2
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __getattr__(self, attribute: str) -> Any:
+        """Return what the module has by this name."""
+        if attribute.startswith("__"):  # asked by who inspects the object, not by who uses it
+            raise AttributeError(attribute)
+        return getattr(importlib.import_module(self._name), attribute)
+
+
+if TYPE_CHECKING:
+    import networkx as nx
+    import pandas as pd
+    from scipy import optimize, special, stats
+else:
+    nx, pd = Deferred("networkx"), Deferred("pandas")
+    optimize, special, stats = map(Deferred, ("scipy.optimize", "scipy.special", "scipy.stats"))
+
+__all__ = ["nx", "optimize", "pd", "special", "stats"]
+"""Libraries that take their time are imported when something of them is first asked for."""
+
+
+def greatest(values: FloatArray, rng: np.random.Generator) -> int:
+    """Return the index of the greatest value, ties (see `SAME`) broken at random.
+
+    Raises
+    ------
+    ArithmeticError
+        If the first value is not a number, or the greatest is infinite.
+    """
+    listed = values.tolist()  # four numbers: plain Python is faster
+    top = max(listed)
+    least = top - SAME * max(1.0, abs(top))
+    best = [action for action, value in enumerate(listed) if value >= least]
+    if not best:
+        raise ArithmeticError(f"none of {len(listed)} actions is worth most: not all are numbers")
+    return int(best[0] if len(best) == 1 else best[rng.integers(len(best))])
+
+
+def stream_of(seed: int | np.random.SeedSequence, key: int) -> np.random.Generator:
+    """Return the stream of a seed that has a key, whatever else is drawn from that seed.
+
+    Examples
+    --------
+    >>> one, same, other = (stream_of(7, key) for key in (0, 0, 1))
+    >>> float(one.random()) == float(same.random()) != float(other.random())
+    True
+    """
+    root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+    child = np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, key))
+    return np.random.default_rng(child)
+
+
+def words_of(rng: np.random.Generator) -> IntArray:
+    """Return the state of a generator of the kind PCG64 as six whole numbers, see `set_words`."""
+    state = rng.bit_generator.state
+    numbers = state["state"]["state"], state["state"]["inc"]
+    words = [number >> shift & (2**64 - 1) for number in numbers for shift in (64, 0)]
+    return np.array([*words, state["has_uint32"], state["uinteger"]], dtype=np.uint64)
+
+
+def set_words(rng: np.random.Generator, words: IntArray | FloatArray) -> None:
+    """Set a generator, which is modified, to the state that `words_of` returned."""
+    high, low, high_step, low_step, has_half, half = map(int, words)
+    rng.bit_generator.state = {
+        "bit_generator": "PCG64",
+        "state": {"state": high << 64 | low, "inc": high_step << 64 | low_step},
+        "has_uint32": has_half,
+        "uinteger": half,
+    }
+
+
+class Kernel:
+    """A function that is compiled when it is first called.
+
+    Parameters
+    ----------
+    function
+        What to compile.
+    options
+        Of `numba.njit`.
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func, self._options = function, DIVISION | options
+        self._ready: Callable[..., Any] | None = None
+
+    @cached_property
+    def compiled(self) -> Any:
+        """What numba makes of the function for Python to call."""
+        return self._made("", **FROM_PYTHON)
+
+    @cached_property
+    def inner(self) -> Any:
+        """What numba makes of the function for other kernels to call, by far the less code."""
+        return self._made(INNER, **FROM_KERNELS)
+
+    def _made(self, suffix: str, **options: bool) -> Any:
+        import numba
+
+        function = self.py_func
+        names = set(_names(function.__code__)) & function.__globals__.keys()
+        kernels = {
+            name: thing.inner
+            for name in names
+            if isinstance(thing := function.__globals__[name], Kernel)
+        }
+        seen = FunctionType(
+            function.__code__, function.__globals__ | kernels, function.__name__,
+            function.__defaults__, function.__closure__,
+        )  # fmt: skip
+        seen.__module__, seen.__qualname__ = function.__module__, function.__qualname__ + suffix
+        compiled = numba.njit(**self._options, **options)(seen)
+        file = _cache_file(compiled)
+        if file is not None:  # interpreted kernels, NUMBA_DISABLE_JIT=1, have none
+            source = Path(function.__code__.co_filename)
+            file._source_stamp = (file._source_stamp, stamp(source))
+        return compiled
+
+    def __call__(self, *args: Any) -> Any:
+        """Call the compiled function."""
+        if self._ready is not None:
+            return self._ready(*args)
+        with _threads:
+            compiled = self.compiled
+            file = _cache_file(compiled)
+            with _alone(file):
+                if file is not None:
+                    self._compile_apart(compiled, args)
+                result = compiled(*args)
+            self._ready = compiled
+        return result
+
+    def _compile_apart(self, compiled: Any, args: tuple[Any, ...]) -> None:
+        """See to it that the cache has the function for arguments of these types, if it can be."""
+        types = tuple(map(compiled.typeof_pyval, args))
+        key = compiled._cache._index_key(types, compiled.targetctx.codegen())
+        if key not in compiled._cache._cache_file._load_index():
+            with contextlib.suppress(OSError, pickle.PicklingError, AttributeError, TypeError):
+                child = _child(os.getpid())
+                assert child.stdin is not None
+                assert child.stdout is not None
+                place = self.py_func.__module__, self.py_func.__name__
+                pickle.dump((sys.path, *place, pickle.dumps(types)), child.stdin)
+                child.stdin.flush()
+                child.stdout.read(1)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the compiled function has, as its statistics."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.compiled, name)
+
+
+@cache
+def _child(parent: int) -> subprocess.Popen[bytes]:
+    """Return the process that compiles for a process; it ends when that one does."""
+    program = f"from {__name__} import serve; serve()"
+    child = subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        start_new_session=True,
+    )  # fmt: skip
+    atexit.register(child.__exit__, None, None, None)
+    return child
+
+
+def serve() -> None:
+    """Compile kernels into the cache as standard input asks for them, and answer with a byte each.
+
+    What cannot be compiled here is left to who asked.
+    """
+    while True:
+        try:
+            sys.path[:], module, name, types = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        gc.disable()  # that takes a tenth of a compilation
+        with contextlib.suppress(Exception):
+            kernel = getattr(importlib.import_module(module), name)
+            kernel.compiled.compile(pickle.loads(types))
+        gc.enable()
+        sys.stdout.buffer.write(b".")
+        sys.stdout.buffer.flush()
+
+
+def njit(**options: Any) -> Callable[[F], F]:
+    """Return a decorator like `numba.njit` that compiles at the first call, see `Kernel`."""
+
+    def decorate(function: F) -> F:
+        return cast(F, Kernel(function, options))
+
+    return decorate
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+def _cache_file(compiled: Any) -> Any:
+    """Return numba's index of cached versions; interpreted and uncached functions have none."""
+    return getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+
+
+@contextlib.contextmanager
+def _alone(file: Any) -> Iterator[None]:
+    """Let no other process compile; without a folder that can be written to, all may."""
+    with contextlib.ExitStack() as stack:
+        if file is not None:
+            with contextlib.suppress(OSError):
+                folder = Path(file._cache_path)
+                folder.mkdir(parents=True, exist_ok=True)
+                lock = stack.enter_context((folder / LOCK).open("w"))
+                fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def stamp(path: Path) -> str:
+    """Return a digest of a file and of all files that it imports, directly or not."""
+    paths, left = {path}, [path]
+    while left:
+        new = _imported(left.pop()) - paths
+        paths |= new
+        left += new
+    texts = hashlib.sha256()
+    for each in sorted(paths):
+        texts.update(_text(each).encode() + b"\0")
+    return texts.hexdigest()
+
+
+@cache
+def _imported(path: Path) -> set[Path]:
+    """Return the files that a file imports; of a package from which modules may come, all."""
+    files: set[Path] = set()
+    for dots, name in IMPORT.findall(_text(path)):
+        place = path.parents[len(dots) - 1].joinpath(*filter(None, name.split(".")))
+        if place.is_dir():
+            files.update(place.glob("*.py"))
+        elif (module := place.with_suffix(".py")).exists():
+            files.add(module)
+    return files
+
+
+@cache
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8")

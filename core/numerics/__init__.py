@@ -1,1 +1,0 @@
-"""Arrays, compiled kernels, ties."""

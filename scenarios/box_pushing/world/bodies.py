@@ -1,0 +1,677 @@
+"""Bodies: boxes, which are pushed over the ground, and robots on wheels, which push.
+
+Box2D takes convex polygons of at most 8 vertices and silently gets others wrong, so that any simple
+polygon, concave or with holes, goes through here first: it is checked, centred on its centre of
+mass and cut into convex pieces. The frame of a box has its centre of mass at the origin and its
+back, where robots start in the easier start distributions, towards -x. Its weight rests on the
+ground as a distributed friction, stood for by four points, so that sliding and turning share one
+friction budget as they do for a real box. A further box, concave or with holes, is one `BoxSpec`
+and one line in `BOXES`; a spec may also describe one by its vertices.
+
+A robot has a round body, wheels that all point ahead, and infrared sensors around it. Its frame has
+its origin at the centre of the body, x ahead, y to the left, angles counter-clockwise. A wheel is a
+soft velocity servo on a sticky ground: where it touches the ground it pulls the body with
+`stiffness` times the difference between its own speed and the body's forward speed there, and
+resists sideways motion with `lateral_stiffness`; both together never exceed its traction limit (the
+friction circle). A further robot is one table in ``robots.toml``; a spec may also describe one.
+
+The forces between wheels and ground are those of all robots of a world at once. Wheel w of a robot
+that moves with twist v pulls it with
+
+    f = (k_w (u_w - v_ahead), -l v_sideways),  |f| <= limit,
+
+v taken where the wheel stands. A wheel holds its speed within milliseconds, faster than a physics
+step, so that forces from the present twist would oscillate. They are therefore taken at the twist
+that they lead to by the end of the step,
+
+    (M + dt K) v' = M v + dt (B u + c),
+
+K and B u being the sums over wheels of the above, and cut to the traction limit afterwards. c is
+the wrench of contacts in the last step: what changed the velocity besides the wheels. Without it a
+servo under a steady load would yield the more the longer the step.
+
+Units are those of the caller as long as they are consistent.
+"""
+
+from __future__ import annotations
+
+import tomllib
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from heapq import heapify, heappop, heappush
+from itertools import combinations
+from math import cos, pi, radians, sin, sqrt
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from shapely.affinity import translate
+from shapely.geometry import Polygon
+from shapely.geometry.polygon import orient
+from shapely.validation import explain_validity
+
+from ....core.numerics import FloatArray, IntArray, njit, nx
+from ....core.plugins.settings import closest, tuples
+from .geometry import Outline, ring_edges
+from .settings import GRAVITY, BoxSettings, RobotSettings
+
+Vertices = Sequence[tuple[float, float]]
+
+MAX_VERTICES = 8
+"""Of a convex piece; b2_maxPolygonVertices."""
+MOST_VERTICES = 1000
+"""Of an outline and its holes; a drawing with more is to be simplified."""
+LEAST_EDGE, LARGEST = 1e-6, 100.0
+"""Shortest edge, and greatest distance of a vertex from another one [m]."""
+STRAIGHT = 1e-9
+"""Sine of the angle between edges that counts as straight on."""
+
+
+class Moments(NamedTuple):
+    """Area and its moments about the origin."""
+
+    area: float
+    """[m2]."""
+    first: FloatArray
+    """``(2,)`` integrals of x and y [m3]."""
+    second: FloatArray
+    """``(2, 2)`` integrals of the products of coordinates [m4]."""
+    radial: float
+    """Integral of the distance from the origin [m3]."""
+
+
+def moments(edges: FloatArray) -> Moments:
+    """Return the moments of the area within directed edges ``(n, 4)``, material on the left.
+
+    Sums over the signed triangles between the origin and each edge; exact but for `radial`, which
+    is a 64-point Gauss-Legendre quadrature along each edge.
+    """
+    a, b = edges[:, :2], edges[:, 2:]
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area = cross.sum() / 2
+    first = (cross[:, None] * (a + b)).sum(axis=0) / 6
+    ends = a + b
+    outer = (
+        np.einsum("n,ni,nj->ij", cross, a, a)
+        + np.einsum("n,ni,nj->ij", cross, b, b)
+        + np.einsum("n,ni,nj->ij", cross, ends, ends)
+    ) / 24
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    t = (nodes + 1) / 2
+    points = a[:, None] + t[:, None] * (b - a)[:, None]
+    mean_distance = np.hypot(points[..., 0], points[..., 1]) @ weights / 2
+    return Moments(float(area), first, outer, float((cross * mean_distance).sum() / 3))
+
+
+def polygon_edges(polygon: Polygon) -> FloatArray:
+    """Return the edges ``(n, 4)`` of an oriented polygon and its holes, material on the left."""
+    rings = [polygon.exterior, *polygon.interiors]
+    return np.vstack([ring_edges(np.asarray(ring.coords)[:-1]) for ring in rings])
+
+
+def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Polygon:
+    """Return a checked polygon, counter-clockwise, with its centre of mass at the origin.
+
+    A clockwise outline is turned around with a warning.
+
+    Raises
+    ------
+    ValueError
+        If the polygon has more than `MOST_VERTICES`, is too large, has two vertices at one place,
+        crosses or touches itself, has no area, or a vertex is not finite. Fewer than 3 vertices are
+        refused by `BoxSettings`.
+    """
+    for ring in (vertices, *holes):
+        _check_ring(f"box {name!r}", ring)
+    if (count := sum(map(len, (vertices, *holes)))) > MOST_VERTICES:
+        raise ValueError(f"box {name!r}: {count} vertices, allowed: {MOST_VERTICES} or fewer")
+    polygon = Polygon(vertices, holes)
+    if not polygon.is_valid:
+        raise ValueError(f"box {name!r}: not a simple polygon: {explain_validity(polygon)}")
+    if not polygon.area > 1e-6 * polygon.length**2:
+        raise ValueError(
+            f"box {name!r}: area {polygon.area:.3g} m2 within {polygon.length:.3g} m of outline, "
+            "degenerate"
+        )
+    if not polygon.exterior.is_ccw:
+        warnings.warn(f"box {name!r}: clockwise outline turned around", stacklevel=2)
+    polygon = orient(polygon)
+    whole = moments(polygon_edges(polygon))
+    return translate(polygon, *(-whole.first / whole.area))
+
+
+def _check_ring(box: str, vertices: Vertices) -> None:
+    """Refuse an outline that no body can have."""
+    ring = np.asarray(vertices, dtype=float)
+    if not np.isfinite(ring).all():
+        raise ValueError(f"{box}: a vertex that is not finite, allowed: numbers in metres")
+    # Halved before they are subtracted: the difference of two numbers may overflow.
+    extent = 2 * float(np.ptp(ring / 2, axis=0).max())
+    if extent > LARGEST:
+        raise ValueError(f"{box}: is {extent:.3g} m long, allowed: up to {LARGEST:g} m")
+    edges = np.roll(ring, -1, axis=0) - ring
+    short = np.flatnonzero(np.hypot(edges[:, 0], edges[:, 1]) < LEAST_EDGE)
+    if len(short):
+        first, second = short[0] + 1, (short[0] + 1) % len(ring) + 1
+        raise ValueError(
+            f"{box}: vertices {first} and {second} are at the same place {vertices[short[0]]}, "
+            "allowed: each once, the first not again at the end"
+        )
+
+
+def _merged(first: FloatArray, second: FloatArray) -> FloatArray | None:
+    """Return the union of two convex rings that share an edge, or None unless it is convex."""
+    union = shapely.union(Polygon(first), Polygon(second))
+    if not isinstance(union, Polygon) or union.interiors:
+        return None
+    ring = np.asarray(orient(union).exterior.coords)[:-1]
+    ring = ring[np.abs(_turns(ring)) > STRAIGHT]
+    return ring if len(ring) <= MAX_VERTICES and (_turns(ring) > 0).all() else None
+
+
+def _turns(ring: FloatArray) -> FloatArray:
+    """Return the sine of the turn at every vertex of a ring ``(n, 2)``."""
+    into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+    scale: FloatArray = np.linalg.norm(into, axis=1) * np.linalg.norm(out, axis=1)
+    return cross / scale
+
+
+def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
+    """Return convex counter-clockwise pieces ``(<= 8, 2)`` that together are the polygon.
+
+    Constrained Delaunay triangles, merged greedily as long as the union of two is convex: always
+    the first two in their order. What neighbours a piece is kept, so that the time grows hardly
+    faster than the number of vertices.
+    """
+    ring = np.asarray(polygon.exterior.coords)[:-1]
+    if not polygon.interiors and len(ring) <= MAX_VERTICES and (_turns(ring) > 0).all():
+        return (ring,)
+    triangles = shapely.constrained_delaunay_triangles(polygon).geoms
+    rings = [np.asarray(orient(t).exterior.coords)[:-1] for t in triangles if t.area > 0]
+    pieces = dict(enumerate(rings))
+    beside = _neighbours(rings)
+    pairs = [(min(edge), max(edge)) for edge in beside.edges]
+    heapify(pairs)
+    while pairs:
+        i, j = heappop(pairs)
+        if not beside.has_edge(i, j):  # one of them has been merged since
+            continue
+        shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
+        union = _merged(pieces[i], pieces[j]) if len(shared) >= 2 else None
+        if union is None:
+            continue
+        pieces[i] = union
+        del pieces[j]
+        nx.contracted_nodes(beside, i, j, self_loops=False, copy=False)
+        for other in beside[i]:
+            heappush(pairs, (min(i, other), max(i, other)))
+    return tuple(pieces.values())
+
+
+def _neighbours(rings: Sequence[FloatArray]) -> nx.Graph:
+    """Return the graph that joins rings, by index, which have an edge in common."""
+    by_edge: dict[frozenset[tuple[float, ...]], list[int]] = {}
+    for index, ring in enumerate(rings):
+        points = [tuple(point) for point in ring.tolist()]
+        for edge in zip(points, [*points[1:], points[0]], strict=True):
+            by_edge.setdefault(frozenset(edge), []).append(index)
+    graph = nx.empty_graph(len(rings))
+    graph.add_edges_from(pair for both in by_edge.values() for pair in combinations(both, 2))
+    return graph
+
+
+AREA = 0.04
+"""Of every box in the table [m2]: that of a square of 20 cm."""
+ROBOTS_PER_BOX = 2
+"""Robots for which the boxes of the table are made."""
+
+
+@dataclass(frozen=True)
+class BoxSpec:
+    """A box: a polygon, or a disc if it has a radius instead of vertices.
+
+    Raises
+    ------
+    ValueError
+        If the outline is not a simple polygon. Quantities are checked by `BoxSettings`.
+
+    Examples
+    --------
+    >>> box = BOXES["square"]
+    >>> round(box.area, 12), round(box.friction_force, 3), round(box.friction_radius, 4)
+    (0.04, 0.785, 0.0765)
+    """
+
+    name: str
+    """The name under which specs know it."""
+    vertices: Vertices = ()
+    """Outline [m], anywhere in the plane; the frame of the box is centred afterwards."""
+    holes: tuple[Vertices, ...] = ()
+    """Outlines of holes [m]."""
+    radius: float = 0.0
+    """Of a disc [m]; 0 for a polygon."""
+    mass: float = 0.4
+    """[kg]."""
+    friction: float = 0.2
+    """Coefficient of friction with the ground."""
+    contact_friction: float = 0.3
+    """Coefficient of friction with robots."""
+    grows: bool | str = field(default=True, compare=False)
+    """Whether it grows with the number of robots, or its ``width`` alone."""
+
+    def __post_init__(self) -> None:
+        if bool(self.vertices) == bool(self.radius):
+            raise ValueError(f"box {self.name!r}: needs either vertices or a radius")
+        _ = self.polygon  # what cannot be one is refused at once
+
+    @cached_property
+    def polygon(self) -> Polygon | None:
+        """The centred polygon; None for a disc."""
+        return centred(self.name, self.vertices, self.holes) if self.vertices else None
+
+    @cached_property
+    def rings(self) -> list[FloatArray]:
+        """The closed outline ``(k, 2)`` in the frame of the box [m], then its holes."""
+        if self.polygon is None:
+            angles = np.linspace(0, 2 * pi, 65)
+            return [self.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)]
+        return [np.array(ring.coords) for ring in (self.polygon.exterior, *self.polygon.interiors)]
+
+    @cached_property
+    def outline(self) -> Outline:
+        """The surface, in the frame of the box."""
+        if self.polygon is None:
+            return Outline(np.zeros((1, 4)), self.radius)
+        return Outline(polygon_edges(self.polygon))
+
+    @cached_property
+    def fixtures(self) -> tuple[FloatArray, ...]:
+        """Convex pieces ``(<= 8, 2)`` [m]; empty for a disc."""
+        return () if self.polygon is None else convex_pieces(self.polygon)
+
+    @cached_property
+    def moments(self) -> Moments:
+        """Moments of the area."""
+        if self.polygon is None:
+            area, quarter = pi * self.radius**2, pi * self.radius**4 / 4
+            return Moments(area, np.zeros(2), quarter * np.eye(2), area * self.radius * 2 / 3)
+        return moments(self.outline.edges)
+
+    @property
+    def area(self) -> float:
+        """[m2]."""
+        return self.moments.area
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the centre of mass [kg m2]."""
+        return float(self.mass * np.trace(self.moments.second) / self.area)
+
+    @cached_property
+    def reach(self) -> float:
+        """Distance from the centre within which all of the box lies [m]."""
+        return self.outline.radius
+
+    @property
+    def friction_force(self) -> float:
+        """Ground friction of the sliding box [N]."""
+        return self.friction * self.mass * GRAVITY
+
+    @property
+    def friction_radius(self) -> float:
+        """Mean distance of the area from the centre [m].
+
+        Ground friction resists pure turning with `friction_force` times this lever.
+        """
+        return self.moments.radial / self.area
+
+    @cached_property
+    def friction_points(self) -> FloatArray:
+        """Four points ``(4, 2)`` that rub on the ground with a quarter of `friction_force` each.
+
+        At the corners of a rectangle with the axes and the proportions of the ellipse of inertia,
+        scaled such that the greatest friction torque is that of evenly spread friction.
+        """
+        spread, axes = np.linalg.eigh(self.moments.second / self.area)
+        half = np.sqrt(spread) * self.friction_radius / sqrt(spread.sum())
+        corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) * half
+        return corners @ axes.T
+
+    @cached_property
+    def width(self) -> tuple[float, float]:
+        """Least and greatest y of the box [m]: how broad it looks from behind."""
+        ends = self.outline.edges.reshape(-1, 2)[:, 1]
+        return float(ends.min()) - self.outline.rounding, float(ends.max()) + self.outline.rounding
+
+    def scaled(self, factor: float) -> BoxSpec:
+        """Return the box with mass and lengths, or those that grow, multiplied by `factor`."""
+        along = 1.0 if self.grows == "width" else factor
+        outline, *holes = [
+            tuple((along * x, factor * y) for x, y in ring) for ring in (self.vertices, *self.holes)
+        ]
+        return replace(
+            self, vertices=outline, holes=tuple(holes), radius=along * self.radius,
+            mass=factor * self.mass,
+        )  # fmt: skip
+
+
+def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
+    """Return the box that a spec names or describes, or that `label` has written.
+
+    Up to two robots push the box as it stands in the table. For more, its lengths and its mass
+    grow in proportion to their number: each has the same room along the back and the same share
+    of the friction as one of two. A box that is described grows only if it says so, and if it says
+    so along its width only.
+
+    Raises
+    ------
+    ValueError
+        If no box has that name, or there can be none as described; one line.
+
+    Examples
+    --------
+    >>> box = box_for("square", 4)
+    >>> round(box.area, 12), box.mass
+    (0.16, 0.8)
+    """
+    described, factor = _described(box), growth(box, robots)
+    return described if factor == 1.0 else described.scaled(factor)
+
+
+def growth(box: str | BoxSettings, robots: int) -> float:
+    """Return by what factor a box is larger for some robots than for two; 1: it does not grow.
+
+    Raises
+    ------
+    ValueError
+        As `box_for`.
+
+    Examples
+    --------
+    >>> growth("square", 2), growth("square", 8)
+    (1.0, 4.0)
+    """
+    return max(robots / ROBOTS_PER_BOX, 1.0) if _described(box).grows else 1.0
+
+
+def _described(box: str | BoxSettings) -> BoxSpec:
+    """Return a box as it stands in the table or the spec."""
+    if isinstance(box, str) and box.startswith("{"):
+        box = BoxSettings.model_validate_json(box)
+    if isinstance(box, BoxSettings):
+        return BoxSpec(**{**dict(box), "name": "own"})
+    if box not in BOXES:
+        raise ValueError(f"scenario.box = {box!r}: {closest(box, BOXES)}")
+    return BOXES[box]
+
+
+def _rectangle(name: str, depth: float, width: float) -> BoxSpec:
+    x, y = depth / 2, width / 2
+    return BoxSpec(name, ((-x, -y), (x, -y), (x, y), (-x, y)))
+
+
+def _regular(name: str, sides: int) -> BoxSpec:
+    """Return a regular polygon of area `AREA` with a side towards -x."""
+    radius = sqrt(2 * AREA / (sides * sin(2 * pi / sides)))
+    angles = [pi + pi / sides + 2 * pi * i / sides for i in range(sides)]
+    return BoxSpec(name, tuple((radius * cos(a), radius * sin(a)) for a in angles))
+
+
+def _shape(name: str, *vertices: tuple[float, float]) -> BoxSpec:
+    """Return a polygon scaled to `AREA`."""
+    unit = sqrt(AREA / Polygon(vertices).area)
+    return BoxSpec(name, tuple((unit * x, unit * y) for x, y in vertices))
+
+
+def _star(name: str, points: int, depth: float) -> BoxSpec:
+    """Return a star with a point ahead whose hollows reach `depth` of the way to the centre."""
+    corners = [(1.0, 2 * pi * i / points) for i in range(points)]
+    hollows = [(1.0 - depth, angle + pi / points) for _, angle in corners]
+    ring = [corner for pair in zip(corners, hollows, strict=True) for corner in pair]
+    return _shape(name, *((radius * cos(angle), radius * sin(angle)) for radius, angle in ring))
+
+
+PLUS = (
+    (-3, -1), (-1, -1), (-1, -3), (1, -3), (1, -1), (3, -1),
+    (3, 1), (1, 1), (1, 3), (-1, 3), (-1, 1), (-3, 1),
+)  # fmt: skip
+
+BOXES: dict[str, BoxSpec] = {
+    box.name: box
+    for box in (
+        _rectangle("square", 0.2, 0.2),
+        _rectangle("rectangle", 0.16, 0.25),
+        _rectangle("bar", 0.08, 0.5),
+        BoxSpec("circle", radius=sqrt(AREA / pi)),
+        _regular("triangle", 3),
+        _regular("pentagon", 5),
+        _regular("hexagon", 6),
+        _shape("L", (0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)),
+        _shape("T", (0, -3), (2, -3), (2, -1), (5, -1), (5, 1), (2, 1), (2, 3), (0, 3)),
+        _shape("U", (0, -2), (3, -2), (3, -1), (1, -1), (1, 1), (3, 1), (3, 2), (0, 2)),
+        _shape("plus", *PLUS),
+        _star("star", 5, 0.5),
+    )
+}
+"""Boxes by the name that specs use; every one has the area of the square."""
+
+
+E_PUCK_SENSORS = tuple(radians(a) for a in (-17.2, -45.9, -90.0, -151.5, 151.2, 90.0, 45.9, 17.2))
+"""Directions of the e-puck's proximity sensors ps0 to ps7 [rad], clockwise from the front right.
+
+From the E-puck model of Webots, which follows the real robot's board.
+"""
+
+
+def resistance(robot: RobotSettings, ahead: float = 1.0, sideways: float = 1.0) -> FloatArray:
+    """Return the wrench per twist ``(3, 3)`` with which standing wheels resist a motion.
+
+    The sum over wheels of ``J' diag(stiffness, lateral) J``, J the velocity of the wheel point,
+    the stiffnesses multiplied by the factors `ahead` and `sideways`.
+    """
+    total = np.zeros((3, 3))
+    stiffness = np.diag([ahead * robot.stiffness, sideways * robot.lateral_stiffness])
+    for wheel in robot.wheels:
+        jacobian = np.array([[1.0, 0.0, -wheel.y], [0.0, 1.0, wheel.x]])
+        total += jacobian.T @ stiffness @ jacobian
+    return total
+
+
+def compliance(robot: RobotSettings) -> FloatArray:
+    """Return by how much a pushed robot yields, below its traction limit.
+
+    Returns
+    -------
+    FloatArray
+        ``(3, 3)`` twist per wrench at its centre, body frame [m/s, m/s, rad/s per N, N, N m].
+    """
+    return np.linalg.inv(resistance(robot))
+
+
+def nominal_effect(robot: RobotSettings) -> FloatArray:
+    """Return what the wheel speeds do to the motion of a free, healthy robot.
+
+    The twist at which the wheel forces balance. For two wheels on one axle it is the kinematics of
+    a differential drive; a skid-steer turns as if its axle were longer, as its wheels scrub. (The
+    traction limit, neglected here, lets a fast turning skid-steer scrub more easily.)
+
+    Returns
+    -------
+    FloatArray
+        ``(3, n_wheels + 1)``: body twist [m/s, m/s, rad/s] = effect @ [wheel speeds [m/s], 1].
+    """
+    drive = np.array([[robot.stiffness, 0.0, -robot.stiffness * w.y] for w in robot.wheels]).T
+    constant = np.zeros((3, 1))
+    return np.hstack([compliance(robot) @ drive, constant])
+
+
+_TABLES = tuples(tomllib.loads(Path(__file__).with_name("robots.toml").read_text(encoding="utf-8")))
+
+ROBOTS = {name: RobotSettings(name=name, **table) for name, table in _TABLES.items()}
+"""Robots by the name that specs use."""
+
+
+def robot_for(robot: str | RobotSettings) -> RobotSettings:
+    """Return the robot that a spec names or describes, or that `label` has written.
+
+    Raises
+    ------
+    ValueError
+        If no robot has that name, or there can be none as described; one line.
+
+    Examples
+    --------
+    >>> robot_for("e-puck").wheel_names
+    ('left', 'right')
+    """
+    if isinstance(robot, str) and robot.startswith("{"):
+        robot = RobotSettings.model_validate_json(robot)
+    if isinstance(robot, RobotSettings):
+        _check(robot)
+        return robot
+    if robot not in ROBOTS:
+        raise ValueError(f"scenario.robot = {robot!r}: {closest(robot, ROBOTS)}")
+    return ROBOTS[robot]
+
+
+def _check(robot: RobotSettings) -> None:
+    """Refuse a robot whose wheels share a name, stand outside its body, or cannot hold it."""
+    name = f"robot {robot.name or 'own'!r}"
+    if len(set(robot.wheel_names)) != len(robot.wheels):
+        raise ValueError(f"{name}: wheels {list(robot.wheel_names)}, must be of different names")
+    for wheel in robot.wheels:
+        if not np.hypot(wheel.x, wheel.y) <= robot.radius:
+            raise ValueError(
+                f"{name}: wheel {wheel.name!r} at ({wheel.x}, {wheel.y}) m, "
+                f"must lie within the body of radius {robot.radius} m"
+            )
+    if np.linalg.cond(resistance(robot)) > 1e12:
+        raise ValueError(
+            f"{name}: its wheels cannot resist turning, there must be two at different places"
+        )
+
+
+class WheelModel(NamedTuple):
+    """Robots on their wheels; ``M`` robots, ``n`` wheels in all."""
+
+    first: IntArray
+    """``(M + 1,)`` index of the first wheel of each robot, and n."""
+    mass: FloatArray
+    """``(M, 3)`` mass, mass, moment of inertia."""
+    points: FloatArray
+    """``(n, 2)`` where the wheels stand in the body frame."""
+    ahead: FloatArray
+    """``(n,)`` stiffness along the heading."""
+    sideways: FloatArray
+    """``(n,)`` stiffness across it."""
+    limit: FloatArray
+    """``(n,)`` greatest force."""
+    implicit: FloatArray
+    """``(M, 3, 3)`` inverse of M + dt K."""
+
+
+def wheel_model(
+    robots: Sequence[RobotSettings], dt: float, grip: FloatArray, length: float = 1.0
+) -> WheelModel:
+    """Return the wheel model of robots.
+
+    Parameters
+    ----------
+    robots
+        The robots.
+    dt
+        Physics step [s].
+    grip
+        ``(n,)`` multiplies the stiffness ahead of every wheel: 1 healthy, 0 free-wheeling.
+    length
+        Units of length per metre.
+    """
+    first = np.cumsum([0] + [len(robot.wheels) for robot in robots])
+    wheels = [(robot, wheel) for robot in robots for wheel in robot.wheels]
+    points = np.array([[wheel.x, wheel.y] for _, wheel in wheels]) * length
+    ahead = np.array([robot.stiffness for robot, _ in wheels]) * grip
+    sideways = np.array([robot.lateral_stiffness for robot, _ in wheels])
+    limit = np.array([robot.wheel_limit for robot, _ in wheels]) * length
+    mass = np.array([[robot.mass, robot.mass, robot.inertia * length**2] for robot in robots])
+    implicit = np.empty((len(robots), 3, 3))
+    for r in range(len(robots)):
+        total = np.diag(mass[r])
+        for w in range(first[r], first[r + 1]):
+            jacobian = np.array([[1.0, 0.0, -points[w, 1]], [0.0, 1.0, points[w, 0]]])
+            total += dt * jacobian.T @ np.diag([ahead[w], sideways[w]]) @ jacobian
+        implicit[r] = np.linalg.inv(total)
+    return WheelModel(first, mass, points, ahead, sideways, limit, implicit)
+
+
+@njit(cache=True)
+def wheel_wrenches(  # type: ignore[no-untyped-def]
+    motion: FloatArray, speeds: FloatArray, dt: float, model, last: FloatArray, out: FloatArray
+) -> None:
+    """Compute the wheels' wrenches on all robots for one physics step.
+
+    Parameters
+    ----------
+    motion
+        ``(M, 4)`` heading and twist (vx, vy, omega) in the world frame.
+    speeds
+        ``(n,)`` wheel speeds.
+    dt
+        Physics step.
+    model
+        `WheelModel`.
+    last
+        ``(M, 3)`` twist of the step before; overwritten with the present one.
+    out
+        ``(M, 3)`` wrench (fx, fy, torque) of the step before, world frame; overwritten.
+    """
+    for r in range(motion.shape[0]):
+        mass, inertia = model.mass[r, 0], model.mass[r, 2]
+        vx, vy, w = motion[r, 1], motion[r, 2], motion[r, 3]
+        # What contacts did in the last step, from the change of velocity.
+        lx = mass * (vx - last[r, 0]) - dt * out[r, 0]
+        ly = mass * (vy - last[r, 1]) - dt * out[r, 1]
+        lw = inertia * (w - last[r, 2]) - dt * out[r, 2]
+        last[r, 0], last[r, 1], last[r, 2] = vx, vy, w
+        cos, sin = np.cos(motion[r, 0]), np.sin(motion[r, 0])
+        px, py = mass * vx + lx, mass * vy + ly
+        p0, p1, p2 = cos * px + sin * py, cos * py - sin * px, inertia * w + lw
+        for i in range(model.first[r], model.first[r + 1]):
+            pull = dt * model.ahead[i] * speeds[i]
+            p0 += pull
+            p2 -= model.points[i, 1] * pull
+        a = model.implicit[r]
+        v0 = a[0, 0] * p0 + a[0, 1] * p1 + a[0, 2] * p2
+        v1 = a[1, 0] * p0 + a[1, 1] * p1 + a[1, 2] * p2
+        v2 = a[2, 0] * p0 + a[2, 1] * p1 + a[2, 2] * p2
+        f0 = f1 = torque = 0.0
+        for i in range(model.first[r], model.first[r + 1]):
+            x, y = model.points[i, 0], model.points[i, 1]
+            fx = model.ahead[i] * (speeds[i] - v0 + y * v2)
+            fy = -model.sideways[i] * (v1 + x * v2)
+            force = np.sqrt(fx * fx + fy * fy)
+            if force > model.limit[i]:
+                fx *= model.limit[i] / force
+                fy *= model.limit[i] / force
+            f0 += fx
+            f1 += fy
+            torque += x * fy - y * fx
+        out[r, 0], out[r, 1], out[r, 2] = cos * f0 - sin * f1, sin * f0 + cos * f1, torque
+
+
+def sensor_directions(robots: Sequence[RobotSettings]) -> FloatArray:
+    """Return the directions ``(M, S)`` of the robots' sensors [rad].
+
+    Raises
+    ------
+    ValueError
+        If robots have different numbers of sensors.
+    """
+    sensors = [E_PUCK_SENSORS if robot.sensors is None else robot.sensors for robot in robots]
+    counts = {len(directions) for directions in sensors}
+    if len(counts) != 1:
+        raise ValueError(f"robots: {sorted(counts)} sensors, must be the same number on each")
+    return np.array(sensors)

@@ -1,0 +1,126 @@
+"""Cached kernels are taken only as long as nothing has changed that they are made of."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from nested_agents.core.numerics import stamp
+
+ROOT = Path(__file__).resolve().parents[2]
+NJIT = "from nested_agents.core.numerics import njit\n"
+CALLER = """from .inner.called import called
+
+
+@njit(cache=True)
+def caller(x):
+    return called(x)
+"""
+CALLED = """from ..constants import FACTOR
+
+
+@njit(cache=True)
+def called(x):
+    return FACTOR * x
+"""
+FILES = {
+    "__init__.py": "",
+    "caller.py": NJIT + CALLER,
+    "inner/__init__.py": "",
+    "inner/called.py": NJIT + CALLED,
+    "constants.py": "FACTOR = 2\n",
+    "other.py": "N = 1\n",
+}
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    for name, text in FILES.items():
+        path = tmp_path / "package" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+    return tmp_path / "package"
+
+
+def called(package: Path) -> tuple[int, int, bool]:
+    """Return what a kernel says in a new process, its cache hits, and whether it was compiled."""
+    code = (
+        "from package.caller import caller\nprint(caller(3), sum(caller.stats.cache_hits.values()))"
+    )
+    command = [sys.executable, "-c", code]
+    before = {path: path.stat().st_mtime_ns for path in package.rglob("*.nb?")}
+    done = subprocess.run(command, cwd=package.parent, capture_output=True, text=True, check=True)
+    after = {path: path.stat().st_mtime_ns for path in package.rglob("*.nb?")}
+    value, hits = map(int, done.stdout.split())
+    return value, hits, before != after
+
+
+def test_an_edit_of_what_is_called_or_read_is_noticed(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    assert called(package) == (6, 1, True)  # by a process that only compiles
+    (package / "other.py").write_text("N = 2\n")
+    assert called(package) == (6, 1, False)
+    (package / "inner" / "called.py").write_text(FILES["inner/called.py"].replace("* x", "+ x"))
+    assert called(package) == (5, 1, True)
+    (package / "constants.py").write_text("FACTOR = 7\n")
+    assert called(package) == (10, 1, True)
+
+
+def test_what_cannot_be_compiled_apart_is_compiled_all_the_same(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    code = (
+        "import sys\nfrom package.inner.called import called\nsys.executable = '/nowhere'\n"
+        "print(called(3))"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=package.parent, capture_output=True, text=True)
+    assert (done.stdout, done.returncode) == ("6\n", 0), done.stderr
+
+
+PUSH = """
+import sys
+import numpy as np
+from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
+from nested_agents.scenarios.box_pushing.prediction.push import push
+from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS
+
+rng = np.random.default_rng(0)
+model = push_model("push", [ROBOTS["e-puck"]] * 2, BOXES["square"])
+poses, twists = rng.normal(size=(2, 3)) * [0.15, 0.15, 9], rng.normal(size=(2, 9, 3)) * 0.1
+choices, box = rng.integers(9, size=(777, 2)), np.array([0.01, 0.02, 0.3])
+results = push(poses, box, twists, choices, 1.5, model)
+sys.stdout.write("".join(np.asarray(result).tobytes().hex() for result in results))
+"""
+
+
+@pytest.mark.slow
+def test_the_run_that_compiles_has_the_bits_of_later_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    command = [sys.executable, "-c", PUSH]
+    first, later = (
+        subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout for _ in range(2)
+    )
+    assert first == later != b""
+
+
+def test_a_stamp_is_of_all_that_is_imported() -> None:
+    kernels = ROOT / "nested_agents" / "core" / "rules" / "kernels"
+    assert stamp(kernels / "dense.py") != stamp(kernels / "contraction.py")
+    assert stamp(kernels / "dense.py") == stamp(kernels / "dense.py")
+
+
+def test_all_kernels_are_compiled_so() -> None:
+    for folder in ("core", "scenarios", "topologies", "studies"):
+        for path in (ROOT / folder).rglob("*.py"):
+            if path.name != "numerics.py":
+                found = re.search(r"^\s*(from|import) numba\b.*", path.read_text(), re.MULTILINE)
+                assert found is None, f"{path}: {found and found[0]}; see core/numerics"
