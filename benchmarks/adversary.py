@@ -42,22 +42,20 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
 from nested_agents.scenarios.box_pushing.world.bodies import BoxSpec
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.api.study import load
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store import durable
 from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.store.store import LOCK, Store
-from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
-from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.session import check, run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
-from nested_agents.studies.workers.runner import save
-from nested_agents.studies.workers.worker import Outcome, RunTrial
+from nested_agents.studies.workers.runner import Outcome, RunTrial, save
 
 from . import misbehaving
 

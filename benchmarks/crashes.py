@@ -24,8 +24,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import MARK, Store
 
 

@@ -16,11 +16,11 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import Trial
-from nested_agents.studies.workers.worker import Outcome, RunTrial, attempt
+from nested_agents.studies.workers.runner import Outcome, RunTrial, attempt
 
 FIRED = "NESTED_AGENTS_FAULT"
 """Environment variable that a fault sets when it comes true."""

@@ -20,8 +20,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.tables import dumps
 
 PENDULUM = {
     "kind": "gymnasium", "id": "Pendulum-v1", "hold": 2, "horizon": 2, "predictor": "copy",
@@ -98,7 +98,7 @@ STUDIES: dict[str, tuple[int, Mapping[str, Any]]] = {
     ),
 }  # fmt: skip
 PLAN = (
-    "import sys; from nested_agents.studies.api.planning import plan; "
+    "import sys; from nested_agents.studies.api.running import plan; "
     "print(*plan(sys.argv[1], jobs=int(sys.argv[2])).seconds)"
 )
 

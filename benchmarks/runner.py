@@ -26,9 +26,8 @@ from joblib.externals.loky import get_reusable_executor
 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.keeping import open_to_run
-from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.session import check, run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.runner import run_trials
 from nested_agents.studies.workers.workers import LokyWorkers

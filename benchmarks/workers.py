@@ -20,8 +20,8 @@ import numpy as np
 from rich.console import Console
 
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.keeping import open_to_run
+from nested_agents.studies.trials.session import check
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save
 

@@ -21,8 +21,8 @@ from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.results.results import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
 from nested_agents.studies.spec.keys import tables
-from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.presets import PRESETS
+from nested_agents.studies.spec.tables import dumps
 
 BESIDE = {
     "*swept keys*": ("", "a column for every swept key, and `name` if there are overrides"),
@@ -76,10 +76,8 @@ MODULES = {
         "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.teams", "api.planning", "cost.table", "api.comparison", "api.recovery",
-        "api.run_study", "api.tuning",
-        "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
-        "trials.arrangement", "trials.session",
+        "api.study", "api.teams", "api.running", "api.recovery", "api.tuning",
+        "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
         "results.contrasts", "results.published", "results.power", "catalogue.study", "cost.cost",
         "claims.claims",
@@ -216,9 +214,11 @@ def commands() -> Iterator[str]:
     yield "In a checkout, `./dev exec` goes before every command. The exit status is 0 if all went"
     yield "well, 1 if a trial failed, 2 if there is something for you to mend, which one line on"
     yield "standard error names, and 130 after Ctrl-C.\n"
-    yield from table(("command", "purpose"), ((f"[`{n}`](#{n})", t) for n, t in COMMANDS.items()))
-    for name in COMMANDS:
-        command = import_module(f"nested_agents.studies.cli.commands.{name}").command
+    yield from table(
+        ("command", "purpose"), ((f"[`{n}`](#{n})", t) for n, (_, t) in COMMANDS.items())
+    )
+    for name, (module, _) in COMMANDS.items():
+        command = getattr(import_module(f"nested_agents.studies.cli.commands.{module}"), name)
         yield f"## {name}\n"
         if isinstance(command, click.Group):
             for below, one in command.commands.items():

@@ -12,7 +12,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from nested_agents import Spec
-from nested_agents.studies.api.run_study import run_study
+from nested_agents.studies.api.running import run_study
 from nested_agents.studies.results.results import read
 
 spec = Spec.of(

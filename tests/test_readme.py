@@ -9,7 +9,7 @@ import pytest
 from nested_agents.studies.claims import claims
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 ROOT = Path(__file__).resolve().parent.parent
 WITH_SPECS = ("README.md", "docs/start.md")

@@ -24,7 +24,7 @@ from typing import Any, Literal, NoReturn
 from nested_agents.core.plugins.settings import closest
 from nested_agents.studies.cli.main import run_to_status
 from nested_agents.studies.errors import SpecError, show
-from nested_agents.studies.presentation.row_formats import write_csv
+from nested_agents.studies.presentation.tables import write_csv
 
 from labs import LABS, Lab
 

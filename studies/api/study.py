@@ -14,33 +14,33 @@ Examples
 
 from __future__ import annotations
 
+import base64
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.interface.scenario import SUCCESS
+from ...core.interface.scenario import SUCCESS, can_draw
 from ...core.numerics import pd
 from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study
 from ..errors import SpecError
-from ..presentation.progress import Terminal
+from ..presentation.progress import Terminal, count
 from ..presentation.tables import SummaryTable, tabulate
-from ..presentation.words import count
 from ..results import published
-from ..results.contrasts import contrasts
+from ..results.analysis import Difference
+from ..results.contrasts import Aggregates, Contrasts, aggregate, contrasts
 from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
 from ..results.results import Results, chosen, read, together
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store
 from ..workers.runner import Backend
-from . import replay
-from .comparison import Comparison
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,6 +48,82 @@ if TYPE_CHECKING:
     from ...core.interface.scenario import Actors, Scenario
     from ..spec.spec import Spec
     from ..workers.runner import Observer
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Conditions compared by one measure; printed or shown by a notebook, table and verdicts."""
+
+    contrasts: Contrasts
+    """The analysis."""
+
+    @cached_property
+    def table(self) -> SummaryTable:
+        """Estimates and differences, in all forms."""
+        return tabulate(self.contrasts.table)
+
+    @property
+    def differences(self) -> tuple[Difference, ...]:
+        """Every difference with its interval, and p raw and adjusted."""
+        return self.contrasts.differences
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """What was found, and what could have been detected, line by line."""
+        return self.contrasts.notes
+
+    @cached_property
+    def statistics(self) -> Aggregates:
+        """Interquartile means, probabilities of improvement and performance profiles.
+
+        Raises
+        ------
+        SpecError
+            If no two conditions have two seeds each.
+        """
+        return aggregate(self.contrasts)
+
+    @cached_property
+    def aggregated(self) -> SummaryTable:
+        """The table of `statistics`, in all forms."""
+        return tabulate(self.statistics.table)
+
+    def figure(self) -> Figure:
+        """Return performance profiles, and the interquartile mean by episode of training."""
+        from ..presentation.figures import draw_profiles  # matplotlib takes its time
+
+        return draw_profiles(self.statistics)
+
+    def __str__(self) -> str:
+        return "\n".join([str(self.table), "", *self.verdicts])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        lines = "\n".join(map(escape, self.verdicts))
+        return f"{self.table.html}<pre>{lines}</pre>"
+
+
+MOST_BYTES = 20_000_000
+"""Of an animation that a notebook is given."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """An animation."""
+
+    path: Path
+    """Where it is."""
+    title: str
+    """Condition, seed and episode."""
+
+    def _repr_html_(self) -> str:
+        content = self.path.read_bytes()
+        if self.path.suffix != ".gif" or len(content) > MOST_BYTES:
+            return f"{self.title}: {self.path}"
+        encoded = base64.b64encode(content).decode("ascii")
+        return f"<img alt='{self.title}' src='data:image/gif;base64,{encoded}'>"
+
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -218,7 +294,7 @@ class StudyResults:
         seed: int | None = None,
         episode: str = "last",
         path: Place | None = None,
-    ) -> replay.Replay:
+    ) -> Replay:
         """Draw a recorded episode of a trial as an animation; a notebook shows it.
 
         Parameters
@@ -229,9 +305,33 @@ class StudyResults:
             ``first`` or ``last``; ``before`` or ``after`` where something fails.
         path
             Where to write, GIF or MP4; by default the study's folder ``replay``.
+
+        Raises
+        ------
+        SpecError
+            If there is no such trial or recording, or its scenario does not draw.
         """
+        from ..trials.keeping import finished_trial
+
         where = None if path is None else Path(path)
-        return replay.draw(self.directory, condition, seed, episode, where)
+        with Store.open(self.directory) as store:
+            trial = finished_trial(store, condition, seed)
+            recorded = list(trial.recorded.values())
+            if episode == "first" and episode not in recorded:
+                episode = "last"  # of one episode
+            if episode not in recorded:
+                raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
+            scenario: Any = trial.world()
+            if not can_draw(scenario):
+                raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
+            is_drawn = False
+            if where is None:
+                where = self.directory / "replay" / f"{trial.identity[:8]}-{episode}.gif"
+                where.parent.mkdir(exist_ok=True)
+                is_drawn = where.exists()
+            if not is_drawn:
+                scenario.animate(store.recording(trial.identity, episode), where)
+        return Replay(where, f"{trial.condition}, seed {trial.seed}, {episode} episode")
 
     def team(
         self, condition: str | None = None, seed: int | None = None
@@ -330,7 +430,7 @@ def run(
         Where the study is kept; made if it does not exist. Every trial is kept the moment it
         finishes.
     jobs, backend, address, retry_failed, accept_code
-        As those of `nested_agents.studies.api.run_study.run_study`.
+        As those of `nested_agents.studies.api.running.run_study`.
     progress
         Whether to show how it goes.
     observer
@@ -348,7 +448,7 @@ def run(
     """
     from ..spec.spec import Spec
     from ..workers.runner import Observer
-    from .run_study import run_study
+    from .running import run_study
 
     out = Path(out)
     spec = Spec.read(spec, study=out)

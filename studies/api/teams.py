@@ -15,17 +15,14 @@ from ..errors import SpecError, show
 from ..presentation.progress import Terminal
 from ..results.results import DONE, read
 from ..spec.labels import label
-from ..spec.objects import plain
-from ..spec.spec import Spec
+from ..spec.spec import Spec, plain
+from ..store.database import EVALUATION
 from ..store.durable import TEAM
-from ..store.schema import EVALUATION
 from ..store.store import Store
-from ..trials.arrangement import check
 from ..trials.keeping import check_teams, open_to_run
-from ..trials.session import Session
+from ..trials.session import Session, check
 from ..trials.trial import Trial, TrialResult, trials_of
-from ..workers.runner import Observer, run_trials
-from ..workers.worker import Outcome
+from ..workers.runner import Observer, Outcome, run_trials
 from ..workers.workers import start_workers
 from .study import Place, StudyResults, load
 

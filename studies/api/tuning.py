@@ -17,16 +17,15 @@ import numpy as np
 from ...core.interface.scenario import roles_of
 from ...core.numerics import pd
 from ..errors import SpecError, show
-from ..presentation.progress import Terminal
-from ..presentation.words import count
+from ..presentation.progress import Terminal, count
 from ..results.results import Results, read
-from ..spec.overlay import TomlTable, dumps, nested, overlay
 from ..spec.spec import Spec
+from ..spec.tables import TomlTable, dumps, nested, overlay
 from ..store import durable
-from ..trials.arrangement import check
+from ..trials.session import check
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer
-from .run_study import run_study
+from .running import run_study
 from .study import StudyResults, load
 
 FIRST_SEED = 10_000

@@ -26,7 +26,7 @@ from ..results.analysis import (
 )
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
-from ..store.schema import EVALUATION
+from ..store.database import EVALUATION
 
 CONTACT = "contact_fraction"
 VALUE_OF = "learner.decision.value_of"

@@ -56,8 +56,7 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
     """
     from ...topologies.builders import listed
     from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
-    from ..presentation.progress import say
-    from ..presentation.words import count
+    from ..presentation.progress import count, say
 
     directory = study.directory
     print_study(study)

@@ -2,7 +2,7 @@
 
 Statuses: 0 done, 1 a trial failed, 2 something the user can mend (one line on standard error),
 130 interrupted, 141 the reader of the output has gone. A command is one line in `COMMANDS` and a
-module of that name in `commands`, which offers a click command called ``command``.
+click command of that name in a module of `commands`.
 """
 
 import codecs
@@ -15,7 +15,6 @@ from typing import Any
 
 import click
 
-from ...core.plugins.settings import closest
 from ..errors import SpecError
 from .options import complete
 
@@ -23,29 +22,29 @@ PROGRAM = "nested-agents"
 IN_ASCII = "nested-agents-ascii"
 """Name of the error handler of the streams: a terminal that lacks dashes shows ``-`` for them."""
 
-COMMANDS: dict[str, str] = {
-    "demo": "Train two e-Pucks to push a box: table, figures and replay.",
-    "run": "Run the study of a spec, or continue it.",
-    "tune": "Look for better settings of a spec, on seeds of their own.",
-    "plan": "Tell what a study will take, and what it can find.",
-    "table": "Print the results of a study: conditions against estimates.",
-    "compare": "Compare conditions of one study or several, seed by seed.",
-    "results": "Print what every episode of a study measured.",
-    "watch": "Watch a study while it runs: trials, curves, failures.",
-    "status": "Tell how far a study is, what failed, and how long is left.",
-    "retry": "Run the failed trials of a study again.",
-    "export": "Write what a study holds as files for other programs.",
-    "report": "Write a study as one self-contained HTML file.",
-    "explain": "Explain a trained team in words and figures.",
-    "presets": "List the named starting points of a spec, or print one.",
-    "keys": "List the keys of a spec: type, default, what is allowed, meaning.",
-    "topology": "List the topologies, or show one of them.",
-    "check": "Check that scenarios keep their promises.",
-    "cost": "Print what hierarchies cost, by formula and measured.",
-    "benchmark": "Enter a learner in the benchmark push-n, and compare entries.",
-    "claims": "Print the claims of the paper and the verdict on each.",
+COMMANDS: dict[str, tuple[str, str]] = {
+    "demo": ("running", "Train two e-Pucks to push a box: table, figures and replay."),
+    "run": ("running", "Run the study of a spec, or continue it."),
+    "tune": ("running", "Look for better settings of a spec, on seeds of their own."),
+    "plan": ("running", "Tell what a study will take, and what it can find."),
+    "table": ("reading", "Print the results of a study: conditions against estimates."),
+    "compare": ("reading", "Compare conditions of one study or several, seed by seed."),
+    "results": ("reading", "Print what every episode of a study measured."),
+    "watch": ("watch", "Watch a study while it runs: trials, curves, failures."),
+    "status": ("reading", "Tell how far a study is, what failed, and how long is left."),
+    "retry": ("running", "Run the failed trials of a study again."),
+    "export": ("reading", "Write what a study holds as files for other programs."),
+    "report": ("reading", "Write a study as one self-contained HTML file."),
+    "explain": ("reading", "Explain a trained team in words and figures."),
+    "presets": ("describing", "List the named starting points of a spec, or print one."),
+    "keys": ("describing", "List the keys of a spec: type, default, what is allowed, meaning."),
+    "topology": ("topology", "List the topologies, or show one of them."),
+    "check": ("describing", "Check that scenarios keep their promises."),
+    "cost": ("describing", "Print what hierarchies cost, by formula and measured."),
+    "benchmark": ("benchmark", "Enter a learner in the benchmark push-n, and compare entries."),
+    "claims": ("claims", "Print the claims of the paper and the verdict on each."),
 }
-"""The commands and what the help says of each; their modules are imported when asked for."""
+"""The module of each command, imported when it is asked for, and what the help says of it."""
 
 
 class _Commands(click.Group):
@@ -57,7 +56,8 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = import_module(f".commands.{cmd_name}", __package__).command
+        module = import_module(f".commands.{COMMANDS[cmd_name][0]}", __package__)
+        command: click.Command = getattr(module, cmd_name)
         return command
 
     def resolve_command(
@@ -65,6 +65,8 @@ class _Commands(click.Group):
     ) -> tuple[str, click.Command, list[str]]:
         command = self.get_command(ctx, args[0])
         if command is None:
+            from ...core.plugins.settings import closest  # pydantic takes its time
+
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
         parts = command.commands if isinstance(command, click.Group) else {}
         owner = parts.get(args[1], command) if args[1:] else command
@@ -72,7 +74,7 @@ class _Commands(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
 
 @click.group(

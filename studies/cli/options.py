@@ -124,7 +124,7 @@ changes = click.option(
     metavar="KEY=VALUE...",
     help='Lay values over the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
 )
-"""Assignments laid over a spec, see `nested_agents.studies.spec.overlay.assignment`."""
+"""Assignments laid over a spec, see `nested_agents.studies.spec.tables.assignment`."""
 
 figures = click.option(
     "--figures",

@@ -4,11 +4,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from statistics import fmean
 
-from ..presentation.words import count, duration
-from ..spec.outline import StudyOutline, other_spec
+from ..presentation.progress import count, duration
+from ..spec.outline import StudyOutline, other_spec, outdated
 from ..store.store import Store, look
-from ..trials.code import outdated
-from ..workers.worker import cores
+from ..workers.runner import cores
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,7 @@ from ...core.numerics import pd
 from ..errors import WIDTH
 from ..presentation import figures
 from ..presentation.figures import add_legend, look, marker
-from . import rules as explain_rules
-from .rules import exponent, percent
-from .team import Bodies, Explanation
+from .team import Bodies, Explanation, by_share, exponent, percent, rules_table
 
 MOST_AGENTS = 8
 """Agents whose rules are printed; the file holds those of all."""
@@ -36,7 +34,7 @@ def text(explained: Explanation, agents: int | None = None) -> str:
     names = explained.agents[:agents]
     shares = [
         f"{variables[j].name} {percent(float(np.mean([p.share(p.singles[j]) for p in parts])))}"
-        for j in explain_rules.by_share(parts)
+        for j in by_share(parts)
     ]
     environment = jinja2.Environment(trim_blocks=True, undefined=jinja2.StrictUndefined)
     environment.filters["wrapped"] = _wrapped
@@ -47,8 +45,8 @@ def text(explained: Explanation, agents: int | None = None) -> str:
         shares=shares,
         is_additive=max(map(len, explained.rules.terms)) == 1,
         rest=percent(float(np.mean([p.rest for p in parts]))),
-        power=explain_rules.exponent(parts),
-        rules=explain_rules.table(explained.rules, variables, names, parts[: len(names)]),
+        power=exponent(parts),
+        rules=rules_table(explained.rules, variables, names, parts[: len(names)]),
         more=len(explained.agents) - len(names),
         verdicts=list(verdicts(bodies, explained.actuators)) if bodies else (),
         effects=effects_table(bodies, explained.actuators) if bodies else "",

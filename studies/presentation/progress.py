@@ -1,4 +1,7 @@
-"""How a study goes, shown while it runs: a bar on a terminal, else lines."""
+"""How a study goes, shown while it runs: a bar on a terminal, else lines.
+
+With them are words for numbers of things and lengths of time.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,39 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..spec.outline import StudyOutline
-from ..workers.runner import Observer
-from ..workers.worker import Outcome
-from .words import count, duration
+from ..workers.runner import Observer, Outcome
 
 if TYPE_CHECKING:
     from ..spec.spec import Spec
+
+
+def count(number: int, what: str, plural: str = "s") -> str:
+    """Return a number of things.
+
+    >>> count(1, "seed"), count(2, "process", "es")
+    ('1 seed', '2 processes')
+    """
+    return f"{number} {what}{'' if number == 1 else plural}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in its two largest units.
+
+    Examples
+    --------
+    >>> duration(8.4), duration(600), duration(8000), duration(200_000)
+    ('8 s', '10 min', '2 h 13 min', '2 d 7 h')
+    """
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    if minutes < 60:
+        return f"{minutes} min"
+    hours, minutes = divmod(minutes, 60)
+    if hours < 24:
+        return f"{hours} h {minutes} min"
+    return f"{hours // 24} d {hours % 24} h"
+
 
 PLAIN_SECONDS = 10.0
 """How often a line tells of the progress when there is no terminal."""

@@ -21,8 +21,8 @@ import numpy as np
 from ...core.interface.scenario import SUCCESS, Measure
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
-from ..store.schema import RESULTS_VERSION, measures_from, tables
-from ..store.schema import SECONDS as PARTS
+from ..store.database import RESULTS_VERSION, measures_from, tables
+from ..store.database import SECONDS as PARTS
 from .results import SECONDS, Array, Results, from_arrays
 
 DECIMALS = 3

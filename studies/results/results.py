@@ -23,11 +23,10 @@ from ...core.numerics import pd
 from ...core.plugins import sources
 from ..errors import SpecError
 from ..spec.labels import label
-from ..spec.overlay import flat
-from ..store.reading import NamesAndRows
-from ..store.schema import EVALUATION
-from ..store.store import Store
-from ..trials.episodes import joined as joined_measures
+from ..spec.tables import flat
+from ..store.database import EVALUATION
+from ..store.store import NamesAndRows, Store
+from ..trials.trial import joined as joined_measures
 
 Array = NDArray[Any]
 

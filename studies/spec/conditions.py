@@ -31,9 +31,8 @@ from ...topologies import build
 from ...topologies.config import Topology, parse
 from ..errors import SpecError, refused, show
 from .labels import label, scalar
-from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS
-from .refused import explain
+from .tables import TomlTable, explain, nested, overlay
 
 SECTIONS = ("scenario", "topology", "learner")
 

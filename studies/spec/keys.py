@@ -19,9 +19,9 @@ from typing_extensions import TypeAliasType
 
 from ...core.plugins.settings import Settings, near
 from .conditions import ConditionSettings, Override, StageSettings
-from .overlay import models_of, registry_of
 from .presets import PRESETS
 from .spec import Spec
+from .tables import models_of, registry_of
 
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 """How the text beside a field names its unit."""

@@ -1,19 +1,28 @@
-"""What a study consists of, as it was noted: read without running anything that it names."""
+"""What a study consists of, as it was noted: read without running anything that it names.
+
+The installed code that computes results is noted, too, so that an edit of it is reported. Every
+module on which a trial's numbers depend, of this package and of those that offer things to it, has
+a digest of its text, to see at once whether it may have changed, and one of its syntax tree, to see
+whether it has: comments and layout do not count.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.plugins.sources import Sources
+from ...core.plugins.sources import Sources, meaning
 from ..errors import SpecError, show
 from ..store.database import DATABASE, SPEC_FILE
+from ..store.store import Store
 from .labels import lengths
 
 if TYPE_CHECKING:
-    from ..store.reading import Reading
     from .spec import Spec
 
 
@@ -49,7 +58,7 @@ class StudyOutline:
         return cls.noted(spec.table(), {c.label: c.columns for c in spec.conditions()})
 
     @classmethod
-    def kept(cls, store: Reading) -> StudyOutline:
+    def kept(cls, store: Store) -> StudyOutline:
         """Return the outline of a kept study, as it was noted; nothing is run for it.
 
         Raises
@@ -88,12 +97,12 @@ class StudyOutline:
         )
 
 
-def sources_of(store: Reading) -> Sources:
+def sources_of(store: Store) -> Sources:
     """Return the files of users that a kept study names, as they were when it began."""
     return Sources(None, store.sources(), brought_by=str(store.directory))
 
 
-def other_spec(store: Reading) -> str | None:
+def other_spec(store: Store) -> str | None:
     """Return how the copy of the spec beside a database differs from it, in one line.
 
     One of the two may have come from another study. None if they mean the same, or there is no
@@ -105,8 +114,8 @@ def other_spec(store: Reading) -> str | None:
     try:
         copy = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         if copy != own:
-            from .overlay import dumps
             from .spec import Spec
+            from .tables import dumps
 
             tables = Spec.of(copy, sources_of(store)).table(), own
             copy, own = (tomllib.loads(dumps(table)) for table in tables)  # without what is None
@@ -120,3 +129,79 @@ def other_spec(store: Reading) -> str | None:
                 f"{key} = {show(here)} here, {show(there)} there"
             )
     return None
+
+
+PACKAGE = Path(__file__).parents[2]
+"""Where the package is installed."""
+COMPUTING = (
+    "core/**/*.py", "topologies/**/*.py", "scenarios/**/*.py", "scenarios/**/*.toml",
+    "studies/trials/**/*.py", "studies/catalogue/**/*.py",
+)  # fmt: skip
+"""Modules that compute results, and what they are given."""
+SILENT = ("checking", "pictures", "environments.py", "figure.py", "drawing.py")
+"""Parts of them that do not."""
+GROUPS = "nested_agents."
+"""With what the names of entry-point groups begin under which packages offer things."""
+
+Code = dict[str, tuple[str, str]]
+"""By module, digests of its text and of its syntax tree."""
+
+
+def modules() -> dict[str, str]:
+    """Return the text of every module that computes results, by its path in its package."""
+    texts = {}
+    for pattern in COMPUTING:
+        for path in sorted(PACKAGE.glob(pattern)):
+            name = path.relative_to(PACKAGE).as_posix()
+            if not set(name.split("/")) & set(SILENT):
+                texts[name] = path.read_text(encoding="utf-8")
+    for root in _offering():
+        for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
+            texts[path.relative_to(root.parent).as_posix()] = path.read_text(encoding="utf-8")
+    return texts
+
+
+def _offering() -> Iterator[Path]:
+    """Yield the folders, or files, of installed packages that offer things to studies."""
+    from importlib.metadata import entry_points
+
+    points = entry_points()
+    groups = [group for group in points.groups if group.startswith(GROUPS)]
+    modules = {p.module.partition(".")[0] for g in groups for p in points.select(group=g)}
+    for name in sorted(modules - {__name__.partition(".")[0]}):
+        try:
+            spec = find_spec(name)
+        except (ImportError, ValueError):
+            continue  # what cannot be found is reported when it is asked for
+        if spec is not None and spec.origin is not None and spec.origin.endswith(".py"):
+            origin = Path(spec.origin)
+            yield origin.parent if origin.name == "__init__.py" else origin
+
+
+def present(known: Mapping[str, tuple[str, str]] | None = None) -> Code:
+    """Return the digests of the installed code; modules whose text is `known` are not parsed."""
+    digests, known = {}, known or {}
+    for name, text in modules().items():
+        digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+        is_same = name in known and known[name][0] == digest
+        digests[name] = known[name] if is_same else (digest, meaning(text, name))
+    return digests
+
+
+def changed(known: Mapping[str, tuple[str, str]]) -> list[str]:
+    """Return the modules that mean something else than they did, or are new or gone."""
+    here = present(known)
+    edited = [name for name in here if name in known and here[name][1] != known[name][1]]
+    return sorted(known.keys() ^ here.keys()) + edited
+
+
+def outdated(store: Store) -> str | None:
+    """Return why this code would not go on with a study, in one line; None if it would."""
+    modules = changed(store.code())
+    if not modules:
+        return None
+    more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"
+    return (
+        f"{store.directory}: its results are of other code: {modules[0]}{more} changed "
+        "since; --accept-code goes on with it"
+    )

@@ -19,19 +19,19 @@ import json
 import os
 import sqlite3
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
+from ...core.interface.scenario import Measure
 from ..errors import SpecError
-from . import database, durable, integrity
-from .database import DATABASE, SPEC_FILE
+from . import database, durable
+from .database import DATABASE, Noted, Planned
 from .durable import Recording
-from .reading import Reading
-from .schema import SECONDS, Noted, Planned, prepare, trial_checksums
 
-__all__ = ["DATABASE", "SPEC_FILE", "Noted", "Planned", "Store", "locked"]
+NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
+"""The names of columns, and rows of values, which may be read one by one."""
 
 
 @contextmanager
@@ -54,7 +54,7 @@ def locked(directory: Path) -> Iterator[None]:
         yield
 
 
-class Store(Reading):
+class Store:
     """An open study directory. Use `Store.create` to write and `Store.open` to read.
 
     Attributes
@@ -66,9 +66,206 @@ class Store(Reading):
     """
 
     def __init__(self, directory: Path, connection: sqlite3.Connection) -> None:
-        super().__init__(directory, connection)
+        self.directory = directory
         self.notes: list[str] = []
+        self._db = connection
         self._code = ""  # what computes what is saved
+
+    @classmethod
+    @contextmanager
+    def open(cls, directory: Path) -> Iterator[Store]:
+        """Open an existing study to read one state of it, whatever is added meanwhile.
+
+        Raises
+        ------
+        SpecError
+            If the directory holds no readable study, or one of another version, or its database is
+            damaged as a whole: what it says of the study, or the number of its trials. For their
+            rows see `verify`.
+        """
+        path = directory / DATABASE
+        if database.is_orphaned(path):
+            raise SpecError(
+                f"{path}-wal: is the log of a database that is not there any more; nested-agents "
+                "run sets it aside"
+            )
+        if not path.is_file():
+            raise SpecError(f"{directory}: holds no study (no {DATABASE})")
+        with database.reading(path) as connection:
+            if (wrong := database.fault(path, connection)) is not None:
+                raise database.DamageError(path, wrong)
+            if connection.execute("SELECT 1 FROM sqlite_master").fetchone() is None:
+                raise SpecError(f"{path}: is empty, it holds no study yet")
+            yield cls(directory, connection)
+
+    def spec(self) -> Mapping[str, Any]:
+        """Return the table of the spec that the study runs."""
+        return self._table("spec")
+
+    def sources(self) -> dict[str, str]:
+        """Return by name the texts of the users' files that the study names, when it began."""
+        return self._table("sources")
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings of each condition by label, as they were when it began."""
+        return self._table("conditions")
+
+    def planned(self) -> tuple[Planned, ...]:
+        """Return all trials of the study, as they were noted."""
+        rows = self._db.execute(
+            f"SELECT {', '.join(database.PLANNED)} FROM planned ORDER BY position"
+        )
+        return tuple(
+            Planned(identity, condition, seed, {int(k): v for k, v in json.loads(kept).items()})
+            for identity, condition, seed, kept in rows
+        )
+
+    def versions_of_code(self) -> int:
+        """Return by how many versions of the installed code finished trials were computed."""
+        query = "SELECT count(DISTINCT code) FROM trials WHERE state = 'done'"
+        return int(self._db.execute(query).fetchone()[0])
+
+    def code(self) -> dict[str, tuple[str, str]]:
+        """Return by module two digests of the code that computed what was added last."""
+        return {name: (text, tree) for name, (text, tree) in self._table("code").items()}
+
+    def noted(self) -> Noted:
+        """Return what the study is, but for its trials and code."""
+        return Noted(self.spec(), self.settings(), self.columns(), self.sources(), self.measures())
+
+    def measures(self) -> tuple[Measure, ...]:
+        """Return what the study measures of its episodes, of any condition."""
+        try:
+            return database.measures_from(json.loads(self.meta("measures")))
+        except (ValueError, TypeError):
+            raise SpecError(
+                f"{self.directory / DATABASE}: is damaged: measures cannot be read"
+            ) from None
+
+    def meta(self, key: str) -> str:
+        """Return what is noted under `key`, as ``spec`` or ``conditions``."""
+        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        if row is None:
+            raise SpecError(f"{self.directory / DATABASE}: is no study: it has no {key}")
+        return str(row[0])
+
+    def _table(self, key: str) -> dict[str, Any]:
+        try:
+            table = json.loads(self.meta(key))
+        except ValueError:
+            table = None
+        if not isinstance(table, dict):
+            raise SpecError(f"{self.directory / DATABASE}: is damaged: {key} cannot be read")
+        return table
+
+    def verify(self) -> None:
+        """Raise `SpecError` if the rows of a trial that was run are not what was written."""
+        for where in self._damaged_rows().values():
+            raise SpecError(f"{where}; nested-agents run runs it again")
+
+    def _damaged_rows(self) -> dict[str, str]:
+        """Return by identity whose rows are not what was written, one line each."""
+        noted = dict(self._db.execute("SELECT identity, sha256 FROM checksums").fetchall())
+        names = {
+            identity: f"{condition}, seed {seed}"
+            for table in ("trials", "planned")
+            for identity, condition, seed in self._db.execute(
+                f"SELECT identity, condition, seed FROM {table}"
+            )
+        }
+        actual = dict(database.trial_checksums(self._db))
+        path = self.directory / DATABASE
+        return {
+            identity: f"{path}: {names.get(identity, identity)}: rows are damaged"
+            for identity in actual | noted
+            if identity not in actual or noted.get(identity, actual[identity]) != actual[identity]
+        }
+
+    def failed(self) -> list[tuple[str, int, str]]:
+        """Return condition, seed and traceback of every failed trial."""
+        return self._db.execute(
+            "SELECT condition, seed, coalesce(error, '') FROM trials "
+            "JOIN conditions USING (condition) "
+            "WHERE state = 'failed' ORDER BY position, seed"
+        ).fetchall()
+
+    def counts(self) -> dict[str, int]:
+        """Return how many trials are ``done`` and how many ``failed``."""
+        query = "SELECT state, count(*) FROM trials GROUP BY state"
+        return {"done": 0, "failed": 0} | dict(self._db.execute(query).fetchall())
+
+    def phases(self) -> list[str]:
+        """Return the phases that episodes were run in.
+
+        First training and evaluation, then the stages of curricula and the further evaluations,
+        each in their order, then others.
+        """
+        known = ["training", "evaluation"]
+        query = "SELECT phase, min(episode) FROM episodes GROUP BY phase ORDER BY 2, 1"
+        recorded = [phase for phase, _ in self._db.execute(query)]
+        stages = [phase for phase in recorded if phase.startswith(database.STAGE)]
+        evaluations = [
+            f"{database.EVALUATION}{name}" for name in self._table("spec").get("evaluations", ())
+        ]
+        ordered = [*known, *stages, *evaluations]
+        return [phase for phase in ordered if phase in recorded] + sorted({*recorded} - {*ordered})
+
+    def columns(self) -> dict[str, dict[str, Any]]:
+        """Return what tells each condition from the others, by label; see `Condition`."""
+        cursor = self._db.execute("SELECT * FROM conditions ORDER BY position")
+        swept = [column[0] for column in cursor.description][2:]
+        return {row[1]: dict(zip(swept, row[2:], strict=True)) for row in cursor}
+
+    def episodes(self) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
+        """Return the column names and the rows of all phases, by condition, seed and episode.
+
+        Rows are read one by one, as long as the study is open: there may be millions.
+        """
+        cursor = self._db.execute("SELECT * FROM results")
+        return [column[0] for column in cursor.description], cursor
+
+    def trials(self) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and one row per trial, by condition and seed.
+
+        After the swept keys and the seed: its state, its identity, the last line of its traceback
+        if it failed, the seconds of each part, and its `numbers`; None where there is no such.
+        """
+        swept = next(iter(self.columns().values()), {})
+        names = [n for (n,) in self._db.execute("SELECT DISTINCT name FROM numbers ORDER BY name")]
+        values = {
+            (i, n): v for i, n, v in self._db.execute("SELECT identity, name, value FROM numbers")
+        }
+        cursor = self._db.execute(
+            f"SELECT c.condition, {''.join(f'c.{database.quoted(key)}, ' for key in swept)}seed, "
+            f"state, identity, error, {', '.join(database.SECONDS)} FROM trials "
+            "JOIN conditions c USING (condition) LEFT JOIN seconds USING (identity) "
+            "ORDER BY position, seed"
+        )
+        columns = [column[0] for column in cursor.description]
+        identity, error = columns.index("identity"), columns.index("error")
+        rows = []
+        for row in cursor:
+            last = (row[error] or "").rstrip().rpartition("\n")[2] or None
+            measured = (values.get((row[identity], name)) for name in names)
+            rows.append((*row[:error], last, *row[error + 1 :], *measured))
+        return [
+            *columns[: -len(database.SECONDS)],
+            *(f"seconds.{part}" for part in database.SECONDS),
+            *names,
+        ], rows
+
+    def mean_seconds(self) -> dict[str, float]:
+        """Return by condition how long its finished trials took on average [s]."""
+        query = "SELECT condition, avg(total) FROM seconds JOIN trials USING (identity) GROUP BY 1"
+        return dict(self._db.execute(query).fetchall())
+
+    def numbers(self) -> list[tuple[str, int, str, float, bool]]:
+        """Return condition, seed, name, value and whether it is a function of the trial."""
+        return self._db.execute(
+            "SELECT condition, seed, n.name, value, repeatable = 1 FROM numbers n "
+            "JOIN trials USING (identity) JOIN conditions USING (condition) "
+            "ORDER BY position, seed, n.name"
+        ).fetchall()
 
     @classmethod
     @contextmanager
@@ -88,7 +285,7 @@ class Store(Reading):
         files
             Contents of files that are kept beside the database, by name.
         damage
-            What is wrong with its database, see `integrity.damage`.
+            What is wrong with its database, see `database.damage`.
 
         Raises
         ------
@@ -96,12 +293,12 @@ class Store(Reading):
             If it cannot be written.
         """
         path = directory / DATABASE
-        aside = integrity.set_aside(path) if damage is not None else None
+        aside = database.set_aside(path) if damage is not None else None
         with database.writing(path) as connection:
             store = cls(directory, connection)
             with database.transaction(connection):
-                prepare(connection, noted)
-                recovered = 0 if aside is None else integrity.recover(aside, connection)
+                database.prepare(connection, noted)
+                recovered = 0 if aside is None else database.recover(aside, connection)
             if aside is not None:
                 store.notes.append(
                     f"{path}: is damaged: {damage}; kept as {aside.name}, "
@@ -167,7 +364,7 @@ class Store(Reading):
         with self._changing(identity):
             self._note(trial, "done", None, digest)
             self._insert("episodes", [(identity, *row) for row in episodes])
-            self._insert("seconds", [(identity, *(seconds[part] for part in SECONDS))])
+            self._insert("seconds", [(identity, *(seconds[part] for part in database.SECONDS))])
             self._insert("numbers", [(identity, n, v, int(exact)) for n, v, exact in numbers])
 
     def fail(self, trial: Planned, error: str) -> None:
@@ -197,7 +394,7 @@ class Store(Reading):
             (before,) = self._db.execute(count).fetchone()
             yield
             for identity in identities:
-                self._insert("checksums", list(trial_checksums(self._db, identity)))
+                self._insert("checksums", list(database.trial_checksums(self._db, identity)))
             (after,) = self._db.execute(count).fetchone()
             self._db.execute("UPDATE ledger SET trials = trials + ?", (after - before,))
 

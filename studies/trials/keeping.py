@@ -13,17 +13,13 @@ from ...core.plugins.settings import closest
 from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ..errors import SpecError, show
 from ..spec.labels import aliases
-from ..spec.outline import sources_of
-from ..spec.overlay import dumps, flat
+from ..spec.outline import outdated, present, sources_of
 from ..spec.spec import Spec
-from ..store import integrity
-from ..store.database import DATABASE, SPEC_FILE
-from ..store.reading import Reading
-from ..store.schema import Noted
+from ..spec.tables import dumps, flat
+from ..store import database
+from ..store.database import DATABASE, SPEC_FILE, Noted
 from ..store.store import Store, locked
-from . import code
-from .episodes import column_of
-from .trial import AS_IN_SPEC, Trial, trials_of
+from .trial import AS_IN_SPEC, Trial, column_of, trials_of
 
 SAME = (*AS_IN_SPEC, "evaluations")
 """What of a spec must be the same for a study to go on."""
@@ -49,7 +45,7 @@ def open_to_run(
     trials
         All its trials.
     measures
-        What it measures of its episodes, see `nested_agents.studies.trials.arrangement.check`.
+        What it measures of its episodes, see `nested_agents.studies.trials.session.check`.
     accept_code
         Whether to go on although the installed code has changed since.
 
@@ -65,10 +61,10 @@ def open_to_run(
         # Again: nobody else writes from here on.
         damage = examine(directory, spec, noted, accept_code=accept_code)
         known = None
-        if damage is None and integrity.holds_tables(directory / DATABASE):
-            with Reading.open(directory) as reading:
+        if damage is None and database.holds_tables(directory / DATABASE):
+            with Store.open(directory) as reading:
                 known = reading.code()
-        computed = replace(noted, code=code.present(known))
+        computed = replace(noted, code=present(known))
         with Store.create(directory, computed, _files(directory, spec, noted), damage) as store:
             yield store
 
@@ -82,7 +78,7 @@ def _files(directory: Path, spec: Spec, noted: Noted) -> dict[str, bytes]:
     return files | {f"{FOLDER}/{kept_name(name)}": text.encode() for name, text in copies}
 
 
-def spec_of(store: Reading) -> Spec:
+def spec_of(store: Store) -> Spec:
     """Return the spec of a kept study; what it names of users' files is run."""
     return Spec.of(store.spec(), sources_of(store))
 
@@ -160,9 +156,9 @@ def examine(directory: Path, spec: Spec, noted: Noted, *, accept_code: bool) -> 
     SpecError
         If the directory holds another study, or something that is none.
     """
-    damage = integrity.damage(directory / DATABASE)
-    if damage is None and integrity.holds_tables(directory / DATABASE):
-        with Reading.open(directory) as store:
+    damage = database.damage(directory / DATABASE)
+    if damage is None and database.holds_tables(directory / DATABASE):
+        with Store.open(directory) as store:
             refusal = _of_study(store, spec, noted, accept_code)
     else:
         refusal = _of_file(directory, spec, noted, damage)
@@ -197,9 +193,9 @@ def _of_file(directory: Path, spec: Spec, noted: Noted, damage: str | None) -> s
     return f"{directory}: holds another study: {mismatch}" if mismatch else None
 
 
-def _of_study(store: Reading, spec: Spec, noted: Noted, accept_code: bool) -> str | None:
+def _of_study(store: Store, spec: Spec, noted: Noted, accept_code: bool) -> str | None:
     """Return why a spec may not be added to an open study, in one line; None if it may."""
-    if not accept_code and (refusal := code.outdated(store)) is not None:
+    if not accept_code and (refusal := outdated(store)) is not None:
         return refusal
     mismatch = difference(store.noted(), noted)
     copy = store.directory / SPEC_FILE

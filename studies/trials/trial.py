@@ -1,24 +1,202 @@
-"""A trial: one condition, one seed, and what running it gives: a pure function of its content."""
+"""A trial: one condition, one seed, and what running it gives: a pure function of its content.
+
+It gives what is measured of its episodes, and what is recorded of them.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from math import inf, isfinite
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core.interface.scenario import Measure, Scenario
+import numpy as np
+
+from ...core.interface.scenario import Measure, Scenario, Transition
 from ...core.plugins.sources import Sources, named
+from ..errors import SpecError
 from ..spec.conditions import ConditionSettings, Stage
 from ..spec.labels import lengths
+from ..store.database import AFTER, BEFORE, RESULTS_VERSION, Planned
 from ..store.durable import Recording
-from ..store.schema import RESULTS_VERSION, Planned
-from .episodes import EpisodeRow
 
 if TYPE_CHECKING:
+    from ...core.agents.loop import StepRecord
     from ..spec.spec import Spec
+
+
+class EpisodeRow(NamedTuple):
+    """The measurements of one episode."""
+
+    phase: str
+    """``training`` or ``evaluation``; or one that begins with `STAGE` or `EVALUATION`."""
+    episode: int
+    """Counted from 0 within its phase, or through all stages of a curriculum."""
+    steps: int
+    measures: Mapping[str, float]
+    """Values of the scenario's measures by name, in their order; of a rate, whether it is so."""
+    return_: float
+    """Sum of the rewards, not discounted; of rewards of each agent, of their mean."""
+
+    def flat(self, names: Iterable[str]) -> tuple[Any, ...]:
+        """Return it with the measures of these names in place of all; None where it has not one."""
+        measured = (self.measures.get(name) for name in names)
+        return (self.phase, self.episode, self.steps, *measured, self.return_)
+
+
+class EpisodeMeter:
+    """Takes in the transitions of one episode and sums them up.
+
+    Parameters
+    ----------
+    phase, episode
+        Where the episode stands.
+    measures
+        What is measured of it.
+
+    Examples
+    --------
+    >>> meter = EpisodeMeter("training", 0, [Measure("energy_j", "energy", "J", "joules", "sum")])
+    >>> for joules in (1.0, 2.5):
+    ...     meter.add(Transition(np.zeros((1, 1)), 0.5, False, False, {"joules": joules}))
+    >>> meter.row()
+    EpisodeRow(phase='training', episode=0, steps=2, measures={'energy_j': 3.5}, return_=1.0)
+    """
+
+    def __init__(self, phase: str, episode: int, measures: Sequence[Measure]) -> None:
+        self._phase, self._episode, self._measures = phase, episode, measures
+        self._values = {m.name: -inf if m.gathering == "max" else 0.0 for m in measures}
+        self._steps, self._return = 0, 0.0
+
+    def add(self, transition: Transition) -> None:
+        """Take in one step.
+
+        Raises
+        ------
+        ValueError
+            If the transition does not hold what a measure is taken from.
+        """
+        self._steps += 1
+        for measure in self._measures:
+            value, before = _taken(measure, transition), self._values[measure.name]
+            if measure.gathering == "last":
+                self._values[measure.name] = value
+            elif measure.gathering == "max":
+                self._values[measure.name] = max(before, value)
+            else:
+                self._values[measure.name] = before + value
+        self._return += float(np.mean(transition.reward))
+
+    def row(self) -> EpisodeRow:
+        """Return the measurements of the episode, which has ended.
+
+        Raises
+        ------
+        FloatingPointError
+            If one of them is not finite: the trial has come to nothing, and says so.
+        """
+        measured = {m.name: self._gathered(m) for m in self._measures}
+        for name, value in {**measured, "return": self._return}.items():
+            if not isfinite(value):
+                where = f"{self._phase} episode {self._episode}"
+                raise FloatingPointError(f"{name} = {value} in {where}")
+        return EpisodeRow(self._phase, self._episode, self._steps, measured, self._return)
+
+    def _gathered(self, measure: Measure) -> float:
+        value = self._values[measure.name]
+        if measure.gathering == "mean":
+            value /= self._steps
+        return bool(value) if measure.is_rate and isfinite(value) else value
+
+
+def _taken(measure: Measure, transition: Transition) -> float:
+    """Return the value of a measure at one step."""
+    if measure.source == "terminated":
+        return float(transition.terminated)
+    if measure.source not in transition.info:
+        known = ", ".join(sorted(transition.info)) or "nothing"
+        raise ValueError(
+            f"measure {measure.name!r}: its source {measure.source!r} is not in the info of a "
+            f"step, which holds {known}"
+        )
+    try:
+        return float(transition.info[measure.source])
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"measure {measure.name!r}: its source {measure.source!r} must be one number at every "
+            f"step, received {type(transition.info[measure.source]).__name__}"
+        ) from None
+
+
+class Stopwatch:
+    """Sums the seconds that the parts of the control loop took."""
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), 0.0)
+
+    def add(self, record: StepRecord) -> None:
+        """Take in one step."""
+        spent: Mapping[str, float] = record.transition.info.get("seconds", {})
+        self.seconds["decision"] += record.deciding
+        self.seconds["physics"] += spent.get("physics", 0.0)
+        self.seconds["sensors"] += spent.get("sensors", 0.0)
+        self.seconds["learning"] += record.learning
+
+
+RESERVED = ("identity", "condition", "seed", "position", *BEFORE, *AFTER)
+"""What no measure may be called, as columns of results are called so."""
+
+
+def joined(
+    by_scenario: Iterable[Sequence[Measure]], taken: Iterable[str] = ()
+) -> tuple[Measure, ...]:
+    """Return the measures of several scenarios, each once, in the order in which they come.
+
+    Parameters
+    ----------
+    by_scenario
+        What each scenario declares.
+    taken
+        Names of further columns, which no measure may have.
+
+    Raises
+    ------
+    SpecError
+        If a name is reserved, or two scenarios mean different things by it.
+
+    Examples
+    --------
+    >>> one, other = Measure("energy_j", "energy", "J"), Measure("spread_m", "spread", "m")
+    >>> [measure.name for measure in joined([(one,), (other, one)])]
+    ['energy_j', 'spread_m']
+    """
+    reserved = {name.lower() for name in (*RESERVED, *taken)}
+    by_name: dict[str, Measure] = {}
+    for measures in by_scenario:
+        for measure in measures:
+            if measure.name.lower() in reserved:
+                raise SpecError(f"measure {measure.name!r}: a column of results is called so")
+            known = by_name.setdefault(measure.name.lower(), measure)
+            if column_of(known) != column_of(measure):
+                raise SpecError(
+                    f"measure {measure.name!r}: is declared as {_describe(known)}, and by another "
+                    f"scenario of this study as {_describe(measure)}"
+                )
+    return tuple(by_name.values())
+
+
+def column_of(measure: Measure) -> tuple[str, str, str, bool]:
+    """Return what equal columns have in common: name, unit, gathering, whether it is a rate."""
+    return measure.name, measure.unit, measure.gathering, measure.is_rate
+
+
+def _describe(measure: Measure) -> str:
+    kind = "rate" if measure.is_rate else "number"
+    return f"{measure.name!r}, {measure.gathering} {kind} in {measure.unit!r}"
+
 
 AS_IN_SPEC = ("study", "episodes", "steps", "evaluation", "evaluation_steps", "keep_teams")
 """What all trials of a spec have in common, and any process can read as it is."""

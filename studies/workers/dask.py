@@ -8,32 +8,51 @@ started here). Only then is the trial lost. Workers may join and leave at any ti
 from __future__ import annotations
 
 import logging
+import os
 import time
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
-from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster
+from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, get_worker
 from distributed.comm.core import CommClosedError
 
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .runner import Workers
-from .worker import (
-    ONE_THREAD,
-    Outcome,
-    RunTrial,
-    UnlikeWorkerError,
-    attempt_alike,
-    ignore_interrupts,
-    versions,
-)
+from .runner import ONE_THREAD, Outcome, RunTrial, Workers, attempt, ignore_interrupts, versions
 
 CONNECT = 10.0
 """How long to try to reach a scheduler [s]."""
 
 PATIENCE = 60.0
 """How long to wait for the first worker, or for another one when all are gone [s]."""
+
+
+class UnlikeWorkerError(Exception):
+    """A worker on which a trial might give other bits, or could not run; one line."""
+
+
+def attempt_alike(expected: dict[str, str], run_trial: RunTrial, trial: Trial) -> Outcome:
+    """Run one trial on a worker that somebody else started, if it is as `expected`.
+
+    Raises
+    ------
+    UnlikeWorkerError
+        If its versions are not the `expected` ones, see `versions`, or it uses several threads.
+    """
+    worker = get_worker()
+    here = versions() | {name: os.environ.get(name, "not set") for name in ONE_THREAD}
+    for name, wanted in (expected | ONE_THREAD).items():
+        if here[name] != wanted:
+            raise UnlikeWorkerError(
+                f"the worker {worker.address} has {name} {here[name]}, must be {wanted}"
+            )
+    if worker.state.nthreads > 1:
+        raise UnlikeWorkerError(
+            f"the worker {worker.address} has {worker.state.nthreads} threads, must be 1: start "
+            f"dask worker with --nworkers {worker.state.nthreads} --nthreads 1"
+        )
+    return attempt(run_trial, trial)
 
 
 class DaskWorkers(Workers):

@@ -18,8 +18,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from ...core.plugins.settings import closest
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .runner import Backend, Workers
-from .worker import ONE_THREAD, Outcome, RunTrial, attempt, begin, cores
+from .runner import ONE_THREAD, Backend, Outcome, RunTrial, Workers, attempt, begin, cores
 
 
 def check_jobs(jobs: int) -> None:

@@ -10,7 +10,7 @@ from nested_agents.scenarios.checking.predictions import MOST_JOINT_ACTIONS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TEXT = (DOCS / "worlds.md").read_text(encoding="utf-8")

@@ -9,9 +9,8 @@ import numpy as np
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.episodes import EpisodeRow
 from nested_agents.studies.trials.keeping import open_to_run
-from nested_agents.studies.trials.trial import TrialResult, trials_of
+from nested_agents.studies.trials.trial import EpisodeRow, TrialResult, trials_of
 
 SPEC = Spec.of({"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
                 "sweep": {"preset": ["default", "frozen"]}})  # fmt: skip

@@ -4,7 +4,7 @@ import sys
 
 import made_up
 
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
 

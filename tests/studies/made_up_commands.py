@@ -12,7 +12,7 @@ from pathlib import Path
 import made_up
 import pytest
 
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
 

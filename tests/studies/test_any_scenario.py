@@ -20,16 +20,15 @@ from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.tables import tabulate
-from nested_agents.studies.report.replays import replays
+from nested_agents.studies.report.page import replays
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store import integrity
+from nested_agents.studies.store import database
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.keeping import pending
-from nested_agents.studies.trials.session import Session, run_trial
+from nested_agents.studies.trials.session import Session, check, run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save
 
@@ -218,7 +217,7 @@ def test_a_measure_that_two_scenarios_mean_otherwise_is_refused(carts, monkeypat
 
 
 def test_results_of_an_older_version_are_not_read(study, monkeypatch):
-    monkeypatch.setattr(integrity, "RESULTS_VERSION", 99)
+    monkeypatch.setattr(database, "RESULTS_VERSION", 99)
     with pytest.raises(SpecError, match="this is version 99; an older"), Store.open(study):
         pass
 

@@ -14,8 +14,7 @@ from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.arrangement import check
-from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.session import check, run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save
 

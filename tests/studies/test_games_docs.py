@@ -10,7 +10,7 @@ from nested_agents.studies.claims import claims
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 GAMES = (DOCS / "games.md").read_text(encoding="utf-8")

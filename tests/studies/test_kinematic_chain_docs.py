@@ -7,7 +7,7 @@ import pytest
 from published_tables import print_table
 
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "kinematic_chain.md").read_text(encoding="utf-8")

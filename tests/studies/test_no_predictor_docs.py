@@ -8,7 +8,7 @@ from published_tables import print_table
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "no_predictor.md").read_text(encoding="utf-8")

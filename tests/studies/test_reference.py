@@ -7,7 +7,7 @@ from types import ModuleType
 import pytest
 
 import nested_agents as na
-from nested_agents.studies.api.run_study import run_study
+from nested_agents.studies.api.running import run_study
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.results.results import NUMBERS
 from nested_agents.studies.spec.keys import tables

@@ -8,7 +8,7 @@ import pytest
 from nested_agents.studies.claims import claims
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "related.md").read_text(encoding="utf-8")

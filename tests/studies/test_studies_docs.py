@@ -6,7 +6,7 @@ from pathlib import Path
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.studies import STUDIES
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")

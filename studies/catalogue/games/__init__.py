@@ -15,7 +15,7 @@ from ...errors import WIDTH
 from ...results.analysis import Analysis, Case, Figures, Summary
 from ...results.results import Results
 from ...results.statistics import rate, two_figures
-from ...store.schema import EVALUATION
+from ...store.database import EVALUATION
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check

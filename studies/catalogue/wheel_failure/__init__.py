@@ -29,8 +29,7 @@ from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Array, bootstrap, rate
 from ...spec.labels import label_but
 from ...spec.spec import Spec
-from ...trials.arrangement import arrange
-from ...trials.session import Session
+from ...trials.session import Session, arrange
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
 

@@ -14,11 +14,11 @@ measures = click.Choice(["success", "decisions"])
 
 
 @click.group(no_args_is_help=False)
-def command() -> None:
+def benchmark() -> None:
     """Teams of 2 to 64 robots in fixed worlds: enter a learner, compare it with others."""
 
 
-@command.command()
+@benchmark.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.out("Where to keep the study.", required=True)
 @click.option("--robots", type=sizes, multiple=True, default=["2", "4", "8"], help="How many.")
@@ -45,7 +45,7 @@ def run(
     return 0
 
 
-@command.command()
+@benchmark.command()
 @entries
 @click.option("--schema", is_flag=True, help="Print the JSON schema of entries.")
 def check(entries: tuple[Path, ...], schema: bool) -> int:
@@ -63,7 +63,7 @@ def check(entries: tuple[Path, ...], schema: bool) -> int:
     return 0
 
 
-@command.command()
+@benchmark.command()
 @entries
 @click.option("--measure", type=measures, default="success", help="In evaluation, or of training.")
 @options.form

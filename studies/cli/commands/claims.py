@@ -1,12 +1,13 @@
 """``nested-agents claims``: what the paper claims, and the verdict on each."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from ....core.plugins.settings import closest
 from ...api.study import run
-from ...claims import claims
+from ...claims.claims import PAPERS, PUBLISHED, QUICK, SPECS, judge, print_claims, studies_of
 from ...errors import SpecError
 from ...presentation.progress import Terminal, say
 from ...results import published
@@ -29,21 +30,21 @@ from .. import options
 )
 @options.jobs
 @options.formats("table", "json", "markdown")
-def command(out: Path | None, quick: bool, of: str, jobs: int | None, form: claims.Format) -> int:
+def claims(out: Path | None, quick: bool, of: str, jobs: int | None, form: Any) -> int:
     """Print one table: each claim of a paper, its measure, the result, the verdict.
 
     Without --out the table is made from the results that are committed in the repository.
     """
-    if of not in claims.PAPERS:
-        raise SpecError(f"--of = {of!r}: {closest(of, claims.PAPERS)}")
+    if of not in PAPERS:
+        raise SpecError(f"--of = {of!r}: {closest(of, PAPERS)}")
     if out is not None:
         results = _run(out, of, quick=quick, jobs=jobs)
     elif quick or jobs is not None:
         raise SpecError(
             f"{'--quick' if quick else '--jobs'}: needs --out, where to run the studies"
         )
-    elif claims.PUBLISHED.is_dir():
-        results = published.read(claims.PUBLISHED, claims.studies_of(of))
+    elif PUBLISHED.is_dir():
+        results = published.read(PUBLISHED, studies_of(of))
     else:
         raise SpecError(
             "claims: the committed results are in the repository, in studies/claims/published, "
@@ -52,16 +53,16 @@ def command(out: Path | None, quick: bool, of: str, jobs: int | None, form: clai
     for study, of_study in results.items():
         if of_study.note:
             say(f"{study}: {of_study.note}")
-    claims.print_claims(claims.judge({study: p.results for study, p in results.items()}, of), form)
+    print_claims(judge({study: p.results for study, p in results.items()}, of), form)
     return 0
 
 
 def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, published.Published]:
     """Run the studies of the claims, or what is left of them; return the results by study."""
     results = {}
-    for study in claims.studies_of(of):
+    for study in studies_of(of):
         name = study.replace("-", "_")
-        folder = claims.QUICK if quick else claims.SPECS / name
+        folder = QUICK if quick else SPECS / name
         ran = run(folder / f"{name}.toml", out / study, jobs=jobs, observer=Terminal())
         if ran.failed:
             raise SpecError(

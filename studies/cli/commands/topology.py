@@ -22,18 +22,18 @@ TOPOLOGY = {"kind", "members", "edges"}
 
 
 @click.group(no_args_is_help=False)
-def command() -> None:
+def topology() -> None:
     """List the topologies, or show one of them."""
 
 
-@command.command("list")
+@topology.command("list")
 def list_all() -> int:
     """List the topologies, built-in and installed."""
     print(kinds())
     return 0
 
 
-@command.command()
+@topology.command()
 @click.argument("topology", metavar="SPEC")
 @click.option(
     "--agents",

@@ -92,7 +92,7 @@ def _conditions(results: Results, planned: Mapping[str, int], now: Progress) -> 
     help="How often to look again.",
 )
 @click.option("--once", is_flag=True, help="Show what there is now, and stop.")
-def command(directory: Path, every: float, once: bool) -> int:
+def watch(directory: Path, every: float, once: bool) -> int:
     """Watch trials, learning curves as they grow, failures and the time left, until all is done.
 
     DIR is where the study is kept, whoever runs it and wherever; looking at it disturbs nothing.

@@ -12,8 +12,7 @@ from nested_agents.core.policies.peer import FARTHEST, Inputs, Peer, RewardScale
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
-from nested_agents.studies.trials.session import Session, run_trial
+from nested_agents.studies.trials.session import Session, check, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 TABLE: dict[str, Any] = {

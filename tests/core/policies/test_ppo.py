@@ -15,8 +15,7 @@ from nested_agents.core.policies.peer import Passing, Seen
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import arrange, check
-from nested_agents.studies.trials.session import Session, run_trial
+from nested_agents.studies.trials.session import Session, arrange, check, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SHORT = {"kind": "hierarchy-ppo", "rollout": 16, "batch_size": 8, "epochs": 2}

@@ -8,8 +8,7 @@ from nested_agents.scenarios.box_pushing.config import PushingPointsSettings
 from nested_agents.scenarios.checking.checker import check_scenario
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import arrange, check
-from nested_agents.studies.trials.session import Session
+from nested_agents.studies.trials.session import Session, arrange, check
 from nested_agents.studies.trials.trial import trials_of
 
 SCENARIO = {"kind": "pushing-points", "option_length": 2, "longest": 12}

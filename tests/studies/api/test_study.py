@@ -4,7 +4,7 @@ import made_up
 import pytest
 
 import nested_agents as na
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 
 TABLE = {"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,

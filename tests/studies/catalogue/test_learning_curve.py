@@ -9,8 +9,7 @@ from nested_agents.core.interface.scenario import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.learning_curve import analyse, curves_of, draw, metrics_of
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.presentation.row_formats import write_rows
-from nested_agents.studies.presentation.tables import Cell
+from nested_agents.studies.presentation.tables import Cell, write_rows
 from nested_agents.studies.results.statistics import Estimate, two_figures
 
 

@@ -8,8 +8,7 @@ from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of,
 from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import arrange, check
-from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.session import arrange, check, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SIZES = {2: 0.9, 8: 0.9, 64: 0.5}

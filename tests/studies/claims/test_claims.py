@@ -39,7 +39,7 @@ from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.studies import STUDIES
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 QUICK = Path(claims.__file__).parent / "quick"
 CATALOGUE = QUICK.parents[1] / "catalogue"

@@ -3,7 +3,7 @@
 import made_up
 import pytest
 
-from nested_agents.studies.spec.overlay import dumps
+from nested_agents.studies.spec.tables import dumps
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import made_up
 import pytest
 from made_up_commands import run_here
 
-from nested_agents.studies.spec.overlay import dumps
+from nested_agents.studies.spec.tables import dumps
 
 STUDY = "STUDY"
 LOADED = [

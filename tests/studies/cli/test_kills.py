@@ -14,7 +14,7 @@ import pytest
 from made_up_commands import finish, run_here, start, wait_for_results
 
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.spec.overlay import dumps
+from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.workers.runner import save
 

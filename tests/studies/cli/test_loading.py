@@ -14,7 +14,7 @@ from rich.console import Console
 
 from nested_agents.studies.cli.commands.watch import curve, frame
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.spec.overlay import dumps
+from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import Store
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.cli.standing import _estimate, progress
-from nested_agents.studies.store import integrity
+from nested_agents.studies.spec import outline
+from nested_agents.studies.store import database
 from nested_agents.studies.store.store import LOCK, MARK, Running, Store, look
-from nested_agents.studies.trials import code
 from nested_agents.studies.workers.runner import save
 
 
@@ -84,7 +84,7 @@ def test_failed_and_damaged_trials_are_counted_once(study, capsys):
 
 
 def test_what_other_code_has_done_is_done(study, monkeypatch, capsys):
-    monkeypatch.setattr(code, "changed", lambda known: ["core/a.py"])
+    monkeypatch.setattr(outline, "changed", lambda known: ["core/a.py"])
     now = read(study)
     assert (now.done, now.left, now.seconds) == (4, 2, None)
     assert main(["status", str(study)]) == 0
@@ -94,7 +94,7 @@ def test_what_other_code_has_done_is_done(study, monkeypatch, capsys):
 
 
 def test_a_study_of_another_version_is_refused(study, monkeypatch, capsys):
-    monkeypatch.setattr(integrity, "RESULTS_VERSION", 99)
+    monkeypatch.setattr(database, "RESULTS_VERSION", 99)
     for command in (["status"], ["watch", "--once"]):
         assert main([*command, str(study)]) == 2
         error = capsys.readouterr().err

@@ -11,7 +11,7 @@ import pytest
 
 from nested_agents.core.agents.cost import Problem
 from nested_agents.core.evaluators.evaluator import Counts
-from nested_agents.studies.cli.commands.cost import numbers
+from nested_agents.studies.cli.commands.describing import numbers
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.cost.cost import (
     WAYS,
@@ -22,9 +22,9 @@ from nested_agents.studies.cost.cost import (
     measure,
     messages,
     step_formula,
+    written,
 )
 from nested_agents.studies.cost.figure import draw
-from nested_agents.studies.cost.table import written
 from nested_agents.studies.presentation import figures
 
 FIVE = ("chain", "teams", "tree:2", "star", "independent")

@@ -6,8 +6,7 @@ import pytest
 from nested_agents.core.interface.spaces import Variable
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.studies.explain import rules as explain_rules
-from nested_agents.studies.explain.rules import labels, take_apart
+from nested_agents.studies.explain.team import labels, rules_table, take_apart
 
 PARTITIONS = [
     Partition((0.0, 1.0), "triangular"),
@@ -78,7 +77,7 @@ def test_rules_in_words():
     theta[:, 2:5] = [[0.02, 0.0, -0.02], [0.04, 0.0, -0.04]]
     parts = [take_apart(rules, row) for row in theta]
     agents = ["robot1.left", "robot1.front-right"]
-    lines = explain_rules.table(rules, VARIABLES, agents, parts).splitlines()
+    lines = rules_table(rules, VARIABLES, agents, parts).splitlines()
     assert [line.split() for line in lines[:2]] == [["robot1", "robot1"], ["left", "front-right"]]
     assert lines[2].split() == ["gap,", "share", "of", "the", "variance", "100", "%", "100", "%"]
     assert lines[3].split() == ["IF", "gap", "is", "touching,", "0", "m:", "+2.00", "+4.00"]
@@ -89,6 +88,6 @@ def test_many_agents_stand_in_blocks():
     rules = base(1)
     parts = [take_apart(rules, theta_for(rules))] * 12
     names = [f"robot{i}.middle-right" for i in range(12)]
-    table = explain_rules.table(rules, VARIABLES, names, parts)
+    table = rules_table(rules, VARIABLES, names, parts)
     assert max(len(line.rstrip()) for line in table.splitlines()) <= 80
     assert table.count("robot") == 12

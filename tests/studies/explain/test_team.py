@@ -10,9 +10,8 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import team as explain
 from nested_agents.studies.explain import text as explain_text
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store import integrity
-from nested_agents.studies.store.database import DATABASE
-from nested_agents.studies.store.schema import RESULTS_VERSION
+from nested_agents.studies.store import database
+from nested_agents.studies.store.database import DATABASE, RESULTS_VERSION
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import finished_trial
 from nested_agents.studies.trials.session import run_trial
@@ -136,7 +135,7 @@ def changed(study, tmp_path, statement):
 
 
 def test_results_of_another_version_are_refused(study, monkeypatch, capsys):
-    monkeypatch.setattr(integrity, "RESULTS_VERSION", 99)
+    monkeypatch.setattr(database, "RESULTS_VERSION", 99)
     status, said = run(capsys, study)
     assert status == 2
     assert f"holds results of version {RESULTS_VERSION}, this is version 99" in said.err

@@ -2,8 +2,8 @@ import pytest
 
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.conditions import StageSettings
-from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.trials.keeping import difference, noted_of
 
 TWO_STAGES = """

@@ -2,7 +2,7 @@ import pytest
 
 from nested_agents.scenarios.box_pushing.world.settings import Failure
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.spec.overlay import assignment, flat, kind_of, models_of, nested, overlay
+from nested_agents.studies.spec.tables import assignment, flat, kind_of, models_of, nested, overlay
 
 LEARNER = ConditionSettings.model_fields["learner"]
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from nested_agents import studies
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.session import check
 
 EXAMPLES = int(os.environ.get("FUZZED_SPECS", "200"))
 

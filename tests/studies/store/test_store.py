@@ -8,10 +8,9 @@ import pytest
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec import spec as spec_module
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store import durable, integrity
+from nested_agents.studies.store import database, durable
 from nested_agents.studies.store import store as store_module
-from nested_agents.studies.store.database import DATABASE, SPEC_FILE
-from nested_agents.studies.store.schema import RESULTS_VERSION
+from nested_agents.studies.store.database import DATABASE, RESULTS_VERSION, SPEC_FILE
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending, spec_of
 from nested_agents.studies.trials.trial import trials_of
@@ -159,7 +158,7 @@ def test_another_study_is_refused_and_nothing_changed(finished, changes, said):
 
 
 def test_results_of_another_version_are_refused(finished, monkeypatch):
-    monkeypatch.setattr(integrity, "RESULTS_VERSION", 99)
+    monkeypatch.setattr(database, "RESULTS_VERSION", 99)
     said = f"holds results of version {RESULTS_VERSION}, this is version 99"
     with (
         pytest.raises(SpecError, match=said),

@@ -3,7 +3,7 @@ import pytest
 
 from nested_agents.core.interface.scenario import SUCCESS, EpisodeRecorder, Measure, Transition
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies.trials.episodes import EpisodeMeter, EpisodeRow
+from nested_agents.studies.trials.trial import EpisodeMeter, EpisodeRow
 
 
 def transition(reward=0.5, terminated=False, **info):

@@ -4,8 +4,8 @@ import pytest
 
 from nested_agents.core.interface.scenario import SUCCESS, Measure
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.store.schema import columns, measures_from, tables
-from nested_agents.studies.trials.episodes import joined
+from nested_agents.studies.store.database import columns, measures_from, tables
+from nested_agents.studies.trials.trial import joined
 
 ENERGY = Measure("energy_j", "energy", "J", "joules", "sum", "lower")
 

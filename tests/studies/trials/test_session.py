@@ -11,8 +11,7 @@ from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.line_up import LineUp
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
-from nested_agents.studies.trials.session import CURRICULUM_WORLDS, Session, run_trial
+from nested_agents.studies.trials.session import CURRICULUM_WORLDS, Session, check, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SHORT = {

@@ -12,10 +12,9 @@ from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.schema import RESULTS_VERSION
+from nested_agents.studies.store.database import RESULTS_VERSION
 from nested_agents.studies.trials import trial as trial_module
-from nested_agents.studies.trials.arrangement import check
-from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.session import check, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SHORT = {"seeds": [7], "episodes": 2, "steps": 6, "evaluation": 1}

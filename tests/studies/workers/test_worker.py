@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.workers.worker import MOST_ERROR, attempt
+from nested_agents.studies.workers.runner import MOST_ERROR, attempt
 
 
 class OddError(BaseException):

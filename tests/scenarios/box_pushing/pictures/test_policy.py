@@ -3,7 +3,7 @@ import pytest
 
 from nested_agents.scenarios.box_pushing.pictures.policy import Field
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.trials.arrangement import arrange
+from nested_agents.studies.trials.session import arrange
 
 
 @pytest.mark.parametrize(("slope", "to_the_box"), [(-1.0, True), (1.0, False)])

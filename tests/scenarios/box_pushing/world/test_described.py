@@ -14,8 +14,7 @@ from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, Robo
 from nested_agents.scenarios.checking.checker import check_scenario
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
-from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.session import check, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SPEC = """

@@ -8,7 +8,7 @@ import made_up
 import pytest
 
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.trials import code
+from nested_agents.studies.spec import outline
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers.runner import save
 
@@ -16,10 +16,10 @@ MODULES = {"core/team.py": "N = 3  # agents", "core/loop.py": "def loop(): pass"
 
 
 def test_all_that_computes_is_known_and_pictures_are_not() -> None:
-    known = code.modules()
+    known = outline.modules()
     assert {"core/agents/team.py", "scenarios/box_pushing/states/relational.py"} <= known.keys()
     assert not [name for name in known if "pictures" in name or name.endswith("figure.py")]
-    assert code.changed(code.present()) == []
+    assert outline.changed(outline.present()) == []
 
 
 @pytest.mark.parametrize(
@@ -28,12 +28,12 @@ def test_all_that_computes_is_known_and_pictures_are_not() -> None:
 def test_what_means_the_same_has_not_changed(
     text: str | None, changed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(code, "modules", lambda: MODULES)
-    known = code.present()
+    monkeypatch.setattr(outline, "modules", lambda: MODULES)
+    known = outline.present()
     later = {**MODULES, "core/team.py": text} if text is not None else {"core/loop.py": "pass"}
     later["core/loop.py"] = MODULES["core/loop.py"]
-    monkeypatch.setattr(code, "modules", lambda: later)
-    assert code.changed(known) == ["core/team.py"] * changed
+    monkeypatch.setattr(outline, "modules", lambda: later)
+    assert outline.changed(known) == ["core/team.py"] * changed
 
 
 def test_packages_that_offer_things_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,17 +44,17 @@ def test_packages_that_offer_things_count(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "offering-1.dist-info" / "METADATA").write_text("Name: offering\nVersion: 1\n")
     points = "[nested_agents.topologies]\narms = offering:arms\n[other]\nx = json:loads\n"
     (tmp_path / "offering-1.dist-info" / "entry_points.txt").write_text(points)
-    assert "offering/__init__.py" not in code.modules()
+    assert "offering/__init__.py" not in outline.modules()
     monkeypatch.syspath_prepend(tmp_path)
-    assert "offering/__init__.py" in code.modules()
-    assert not [name for name in code.modules() if name.startswith("json")]
+    assert "offering/__init__.py" in outline.modules()
+    assert not [name for name in outline.modules() if name.startswith("json")]
 
 
 def test_rows_of_two_codes_are_mixed_only_if_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def kept(text: str, number: int, *, accept_code: bool = False) -> None:
-        monkeypatch.setattr(code, "modules", lambda: {"core/team.py": text})
+        monkeypatch.setattr(outline, "modules", lambda: {"core/team.py": text})
         with made_up.opened(tmp_path / "study", accept_code=accept_code) as store:
             for trial in pending(store, made_up.TRIALS)[:number]:
                 save(store, trial, made_up.measure(trial), 0.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nested_agents as na
-from nested_agents.studies.api.planning import learned, try_out
+from nested_agents.studies.api.running import learned, try_out
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.trials.trial import trials_of
 

@@ -1,0 +1,293 @@
+"""Commands that read a study, or several: what it measured, how far it is, what was learned."""
+
+import sys
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+
+from ...errors import SpecError, refused
+from ...spec.outline import StudyOutline
+from ...store import durable
+from ...store.store import Store
+from .. import options
+from ..display import print_study, print_table
+from ..loading import load_results, opened, trust_files
+
+
+@click.command()
+@options.directory
+def status(directory: Path) -> int:
+    """Tell how many trials are done, running, failed (with the reason) and left, and for how long.
+
+    DIR is where the study is kept.
+    """
+    from ..standing import describe, progress, warnings
+
+    with Store.open(directory) as store:
+        now = progress(store)
+        print(*describe(store, now), sep="\n")
+        failed = store.failed()
+    for line in warnings(now):
+        print(line)
+    for condition, seed, error in failed:
+        print(f"\n{condition}, seed {seed} failed:\n{error.rstrip()}")
+    if failed:
+        print(f"\nto run them again: nested-agents retry {directory}")
+    return 1 if failed else 0
+
+
+@click.command()
+@options.sources
+@options.as_study
+@options.where
+@click.option(
+    "--columns",
+    multiple=True,
+    metavar="TITLE...",
+    help="Headings of the columns to print, in this order; by default all.",
+)
+@options.form
+@options.trust
+def table(columns: tuple[str, ...], form: str, **choice: Any) -> int:
+    """Print conditions against estimates with their 95 % intervals, as at the end of a run.
+
+    DIR is where a study is kept; several are analysed together, as the first one says. FILE.json is
+    a file of results that `export --format json` has written.
+    """
+    study = load_results(**choice)
+    if form == "table":
+        print_study(study, columns)
+    else:
+        print(getattr(study.table(columns), form), end="")
+    return 0
+
+
+@click.command()
+@options.sources
+@click.option(
+    "--by",
+    metavar="KEY",
+    help="Compare conditions that differ in this swept key alone, as robots or topology; "
+    "directory compares studies. By default all conditions with the first.",
+)
+@click.option(
+    "--measure",
+    metavar="NAME",
+    default="success",
+    help="A measure of episodes, steps, return, or a number of whole trials.",
+)
+@click.option("--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one.")
+@click.option(
+    "--reference", metavar="LABEL", help="What the others are compared with; by default the first."
+)
+@options.flag(
+    "--statistics",
+    "Add interquartile mean and probability of improvement, over the groups of --by as tasks.",
+)
+@options.plot
+@options.where
+@options.form
+@options.trust
+def compare(
+    sources: tuple[Path, ...],
+    statistics: bool,
+    plot: Path | None,
+    where: str | None,
+    form: str,
+    trust: bool,
+    **compared: Any,
+) -> int:
+    """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
+
+    DIR is where a study is kept, FILE.json a file of results. Conditions are compared on the seeds
+    that both have, on equal worlds.
+    """
+    comparison = load_results(sources, where=where, trust=trust).compare(**compared)
+    if plot is not None:
+        from ...presentation.figures import write
+
+        with refused():
+            write(comparison.figure(), plot)
+    tables = [comparison.table, *([comparison.aggregated] if statistics else [])]
+    if form != "table":
+        print(*(getattr(table, form) for table in tables), sep="\n", end="")
+        return 0
+    print_table(tables[0])
+    print("", *comparison.verdicts, sep="\n")
+    if statistics:
+        print()
+        print_table(tables[1], comparison.statistics.notes)
+    return 0
+
+
+@click.command()
+@options.directory
+@options.formats(
+    "table",
+    "csv",
+    "json",
+    text="How to print the rows; CSV and JSON hold every digit, and a column for every swept key.",
+)
+@click.option(
+    "--phase",
+    metavar="PHASE",
+    default="training",
+    help="The episodes of training, those of the greedy evaluation after it (evaluation), of a "
+    "stage before it (training:NAME) or of another evaluation (evaluation:NAME).",
+)
+def results(directory: Path, form: Literal["table", "csv", "json"], phase: str) -> int:
+    """Print one row per trial and episode, as a table, CSV or JSON.
+
+    DIR is where the study is kept.
+    """
+    from ....core.plugins.settings import closest
+    from ...presentation.tables import write_rows
+    from ...results.results import read
+
+    with opened(directory) as store:
+        store.verify()
+        measured = read(store)
+    if measured.phases and phase not in measured.phases:
+        raise SpecError(f"--phase {phase!r}: {closest(phase, measured.phases)}")
+    episodes = measured.episodes
+    write_rows(episodes[episodes["phase"] == phase], measured.measures, form, sys.stdout)
+    return 0
+
+
+Files = Literal["csv", "json", "marl-eval"]
+
+
+@click.command()
+@options.directory
+@options.formats(
+    "csv",
+    "json",
+    "marl-eval",
+    text="Of the files; distances and returns are left out of json.",
+)
+@options.out("Folder of the files; by default export in the study's own.", "PATH")
+@click.option("--overwrite", is_flag=True, help="Replace files that are there.")
+def export(directory: Path, form: Files, out: Path | None, overwrite: bool) -> int:
+    """Write one file with a row for every episode, and one with a row for every trial.
+
+    DIR is where the study is kept. JSON is one small file of spec, seeds and rounded measures, fit
+    to be published with a paper; `nested-agents table` reads it.
+    """
+    with opened(directory) as store:
+        folder = directory / "export" if out is None else out
+        for path in write_files(store, folder, form, overwrite=overwrite):
+            print(path)
+    return 0
+
+
+def write_files(store: Store, folder: Path, form: Files, *, overwrite: bool = False) -> list[Path]:
+    """Write what a study holds; a file is there whole or not at all.
+
+    Parameters
+    ----------
+    store
+        An open study.
+    folder
+        Where to write ``episodes`` and ``trials``, or with JSON ``results``; made if it does not
+        exist.
+    form
+        Of the files, and their suffix; for JSON and marl-eval, ``marl-eval.json``, see
+        `nested_agents.studies.results.published`.
+    overwrite
+        Whether files of these names may be replaced.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    SpecError
+        If a file is in the way, or the database is damaged.
+    """
+    store.verify()
+    paths = {folder / name: text for name, text in _texts(store, form).items()}
+    there = [path for path in paths if path.exists()]
+    # Of an export that was killed the first file is left, and is what would be written.
+    is_rest = len(there) < len(paths) and all(
+        path.is_file() and path.read_bytes() == paths[path].encode() for path in there
+    )
+    if there and not (overwrite or is_rest):
+        raise SpecError(f"{there[0]}: exists; --overwrite replaces it, --out writes elsewhere")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpecError(f"--out {folder}: {error.strerror or error}") from None
+    for path, text in paths.items():
+        durable.write(path, text.encode())
+    return list(paths)
+
+
+def _texts(store: Store, form: Files) -> dict[str, str]:
+    """Return the content of each file by its name."""
+    from ...catalogue.study import published_part
+    from ...presentation.tables import in_csv
+    from ...results import published
+    from ...results.results import read
+
+    results, outline = read(store), StudyOutline.kept(store)
+    if form == "json":
+        kept = published_part(outline.study, results)
+        return {"results.json": published.dumps(outline, kept)}
+    if form == "marl-eval":
+        kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
+        return {"marl-eval.json": published.dumps_marl_eval(results, kinds, outline.study)}
+    frames = {"episodes.csv": results.episodes, "trials.csv": results.trials}
+    return {name: in_csv(frame) for name, frame in frames.items()}
+
+
+@click.command()
+@options.directory
+@options.out("Where to write; by default report.html in the study's directory.", "FILE.html")
+@options.trust
+def report(directory: Path, out: Path | None, trust: bool) -> int:
+    """Write a study as one self-contained HTML file: verdict, table, figures, replays, spec.
+
+    DIR is where the study is kept; it may be unfinished.
+    """
+    path = load_results([directory], trust=trust).report(out)
+    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, nothing outside it is needed")
+    return 0
+
+
+@click.command()
+@options.directory
+@click.option(
+    "--condition", metavar="LABEL", help="Label of the condition; by default the first one."
+)
+@click.option("--seed", type=int, metavar="SEED", help="The seed; by default the first one.")
+@options.trust
+def explain(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
+    """Explain a trained team: its rules in words, its policy, its self-model.
+
+    DIR is where the study is kept. Text and figures go into its folder explain. Unless the study
+    keeps its teams (keep_teams = true in its spec), training is run again, which takes seconds, and
+    must give the episodes that are kept.
+    """
+    from ...explain import team
+    from ...explain.text import MOST_AGENTS, draw, text
+    from ...presentation.figures import save
+    from ...trials.keeping import finished_trial
+
+    if trust:
+        trust_files(directory)
+    with opened(directory) as store:
+        trial = finished_trial(store, condition, seed)
+        conditions = list(store.columns())
+        explanation = team.explain(store, trial)
+    folder = team.folder_of(directory, trial, conditions)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = folder / "explanation.txt"
+    durable.write(written, text(explanation).encode())
+    figures = save(draw(explanation), folder)
+    print(text(explanation, MOST_AGENTS))
+    for path in (written, *figures):
+        print(path)
+    return 0

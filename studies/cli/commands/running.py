@@ -1,0 +1,152 @@
+"""Commands that run trials: ``demo``, ``run``, ``tune``, ``plan`` and ``retry``."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .. import options
+from ..display import print_table, show_results
+
+
+@click.command()
+@options.out(
+    "Where to keep the study; made if it does not exist. The same command again continues it.",
+    default="nested-agents-demo",
+)
+@options.jobs
+@click.option("--print-spec", is_flag=True, help="Print the spec that would be run, and stop.")
+def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
+    """Train two e-Pucks to push a box: table, figures and replay within minutes."""
+    spec = Path(__file__).parents[2] / "catalogue/learning_curve/demo.toml"
+    text = spec.read_text(encoding="utf-8")
+    if print_spec:
+        print(text, end="")
+        return 0
+    from ...api import study as api
+    from ...presentation.progress import Terminal
+    from ...spec.spec import Spec
+
+    study = api.run(Spec.parse(text), out, jobs=jobs, observer=Terminal())
+    status = show_results(study)
+    for episode in ("first", "last") if not study.failed else ():
+        path = out / "replay" / f"{episode}-episode.gif"
+        path.parent.mkdir(exist_ok=True)
+        print(f"replay  {study.replay(episode=episode, path=path).path}")
+    return status
+
+
+@click.command()
+@click.argument("spec", type=options.PATH, metavar="SPEC.toml")
+@options.out(
+    "Where to keep the study; made if it does not exist. Every trial is kept the moment it "
+    "finishes, so interrupting costs only those that are running.",
+    required=True,
+)
+@options.running
+@options.trust
+@options.figures
+@options.changes
+def run(
+    spec: Path,
+    out: Path,
+    trust: bool,
+    figures: tuple[str, ...],
+    changes: tuple[str, ...],
+    **running: Any,
+) -> int:
+    """Run the study of a spec; the same command again continues it.
+
+    SPEC.toml says what to run; `nested-agents demo --print-spec` prints an example.
+    """
+    from ...api import study as api
+    from ...errors import SpecError
+    from ...presentation.progress import Terminal
+    from ...spec.spec import Spec
+    from ...store.database import DATABASE, SPEC_FILE
+    from ..loading import trust_files
+
+    for directory in {out.resolve(), spec.resolve().parent} if trust else ():
+        if (directory / DATABASE).exists():
+            trust_files(directory)
+    try:
+        given = Spec.load(spec, changes, study=out)
+    except SpecError as error:
+        if not (out / DATABASE).exists() or spec.resolve() != (out / SPEC_FILE).resolve():
+            raise
+        raise SpecError(
+            f"{error}; if you did not edit {spec}, it is damaged: nested-agents retry {out} goes "
+            "on by the database"
+        ) from None
+    return show_results(api.run(given, out, observer=Terminal(), **running), figures)
+
+
+@click.command()
+@click.argument("spec", type=options.PATH, metavar="SPEC.toml")
+@options.out(
+    "Where to keep the study of all configurations, best.toml and configurations.csv.",
+    required=True,
+)
+@options.number("--trials", "N", 20, "Configurations to try, the spec's own among them.")
+@options.number("--seeds", "N", 16, "On which the last ones are compared.")
+@options.number("--first-seed", "N", 10_000, "Of these seeds; at least 10000.")
+@options.number("--draw", "N", 0, "Seed of the draw.")
+@options.running
+@options.changes
+def tune(spec: Path, out: Path, changes: tuple[str, ...], **choice: Any) -> int:
+    """Look for better settings of a spec, on seeds that no report uses; again, it continues.
+
+    SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
+    configurations are tried on two seeds, the better half on four, and so on.
+    """
+    from ...api import tuning
+    from ...spec.spec import Spec
+
+    tuned = tuning.tune(Spec.load(spec, changes, study=out), out, **choice)
+    print_table(tuned.study.table(tuned.columns))
+    print("", *tuned.lines, "", sep="\n")
+    print(f"spec    {out / tuning.BEST_FILE}")
+    print(f"table   {out / tuning.TABLE_FILE}")
+    return 0
+
+
+@click.command()
+@click.argument("spec", type=options.PATH, metavar="SPEC.toml")
+@options.jobs
+@options.number("--deviation", "SD", 0.25, "Supposed standard deviation of differences of seeds.")
+@options.number("--smallest", "D", 0.2, "The smallest difference of success rates of interest.")
+@click.option("--timed/--no-timed", default=True, help="Try episodes of every condition.")
+@options.changes
+def plan(spec: Path, changes: tuple[str, ...], **supposed: Any) -> int:
+    """Tell trials, time, memory and the differences that a study can find, before it is run.
+
+    SPEC.toml says what to run. Episodes of every condition are tried out for a second.
+    """
+    from ...api import running
+    from ...spec.spec import Spec
+
+    print(running.plan(Spec.load(spec, changes), **supposed))
+    return 0
+
+
+@click.command()
+@options.directory
+@options.running
+@options.trust
+def retry(directory: Path, trust: bool, **running: Any) -> int:
+    """Run the failed trials of a study again, and whatever is left of it.
+
+    DIR is where the study is kept.
+    """
+    from ...api import study as api
+    from ...presentation.progress import Terminal
+    from ...store.store import Store
+    from ...trials.keeping import spec_of
+    from ..loading import trust_files
+
+    if trust:
+        trust_files(directory)
+    with Store.open(directory) as store:
+        spec = spec_of(store)
+    study = api.run(spec, directory, retry_failed=True, observer=Terminal(), **running)
+    return show_results(study)
