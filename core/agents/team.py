@@ -19,7 +19,7 @@ from ..interface.spaces import NOT_EXPLORING, Prediction
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics import FloatArray, IntArray, greatest, set_words, words_of
-from .messages import MessageFailure, Messages
+from .failures import MessageFailure, Messages
 
 DECIDED = ("rule", "teammates", "value_of", "unseen", "plan")
 """What of the settings of decisions an evaluator is told."""

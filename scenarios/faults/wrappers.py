@@ -35,8 +35,8 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo.utils import BaseParallelWrapper
 
+from ...core.agents.failures import Names
 from ...core.numerics import BoolArray, FloatArray
-from ...core.plugins.scheduled import Names
 from . import settings
 from .settings import Failures, FailureSettings, befalling
 
