@@ -16,7 +16,7 @@ from ...core.interface.scenario import Measure
 from ...core.numerics import pd, stats
 from ...core.plugins.settings import closest
 from ..errors import SpecError
-from ..spec.labels import aliases, label
+from ..spec.tables import aliases, label
 from .analysis import NOTHING, BySeed, Difference, Summary, differences, identity_lines, verdicts
 from .results import SECONDS, Results, shown
 from .statistics import Array, Estimate, bootstrap, rate, stacked

@@ -12,10 +12,9 @@ from ...core.interface.scenario import Measure
 from ...core.plugins.settings import closest
 from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ..errors import SpecError, show
-from ..spec.labels import aliases
 from ..spec.outline import outdated, present, sources_of
 from ..spec.spec import Spec
-from ..spec.tables import dumps, flat
+from ..spec.tables import aliases, dumps, flat
 from ..store import database
 from ..store.database import DATABASE, SPEC_FILE, Noted
 from ..store.store import Store, locked

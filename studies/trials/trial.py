@@ -19,7 +19,7 @@ from ...core.interface.scenario import Measure, Scenario, Transition
 from ...core.plugins.sources import Sources, named
 from ..errors import SpecError
 from ..spec.conditions import ConditionSettings, Stage
-from ..spec.labels import lengths
+from ..spec.outline import lengths
 from ..store.database import AFTER, BEFORE, RESULTS_VERSION, Planned
 from ..store.durable import Recording
 

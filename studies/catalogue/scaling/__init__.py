@@ -23,8 +23,8 @@ from ....core.numerics import FloatArray, pd
 from ...results.analysis import EVALUATED, Analysis, Figures, Sizes, Summary, evaluated, shared
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
-from ...spec.labels import label_but
 from ...spec.spec import Spec
+from ...spec.tables import label_but
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
