@@ -30,7 +30,7 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
     for title, phase in phases.items() if others else ():
         base = results.means(conditions[0], phase)
         pairs[title] = [(name, title, results.means(c, phase), base) for c, name in others]
-    compared, notes = judged(pairs, names[0])
+    compared, notes = judged(pairs, "".join(names[:1]))
     by_place = {(d.condition, d.measure): d.estimate for ds in compared.values() for d in ds}
     table = []
     for condition, name in zip(conditions, names, strict=True):
