@@ -9,8 +9,8 @@ from decimal import Decimal
 from typing import Literal
 
 from ..core.agents.cost import below_counts
+from ..core.agents.failures import MessageFailure
 from ..core.agents.loop import Agents, joint_blocks
-from ..core.agents.messages import MessageFailure
 from ..core.interface.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, parse
 from .builders import check_legible, names_of

@@ -38,6 +38,8 @@ from .evaluator import (
     combinations,
 )
 
+MOST_AHEAD = 4
+"""Bodies that are valued at a time, if most keep to the plan: more would be valued in vain."""
 CUTS = (0.25, 0.5, 0.75)
 """Where a team is cut in two, as shares of its bodies in the order of decision."""
 
@@ -69,6 +71,17 @@ class _Known(NamedTuple):
         if self.concerned is not concerned:
             return False
         return all(i in self.free for i in np.flatnonzero(self.plan != plan).tolist())
+
+
+class _Ahead(NamedTuple):
+    """What bodies, the next ones too, were found to be worth while a plan stands."""
+
+    concerned: IntArray
+    plan: IntArray
+    begun: int
+    """Which is the first of them, in the order of decision."""
+    worths: dict[tuple[int, ...], FloatArray]
+    """By the free agents of every body, ``(A ** k,)``."""
 
 
 class BestResponse(Aggregation):
@@ -123,9 +136,15 @@ class BestResponse(Aggregation):
         ]
         self._others = [np.setdiff1d(np.arange(n), free) for free in self._free]
         self._starts: dict[tuple[int, ...], IntArray] = {}
+        # The bodies in the order of decision, if what one is worth to one agent is so to all.
+        whole = {*groups}
+        bodies = [own for i in hierarchy.order if (own := self._own[i]) in whole]
+        self._bodies = bodies if problem.value_of == "team" else []
+        self._rank = {agents: k for k, agents in enumerate(self._bodies)}
         self._prediction: Prediction | None = None
         self._plans: dict[int, IntArray] = {}
         self._known: _Known | None = None
+        self._ahead: _Ahead | None = None
         self._alike: list[tuple[IntArray, IntArray]] = []
 
     def values(self, deliberation: Deliberation) -> FloatArray:
@@ -135,7 +154,8 @@ class BestResponse(Aggregation):
             return np.zeros(self.n_actions)
         first = agent == self.hierarchy.order[0]
         if first or deliberation.prediction is not self._prediction:
-            self._prediction, self._plans, self._known = deliberation.prediction, {}, None
+            self._prediction, self._plans = deliberation.prediction, {}
+            self._known = self._ahead = None
             self._alike = self._compared(deliberation.prediction)
         plan, free = self._plan(deliberation), self._own[agent]
         known, concerned = self._known, self.concerned[agent]
@@ -197,19 +217,62 @@ class BestResponse(Aggregation):
         If that of the plan is known, the `value`, it is not predicted again, nor are actions that
         come to the same.
         """
-        body, tried = self._group_of[free[0]], self._actions[len(free)]
         shape = (self.n_actions,) * len(free)
         if value is None:
-            return self.predicted_worth(deliberation, _with(plan, free, tried)).reshape(shape)
-        is_whole, every = free == self.problem.groups[body], self._numbers[: len(tried)]
-        alike, distinct = self._alike[body] if is_whole else (every, every)
-        planned, worths = alike[self._index(plan, free)], np.empty(len(tried))
-        predicted = distinct[distinct != planned]
-        worths[planned] = value
-        if len(predicted):
-            varied = _with(plan, free, tried[predicted])
-            worths[predicted] = self.predicted_worth(deliberation, varied)
-        return worths[alike].reshape(shape)
+            tried = _with(plan, [(free, self._actions[len(free)])])
+            return self.predicted_worth(deliberation, tried).reshape(shape)
+        concerned, ahead = self.concerned[deliberation.agent], self._ahead
+        if ahead is None or not self._stands(ahead, concerned, plan, free):
+            ahead = self._ahead = self._valued_ahead(deliberation, plan, free, value)
+        return ahead.worths[free].reshape(shape)
+
+    def _stands(
+        self, ahead: _Ahead, concerned: IntArray, plan: IntArray, free: tuple[int, ...]
+    ) -> bool:
+        """Return whether it has what a body is worth to those, by a plan that comes to the same."""
+        if free not in ahead.worths or ahead.concerned is not concerned:
+            return False
+        changed = {self._group_of[i] for i in np.flatnonzero(plan != ahead.plan).tolist()}
+        groups = [(self._alike[body][0], self.problem.groups[body]) for body in changed]
+        return all(
+            alike[self._index(plan, group)] == alike[self._index(ahead.plan, group)]
+            for alike, group in groups
+        )
+
+    def _valued_ahead(
+        self, deliberation: Deliberation, plan: IntArray, free: tuple[int, ...], value: float
+    ) -> _Ahead:
+        """Return what the free agents of a body, and of bodies after it, are worth.
+
+        Of these the more, the more bodies in a row have kept to the plan.
+        """
+        begun, last, depth = self._rank.get(free, -1), self._ahead, 1
+        if last is not None and begun == last.begun + len(last.worths):
+            depth = min(2 * len(last.worths), MOST_AHEAD)
+        bodies = [free] if begun < 0 else self._bodies[begun : begun + depth]
+        parts, changes = [], []
+        for agents in bodies:
+            alike, distinct = self._told_apart(agents)
+            planned = alike[self._index(plan, agents)]
+            predicted = distinct[distinct != planned]
+            parts.append((agents, alike, planned, predicted))
+            changes.append((agents, self._actions[len(agents)][predicted]))
+        worths: dict[tuple[int, ...], FloatArray] = {}
+        varied, at = _with(plan, changes), 0
+        found = self.predicted_worth(deliberation, varied) if len(varied) else np.empty(0)
+        for agents, alike, planned, predicted in parts:
+            each = np.empty(len(alike))
+            each[planned], each[predicted] = value, found[at : at + len(predicted)]
+            worths[agents], at = each[alike], at + len(predicted)
+        return _Ahead(self.concerned[deliberation.agent], plan.copy(), begun, worths)
+
+    def _told_apart(self, agents: tuple[int, ...]) -> tuple[IntArray, IntArray]:
+        """Return what each action of a body's agents comes to the same as, and the distinct ones.
+
+        Told apart in agent order, even where the agents of a body decide in another.
+        """
+        body, every = self._group_of[agents[0]], self._numbers[: len(self._actions[len(agents)])]
+        return self._alike[body] if agents == self.problem.groups[body] else (every, every)
 
     def _planned(self, deliberation: Deliberation) -> IntArray:
         """Return a plan ``(n,)`` for the agent and those that it plans for."""
@@ -222,11 +285,9 @@ class BestResponse(Aggregation):
         for i in free:
             bodies.setdefault(self._group_of[i], []).append(i)
         plan, value = self._started(deliberation, free), None
-        for body, members in self._sweeps * list(bodies.items()):
+        for members in self._sweeps * list(bodies.values()):
             worths = self._valued(deliberation, plan, tuple(members), value).ravel()
-            # Told apart in agent order, even where the agents of a body decide in another.
-            whole = len(members) == len(self.problem.groups[body])
-            distinct = self._alike[body][1] if whole else self._numbers[: len(worths)]
+            distinct = self._told_apart(tuple(sorted(members)))[1]
             self.count(agent, len(distinct))
             best = distinct[greatest(worths[distinct], rng)]
             plan[members], value = self._actions[len(members)][best], worths[best]
@@ -237,7 +298,7 @@ class BestResponse(Aggregation):
         if free not in self._starts:
             bodies = list(dict.fromkeys(self._group_of[i] for i in free))
             self._starts[free] = self._starting(free, bodies)
-        tried = _with(deliberation.joint_action, free, self._starts[free])
+        tried = _with(deliberation.joint_action, [(free, self._starts[free])])
         plan: IntArray = tried[greatest(self.worth(deliberation, tried), deliberation.rng)]
         return plan
 
@@ -297,9 +358,12 @@ def _in_order(hierarchy: Hierarchy, agents: set[int]) -> tuple[int, ...]:
     return tuple(i for i in hierarchy.order if i in agents)
 
 
-def _with(joint_action: IntArray, agents: tuple[int, ...], actions: IntArray) -> IntArray:
-    """Return the joint action ``(n,)`` with the `actions` ``(m, k)`` of k agents: ``(m, n)``."""
-    joint = np.empty((len(actions), len(joint_action)), dtype=np.int64)
+def _with(joint_action: IntArray, changes: list[tuple[tuple[int, ...], IntArray]]) -> IntArray:
+    """Return the joint action ``(n,)`` with some agents' actions ``(m, k)``, set by set of them."""
+    rows = sum(len(actions) for _, actions in changes)
+    joint, at = np.empty((rows, len(joint_action)), dtype=np.int64), 0
     joint[:] = joint_action
-    joint[:, agents] = actions
+    for agents, actions in changes:
+        joint[at : at + len(actions), agents] = actions
+        at += len(actions)
     return joint

@@ -286,8 +286,9 @@ class Aggregation:
         if self.problem.rule != "value":
             return False
         if len(self.concerned[deliberation.agent]) > 1:
-            return not self._pooled(deliberation).weights[0].any()
-        weights = deliberation.own_weights
+            weights = self._pooled(deliberation).weights[0].ravel()
+        else:
+            weights = deliberation.own_weights
         return not (weights[:64].any() or weights.any())
 
     def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:

@@ -25,8 +25,8 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field, create_model
 
+from ...core.agents.failures import Scheduled
 from ...core.numerics import BoolArray, FloatArray, stream_of
-from ...core.plugins.scheduled import Scheduled
 
 
 class FailureSettings(Scheduled):

@@ -16,12 +16,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit
-from ..world.geometry import LANES, nearest_points
+from ..world.geometry import LANES, nearest_points, surface
 from . import push_lanes as lanes
 from .push_lanes import BODY_SIZE, BOX_SIZE, MARGIN
 
 SUBSTEPS = 4
 SWEEPS = 4
+ROUNDED = 1e-9
+"""What rounding may make of a gap, or a way [m]."""
 
 
 class PushModel(NamedTuple):
@@ -89,35 +91,46 @@ def pushed(robots, box, twists, choices, seconds, model):  # type: ignore[no-unt
     m, n = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     dt = seconds / SUBSTEPS
-    reach = np.empty(n)  # how far from the centre of the box a robot may be and still touch it
+    # How far robots may move in a substep, and what is left of their gaps before they may touch.
+    way, spare = np.empty(n), np.empty(n)
+    cos, sin = np.cos(box[2]), np.sin(box[2])
     for r in range(n):
-        fastest = 0.0
+        way[r] = 0.0
         for k in range(twists.shape[1]):
-            fastest = max(fastest, np.hypot(twists[r, k, 0], twists[r, k, 1]))
-        reach[r] = model.reach + model.radii[r] + 2.0 * dt * fastest + MARGIN
+            half = 0.5 * dt * twists[r, k, 2]
+            longer = np.sqrt(1.0 + 0.25 * half**4)  # as chords are drawn, see `lanes.move`
+            way[r] = max(way[r], longer * dt * np.hypot(twists[r, k, 0], twists[r, k, 1]))
+        dx, dy = robots[r, 0] - box[0], robots[r, 1] - box[1]
+        apart = surface(model.edges, model.rounding, cos * dx + sin * dy, cos * dy - sin * dx)[0]
+        spare[r] = apart - model.radii[r] - 2.0 * way[r] - MARGIN - ROUNDED
     bodies, shared = np.zeros((n, BODY_SIZE)), np.zeros(BOX_SIZE)
     near = np.zeros(n, np.bool_)
     for first in range(0, m, LANES):
         used = min(LANES, m - first)
         # Whole vectors are faster than their ends: lanes beyond repeat the last one.
         width = (used + 7) // 8 * 8
-        for k in range(width):
-            c = first + min(k, used - 1)
-            for j in range(3):
+        for j in range(3):
+            for k in range(width):
                 shared[j * LANES + k] = box[j]
-                for r in range(n):
+        for r in range(n):
+            for k in range(width):
+                choice = choices[first + min(k, used - 1), r]
+                for j in range(3):
                     bodies[r, j * LANES + k] = robots[r, j]
-                    bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, choices[c, r], j]
-        for _ in range(SUBSTEPS):
-            _substep(bodies, shared, near, reach, dt, model, width)
+                    bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, choice, j]
+        moved = 0.0
+        for substep in range(SUBSTEPS):
+            moved = _substep(bodies, shared, near, substep, way, spare, moved, dt, model, width)
         lanes.head(shared, width)
         for r in range(n):
-            lanes.localise(bodies[r], shared, reach[r], width)
+            lanes.move(bodies[r], model.radii[r], model.compliance[r], dt, width)
+            lanes.localise(bodies[r], shared, width)
             nearest_points(model.edges, shared[lanes.NEAREST :], width)
             for k in range(used):
                 gap = np.sqrt(shared[lanes.SQUARE + k]) * shared[lanes.SIDE + k]
                 out_gaps[r, first + k] = gap - model.rounding - model.radii[r]
-                for j in range(3):
+            for j in range(3):
+                for k in range(used):
                     out_robots[r, j, first + k] = bodies[r, j * LANES + k]
         for j in range(3):
             for k in range(used):  # slices that are assigned take seconds to compile
@@ -126,20 +139,26 @@ def pushed(robots, box, twists, choices, seconds, model):  # type: ignore[no-unt
 
 
 @njit(cache=True)
-def _substep(bodies, box, near, reach, dt, model, width) -> None:  # type: ignore[no-untyped-def]
-    """Find the contacts of all robots, their forces, and move everything for `dt` seconds."""
+def _substep(bodies, box, near, substep, way, spare, moved, dt, model, width):  # type: ignore[no-untyped-def]
+    """Find the contacts of all robots, their forces, and move the box for `dt` seconds.
+
+    The robots are moved when they are next looked at, which saves to go through them once more.
+    Taken and returned is by how much the surface of the box may have `moved` in all.
+    """
     rho2 = model.friction_radius**2
     lanes.head(box, width)
     lanes.rest(box, model.friction_force, width)
     touching = False
     for r in range(len(bodies)):
-        body = bodies[r]
+        body, radius, compliance = bodies[r], model.radii[r], model.compliance[r]
+        if substep > 0:
+            lanes.move(body, radius, compliance, dt, width)
         lanes.head(body, width)
         lanes.release(body, width)
         near[r] = False
-        if lanes.localise(body, box, reach[r], width) > 0:
+        if spare[r] <= substep * way[r] + moved:
+            lanes.localise(body, box, width)
             nearest_points(model.edges, box[lanes.NEAREST :], width)
-            radius, compliance = model.radii[r], model.compliance[r]
             near[r] = lanes.touch(body, box, radius, model.rounding, compliance, dt, width) > 0
             touching = touching or near[r]
     if touching:
@@ -148,6 +167,4 @@ def _substep(bodies, box, near, reach, dt, model, width) -> None:  # type: ignor
                 if near[r]:
                     lanes.answer(bodies[r], box, rho2, model.contact_friction, width)
             lanes.drag(box, rho2, model.friction_force, width)
-    for r in range(len(bodies)):
-        lanes.move(bodies[r], model.radii[r], model.compliance[r], dt, width)
-    lanes.carry(box, dt, width)
+    return moved + lanes.carry(box, model.reach, dt, width)

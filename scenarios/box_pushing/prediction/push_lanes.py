@@ -84,16 +84,13 @@ def head(rows, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def localise(body, box, reach, lanes):  # type: ignore[no-untyped-def]
-    """Write where the robot is in the frame of the box; return in how many lanes within reach."""
-    within, square = 0, reach * reach
+def localise(body, box, lanes):  # type: ignore[no-untyped-def]
+    """Write where the robot is in the frame of the box."""
     for k in range(lanes):
         dx, dy = body[X + k] - box[X + k], body[Y + k] - box[Y + k]
         cos, sin = box[COS + k], box[SIN + k]
         box[LOCAL_X + k] = cos * dx + sin * dy
         box[LOCAL_Y + k] = cos * dy - sin * dx
-        within += 1 if dx * dx + dy * dy <= square else 0
-    return within
 
 
 @njit(cache=True, fastmath=_EXACT)
@@ -236,9 +233,13 @@ def move(body, radius, compliance, dt, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def carry(box, dt, lanes):  # type: ignore[no-untyped-def]
-    """Move the box for one substep."""
+def carry(box, reach, dt, lanes):  # type: ignore[no-untyped-def]
+    """Move the box for one substep; return how far at most what lies within its reach moves."""
+    farthest = 0.0
     for k in range(lanes):
-        box[X + k] += box[U_X + k] * dt
-        box[Y + k] += box[U_Y + k] * dt
-        box[PSI + k] += box[U_W + k] * dt
+        ux, uy, uw = box[U_X + k], box[U_Y + k], box[U_W + k]
+        box[X + k] += ux * dt
+        box[Y + k] += uy * dt
+        box[PSI + k] += uw * dt
+        farthest = max(farthest, (np.sqrt(ux * ux + uy * uy) + reach * abs(uw)) * dt)
+    return farthest

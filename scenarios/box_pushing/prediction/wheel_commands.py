@@ -178,7 +178,8 @@ def speeds_of(choices: IntArray, speeds: FloatArray) -> FloatArray:
     wheels = speeds.shape[2]
     wheel_speeds = np.empty((n * wheels, m))
     for r in range(n):
-        for j in range(wheels):
-            for c in range(m):
-                wheel_speeds[r * wheels + j, c] = speeds[r, choices[c, r], j]
+        for c in range(m):
+            choice = choices[c, r]
+            for j in range(wheels):
+                wheel_speeds[r * wheels + j, c] = speeds[r, choice, j]
     return wheel_speeds

@@ -368,7 +368,9 @@ class World:
     @property
     def twists(self) -> FloatArray:
         """Velocities (vx, vy, omega) of the box and the robots ``(M + 1, 3)``, world frame."""
-        return np.array([_twist(handles) for handles in self._handles])
+        return np.array(
+            [(get_x(v) / UNIT, get_y(v) / UNIT, get_omega(body)) for body, _, v in self._handles]
+        )
 
     def infrared(self) -> FloatArray:
         """Return what the infrared sensors would read ``(2, M, S)``, free of noise.
@@ -436,11 +438,6 @@ class World:
 def _handles(body: Any) -> tuple[Any, Any, Any]:
     """Return the handles of a body, its position and its velocity; all show the present."""
     return body.this, body.position.this, body.linearVelocity.this
-
-
-def _twist(handles: tuple[Any, Any, Any]) -> tuple[float, float, float]:
-    body, _, velocity = handles
-    return get_x(velocity) / UNIT, get_y(velocity) / UNIT, get_omega(body)
 
 
 class WheelFailures(Failures):

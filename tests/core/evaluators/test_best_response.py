@@ -5,6 +5,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
+from nested_agents.core.evaluators import best_response
 from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
 from nested_agents.core.evaluators.evaluator import (
     AutoSettings,
@@ -196,7 +197,14 @@ class InStep:
 
 
 def decided(
-    hierarchy, first, plan="private", unseen="maintain", seed=0, prediction=None, sweeps=1
+    hierarchy,
+    first,
+    plan="private",
+    unseen="maintain",
+    seed=0,
+    prediction=None,
+    sweeps=1,
+    value_of="own",
 ) -> list[np.ndarray]:
     """What all value their actions at, after the first agent does `first` whatever it values."""
     n = len(hierarchy)
@@ -204,8 +212,8 @@ def decided(
         StateSpace("none", (Variable("x", "1", -1.0, 1.0),), 1), RuleBaseSettings()
     )
     problem = DecisionProblem(
-        rules, hierarchy, A, tuple((i,) for i in range(n)), "reward", "best-response", 0.9, "own",
-        unseen, plan, hierarchy.told == "ancestors",
+        rules, hierarchy, A, tuple((i,) for i in range(n)), "reward", "best-response", 0.9,
+        value_of, unseen, plan, hierarchy.told == "ancestors",
     )  # fmt: skip
     search = BestResponseSettings(sweeps=sweeps).build(problem)
     rng = np.random.default_rng(seed)
@@ -252,6 +260,21 @@ def test_every_sweep_goes_over_all_bodies(sweeps: int, tried: int) -> None:
     prediction = Noted()
     decided(Hierarchy(NAMES, PAIRS), 0, prediction=prediction, sweeps=sweeps)
     assert sum(prediction.tried) == tried
+
+
+@pytest.mark.parametrize("sweeps", [1, 2])
+def test_bodies_valued_ahead_decide_as_one_by_one(monkeypatch, sweeps: int) -> None:
+    """The first departs from the plan, so that what was valued ahead is valued anew."""
+    runs, calls = [], []
+    for most in (1, 4):
+        monkeypatch.setattr(best_response, "MOST_AHEAD", most)
+        noted = Noted()
+        runs.append(
+            decided(Hierarchy(NAMES, PAIRS), 2, prediction=noted, sweeps=sweeps, value_of="team")
+        )
+        calls.append(len(noted.tried))
+    np.testing.assert_array_equal(*runs)
+    assert calls[1] < calls[0]
 
 
 NAMES = tuple("abcdef")
