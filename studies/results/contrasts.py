@@ -194,7 +194,9 @@ def _level(key: str, value: object) -> str:
     return value if isinstance(value, str) else f"{key.rpartition('.')[2]}={label({key: value})}"
 
 
-def _led(members: _Members, reference: str | None, known: Mapping[str, Collection[str]]) -> _Members:
+def _led(
+    members: _Members, reference: str | None, known: Mapping[str, Collection[str]]
+) -> _Members:
     """Return the members of a group, the reference first, by a name or another `known` one."""
     if reference is None:
         return members
