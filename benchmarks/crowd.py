@@ -18,7 +18,7 @@ from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot
-from nested_agents.studies.trials.trial import Stopwatch
+from nested_agents.studies.trials.session import Stopwatch
 
 
 def main() -> None:

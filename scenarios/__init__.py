@@ -18,7 +18,7 @@ SCENARIOS = SettingsRegistry(
     "scenario",
     {
         "box-pushing": f"{__name__}.box_pushing.config:BoxPushingSettings",
-        "pushing-points": f"{__name__}.box_pushing.options.config:PushingPointsSettings",
+        "pushing-points": f"{__name__}.box_pushing.config:PushingPointsSettings",
         "matrix-game": f"{__name__}.matrix_games.scenario:MatrixGameSettings",
         "team-game": f"{__name__}.matrix_games.scenario:TeamGameSettings",
         "kinematic-chain": f"{__name__}.kinematic_chain.config:KinematicChainSettings",

@@ -23,7 +23,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import model_validator
 
-from ..core.agents.messages import AbsentAgents, AnyMessageFailure
+from ..core.agents.failures import AbsentAgents, AnyMessageFailure
 from ..core.coordination.graphs import Shape, oriented
 from ..core.interface.hierarchy import Considers, Hierarchy, Told
 from ..core.numerics import nx

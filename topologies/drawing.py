@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 from ..core.interface.hierarchy import Hierarchy
 from ..core.numerics import FloatArray, nx
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Indices = Sequence[int]
 COLUMNS = 6
@@ -62,9 +63,6 @@ def draw(
     """
     if Path(path).suffix not in (".svg", ".png", ".pdf"):
         raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
-    import matplotlib
-    from matplotlib.figure import Figure
-
     places = positions(hierarchy)
     low, high = places.min(axis=0), places.max(axis=0)
     width, height = high - low + (WIDTH + 0.6, HEIGHT + 1.1)
@@ -130,8 +128,6 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
 def _arrows(
     axes: Axes, hierarchy: Hierarchy, places: FloatArray, implied: set[tuple[int, int]]
 ) -> None:
-    from matplotlib.patches import FancyArrowPatch
-
     for a, b in hierarchy.neighbours:
         axes.plot(*places[[a, b]].T, color="#444444", linewidth=0.8, zorder=1)
     for edge in hierarchy.edges:
@@ -173,8 +169,6 @@ def _agents(
     bodies: Sequence[Indices],
     failing: Indices,
 ) -> None:
-    from matplotlib.patches import FancyBboxPatch
-
     body_of = {i: number for number, members in enumerate(bodies) for i in members}
     for rank, i in enumerate(hierarchy.order, 1):
         (x, y), name = places[i], hierarchy.agents[i]

@@ -9,8 +9,8 @@ from decimal import Decimal
 from typing import Literal
 
 from ..core.agents.cost import below_counts
+from ..core.agents.failures import MessageFailure
 from ..core.agents.loop import Agents, joint_blocks
-from ..core.agents.messages import MessageFailure
 from ..core.interface.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, parse
 from .builders import check_legible, names_of
@@ -186,17 +186,11 @@ def printed(shown: HierarchyView, form: Form) -> str:
         subordinates = ", ".join(under[i]) or "-"
         tried = readable(shown.tries[i])
         rows.append((str(rank + 1), names[i], str(len(below[i])), tried, subordinates))
-    return "\n".join(
-        [
-            shown.title,
-            *shown.remarks,
-            "",
-            *aligned(rows, "><>><"),
-            "",
-            "In order of decision. below: agents whose actions it tries; tries: joint",
-            "actions tried a step.",
-        ]
-    )
+    legend = [
+        "In order of decision. below: agents whose actions it tries; tries: joint",
+        "actions tried a step.",
+    ]
+    return "\n".join([shown.title, *shown.remarks, "", *aligned(rows, "><>><"), "", *legend])
 
 
 def aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:

@@ -23,11 +23,11 @@ Everything else of this package, hierarchies too, works on it unchanged.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -41,7 +41,7 @@ from ..interface.scenario import (
     measures_of,
     roles_of,
 )
-from ..interface.spaces import ActionSet, Blocks, Prediction, StateSpace, Variable
+from ..interface.spaces import ActionSet, Blocks, Prediction, StateSpace
 from ..numerics import FloatArray, IntArray
 
 
@@ -265,7 +265,11 @@ class JointAgents:
             of_block = [agent.rpartition(".")[2] for agent in of_block]
             roles = roles_of(scenario)
             self.roles = tuple("+".join(roles[i] for i in block) for block in self.blocks)
-        own = _named(of_block, space.variables[: self._n_each])
+        own = [
+            replace(v, name=f"{agent}.{v.name}")
+            for agent in of_block
+            for v in space.variables[: self._n_each]
+        ]
         self.state_space = StateSpace(
             f"joint {space.name}" if self.whole else f"bodies' {space.name}",
             (*own, *space.variables[self._n_each :]),
@@ -284,7 +288,7 @@ class JointAgents:
             for name in OF_BODIES:
                 if hasattr(scenario, name):
                     setattr(self, name, getattr(scenario, name))
-            self.predict_with = self._predict_with
+            self.predict_with = self._predict
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode; return the states of those who act."""
@@ -298,13 +302,11 @@ class JointAgents:
             reward = np.array([np.take(reward, block).mean() for block in self.blocks])
         return replace(transition, states=self._states(transition.states), reward=reward)
 
-    def _predict(self) -> JointPrediction:
-        """Predict from the present state."""
-        return JointPrediction(cast(Any, self.scenario).predict(), self)
-
-    def _predict_with(self, *beliefs: Any) -> JointPrediction:
-        """Predict from the present state, believing in effects, and in constants if given."""
-        return JointPrediction(cast(Any, self.scenario).predict_with(*beliefs), self)
+    def _predict(self, *beliefs: Any) -> JointPrediction:
+        """Predict from the present state, believing in effects and constants if they are given."""
+        scenario: Any = self.scenario
+        known = scenario.predict_with(*beliefs) if beliefs else scenario.predict()
+        return JointPrediction(known, self)
 
     def actions(self, joint_actions: IntArray) -> IntArray:
         """Return the actions ``(..., n)`` of all agents for those of who acts for them."""
@@ -381,7 +383,3 @@ def _body_blocks(prediction: Any, joint: JointAgents, agent: int) -> Blocks:
     blocks = [prediction.blocks(i) for i in joint.blocks[agent]]
     own = [b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks]
     return replace(blocks[0], own=np.concatenate(own, axis=1), own_rows=np.zeros(0, dtype=np.int64))
-
-
-def _named(agents: Iterable[str], variables: Sequence[Variable]) -> tuple[Variable, ...]:
-    return tuple(replace(v, name=f"{agent}.{v.name}") for agent in agents for v in variables)

@@ -19,7 +19,7 @@ from ..interface.spaces import NOT_EXPLORING, Prediction
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics import FloatArray, IntArray, greatest, set_words, words_of
-from .messages import MessageFailure, Messages
+from .failures import MessageFailure, Messages
 
 DECIDED = ("rule", "teammates", "value_of", "unseen", "plan")
 """What of the settings of decisions an evaluator is told."""
@@ -196,7 +196,10 @@ class Team:
         is, apart from the random numbers that break ties.
         """
         n = len(self.hierarchy)
-        self._left = self._with_told()
+        self._left = self._states
+        if self._n_told:  # a column for each action told, as yet that of nobody
+            nobody = np.full((n, self._n_told), float(len(self.action_set)))
+            self._left = np.hstack([self._states, nobody])
         if self.evaluator is None:
             self._last = self.rng.integers(len(self.action_set), size=n)
             return self._last
@@ -270,13 +273,6 @@ class Team:
         known = self._last.copy() if self._unseen == "last" else np.full_like(joint_action, neutral)
         known[senders] = actions
         return senders, known
-
-    def _with_told(self) -> FloatArray:
-        """Return the present states with a column for each action told, as yet that of nobody."""
-        if not self._n_told:
-            return self._states
-        nobody = np.full((len(self._states), self._n_told), float(len(self.action_set)))
-        return np.hstack([self._states, nobody])
 
     def _given_by(self, agent: int) -> FloatArray:
         """Return how often all took each action ``(A, n, A)`` given each action of an agent."""

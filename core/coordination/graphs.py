@@ -210,14 +210,15 @@ class MaxPlus:
         count, k = members.shape
         full = np.zeros((count, *[a] * k))
         for place, table in zip(self._place, tables, strict=True):
-            full[place] += self._filled(table)
+            # The same along the axes of agents that are not there.
+            full[place] += table[(..., *[None] * (k - table.ndim))]
         to_agents = np.zeros((count, k, a))  # messages of tables
         best, greatest = np.zeros(self.n, dtype=np.int64), -np.inf
         for _ in range(self.rounds):
             sums = np.zeros((self.n + 1, a))
             np.add.at(sums, members, to_agents)
             joint = np.append(sums[:-1].argmax(axis=1), 0)
-            worth = self._worth(full, joint)
+            worth = float(full[(np.arange(count), *joint[members].T)].sum())
             if worth > greatest:
                 best, greatest = joint[:-1].copy(), worth
             to_tables = sums[members] - to_agents  # what agents heard of other tables
@@ -228,12 +229,6 @@ class MaxPlus:
             if change < 1e-9:
                 break
         return self._improved(full, best)
-
-    def _filled(self, table: FloatArray) -> FloatArray:
-        """Return a table over all axes, the same along those of agents that are not there."""
-        missing = self._members.shape[1] - table.ndim
-        shape = (self.n_actions,) * self._members.shape[1]
-        return np.broadcast_to(table[(..., *[None] * missing)], shape)
 
     def _messages(self, full: FloatArray, to_tables: FloatArray) -> FloatArray:
         """Return what tables tell their agents ``(tables, k, A)``, with the mean taken away."""
@@ -246,10 +241,6 @@ class MaxPlus:
             others = tuple(1 + q for q in range(k) if q != p)
             new[:, p] = total.max(axis=others) - to_tables[:, p]
         return new - new.mean(axis=2, keepdims=True)
-
-    def _worth(self, full: FloatArray, joint: IntArray) -> float:
-        """Return the sum of the tables at a joint action ``(n + 1,)``."""
-        return float(full[(np.arange(len(full)), *joint[self._members].T)].sum())
 
     def _improved(self, full: FloatArray, best: IntArray) -> IntArray:
         """Return a joint action that no agent can improve alone."""

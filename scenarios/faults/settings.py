@@ -25,8 +25,8 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field, create_model
 
+from ...core.agents.failures import Scheduled
 from ...core.numerics import BoolArray, FloatArray, stream_of
-from ...core.plugins.scheduled import Scheduled
 
 
 class FailureSettings(Scheduled):
@@ -90,7 +90,7 @@ class Stuck(FailureSettings):
 
 
 class Delayed(FailureSettings):
-    """It carries out its commands too late; `schedule.Failures` remembers them."""
+    """It carries out its commands too late; `Failures` remembers them."""
 
     periods: Annotated[int, Field(ge=1, le=1000)] = 8
     """Control periods by which commands are late."""

@@ -35,8 +35,8 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo.utils import BaseParallelWrapper
 
+from ...core.agents.failures import Names
 from ...core.numerics import BoolArray, FloatArray
-from ...core.plugins.scheduled import Names
 from . import settings
 from .settings import Failures, FailureSettings, befalling
 
@@ -283,7 +283,32 @@ class Carried:
         }
 
 
-class FaultyEnv(gymnasium.Wrapper):
+class _Faulty:
+    """A schedule of faults over an environment; inherited beside a library's wrapper."""
+
+    _by_prefix: Callable[[Any, Any], Any]
+    """Returns action spaces of an environment and actions at rest, as `Carried` takes them."""
+
+    def __init__(
+        self,
+        env: Any,
+        faults: Sequence[ActuatorFault],
+        *,
+        seed: int = 0,
+        commands: Commands = "effort",
+        rest: Any = None,
+        mechanism: Mechanism | None = None,
+        inform: bool = False,
+    ) -> None:
+        super().__init__(env)  # type: ignore[call-arg]  # of the wrapper
+        spaces, rests = self._by_prefix(env, rest)
+        self._carrier = Carried(spaces, faults, seed, commands, rests, mechanism)
+        self.actuators = self._carrier.names
+        self._inform = inform
+        self.carried: Any = None
+
+
+class FaultyEnv(_Faulty, gymnasium.Wrapper):
     """A Gymnasium environment whose actuators fail as scheduled, without the policy being informed.
 
     Its worlds are those of the environment beneath, seed by seed, whatever fails. Steps and
@@ -300,7 +325,7 @@ class FaultyEnv(gymnasium.Wrapper):
     seed
         Of the noise of faults, beside the seed of the environment.
     commands
-        What actions command; see `nested_agents.scenarios.faults.wrappers`.
+        What actions command; see `Commands`.
     rest
         The action in which actuators rest; None: 0 where they can, else the middle of their range.
     mechanism
@@ -322,23 +347,9 @@ class FaultyEnv(gymnasium.Wrapper):
         If a fault names no actuator or cannot be expressed, or the actions are of another kind.
     """
 
-    def __init__(
-        self,
-        env: gymnasium.Env[Any, Any],
-        faults: Sequence[ActuatorFault],
-        *,
-        seed: int = 0,
-        commands: Commands = "effort",
-        rest: Any = None,
-        mechanism: Mechanism | None = None,
-        inform: bool = False,
-    ) -> None:
-        super().__init__(env)
-        spaces = {"": env.action_space}
-        self._carrier = Carried(spaces, faults, seed, commands, {"": rest}, mechanism)
-        self.actuators = self._carrier.names
-        self._inform = inform
-        self.carried: Any = None
+    @staticmethod
+    def _by_prefix(env: Any, rest: Any) -> Any:
+        return {"": env.action_space}, {"": rest}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -356,7 +367,7 @@ class FaultyEnv(gymnasium.Wrapper):
         return seen, reward, terminated, truncated, info
 
 
-class FaultyParallelEnv(BaseParallelWrapper):
+class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
     """A PettingZoo parallel environment whose actuators fail as scheduled; see `FaultyEnv`.
 
     Parameters
@@ -376,23 +387,9 @@ class FaultyParallelEnv(BaseParallelWrapper):
         The last actions that were done, by agent.
     """
 
-    def __init__(
-        self,
-        env: Any,
-        faults: Sequence[ActuatorFault],
-        *,
-        seed: int = 0,
-        commands: Commands = "effort",
-        rest: Mapping[str, Any] | None = None,
-        mechanism: Mechanism | None = None,
-        inform: bool = False,
-    ) -> None:
-        super().__init__(env)
-        spaces = {agent: env.action_space(agent) for agent in env.possible_agents}
-        self._carrier = Carried(spaces, faults, seed, commands, rest or {}, mechanism)
-        self.actuators = self._carrier.names
-        self._inform = inform
-        self.carried: dict[str, Any] = {}
+    @staticmethod
+    def _by_prefix(env: Any, rest: Any) -> Any:
+        return {agent: env.action_space(agent) for agent in env.possible_agents}, rest or {}
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None

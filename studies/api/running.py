@@ -39,7 +39,7 @@ from ..store.store import Store
 from ..trials.keeping import open_to_run, pending
 from ..trials.session import Session, check, run_trial
 from ..trials.trial import Trial, trials_of
-from ..workers.runner import Backend, Observer, RunTrial, cores, run_trials
+from ..workers.runner import Backend, Observer, cores, run_trials
 from ..workers.workers import check_jobs, start_workers
 
 
@@ -99,6 +99,8 @@ def run_study(
         if retry_failed:
             store.forget_failed()
         left = pending(store, trials)
+        # A user's study is made again in every worker, which knows its file.
+        run_one = measured if is_reference(spec.study) else load_study(spec.study).measure
         for note in filter(None, (title, *store.notes, *spec.warnings())):
             observer.note(note)
         if left:
@@ -106,7 +108,7 @@ def run_study(
         if left and not workers.processes:
             observer.note("there is no worker yet: waiting for one")
         try:
-            with closing(run_trials(left, store, _run_trial(spec), workers)) as outcomes:
+            with closing(run_trials(left, store, run_one, workers)) as outcomes:
                 observer.follow(outcomes, len(trials), len(trials) - len(left))
         except KeyboardInterrupt:
             observer.note(
@@ -130,13 +132,6 @@ def examine(spec: Spec) -> tuple[Measure, ...]:
     with spec.sources.active():
         getattr(load_study(spec.study), "check", lambda spec: None)(spec)
     return measures
-
-
-def _run_trial(spec: Spec) -> RunTrial:
-    """Return what runs a trial of the study."""
-    if is_reference(spec.study):  # made again in every worker, which knows the file
-        return measured
-    return load_study(spec.study).measure
 
 
 SEED = 10_000
@@ -285,7 +280,9 @@ def _taken(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Range, 
     slow += (1 - 1 / processes) * max(each.seconds[1] for each in tried)
     busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
     least, most = FASTER * busy**0.5, SLOWER * busy  # others may stop, or not
-    memory = _resident() + max(each.memory for each in tried)
+    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    peak *= 1 if sys.platform == "darwin" else 1024
+    memory = peak + max(each.memory for each in tried)
     seconds = least * (started + quick), most * (started + loading + slow)
     return (float(seconds[0]), float(seconds[1])), processes * memory
 
@@ -362,9 +359,3 @@ def _seconds(call: Callable[[], object]) -> float:
 
 def _bytes(session: Session) -> float:
     return float(sum(array.nbytes for array in session.team.arrays().values()))
-
-
-def _resident() -> float:
-    """Return the most memory that this process, as large as a worker, has held [bytes]."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return float(peak) * (1 if sys.platform == "darwin" else 1024)

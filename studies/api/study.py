@@ -24,7 +24,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.interface.scenario import SUCCESS, can_draw
+from ...core.interface.scenario import SUCCESS, Actors, Scenario, can_draw
 from ...core.numerics import pd
 from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources
@@ -40,14 +40,12 @@ from ..results.results import Results, chosen, read, together
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store
-from ..workers.runner import Backend
+from ..workers.runner import Backend, Observer
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ...core.interface.scenario import Actors, Scenario
     from ..spec.spec import Spec
-    from ..workers.runner import Observer
 
 
 @dataclass(frozen=True)
@@ -447,7 +445,6 @@ def run(
         If the study cannot be run or continued; one line says why.
     """
     from ..spec.spec import Spec
-    from ..workers.runner import Observer
     from .running import run_study
 
     out = Path(out)

@@ -14,8 +14,8 @@ from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
 from ..presentation.progress import Terminal
 from ..results.results import DONE, read
-from ..spec.labels import label
 from ..spec.spec import Spec, plain
+from ..spec.tables import label
 from ..store.database import EVALUATION
 from ..store.durable import TEAM
 from ..store.store import Store

@@ -22,10 +22,7 @@ def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> Non
     """Print estimates by condition, each over its 95 % interval, and its legend or another one."""
     from rich.console import Console
 
-    from ..presentation.tables import print_rows
-
-    if table.rows:
-        print_rows(table.titles, table.rows, Console())
+    table.print(Console())
     print(*(table.legend if legend is None else legend), sep="\n")
 
 

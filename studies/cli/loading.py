@@ -1,17 +1,23 @@
-"""Results that a command reads: of one study or several, or a part of them."""
+"""Studies that a command opens: their results, how far they are, and whether they are trusted.
+
+What is said of how far a study is, in lines, is what `status` prints and `watch` shows.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 from ...core.plugins.sources import is_trusted
 from ...core.plugins.sources import trust as trust_text
-from ..presentation.progress import say
-from ..spec.outline import other_spec
-from ..store.store import Store
+from ..presentation.progress import count, duration, say
+from ..spec.outline import StudyOutline, other_spec, outdated
+from ..store.store import Store, look
+from ..workers.runner import cores
 
 if TYPE_CHECKING:
     from ..api.study import StudyResults
@@ -51,3 +57,111 @@ def trust_files(directory: Path) -> None:
         if name.endswith(".py") and not is_trusted(text):
             say(f"{name}, which came with {directory}, is trusted from now on")
             trust_text(text)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """The trials of a study, each counted once."""
+
+    total: int
+    """Number of trials."""
+    done: int
+    """Of these, how many have ended well."""
+    failed: int
+    """How many have failed."""
+    left: int
+    """How many neither ended nor run."""
+    running: tuple[tuple[str, int, float], ...]
+    """Condition, seed, and seconds so far of the trials that are running."""
+    processes: int
+    """How many trials run at a time; if none does, the cores of this machine; or none where nothing
+    is left."""
+    seconds: float | None
+    """Estimate of the time left [s]; None if nothing has finished to go by."""
+    damaged: tuple[str, ...]
+    """What has finished but is not as it was written, one line each; counted as left."""
+    refusal: str | None
+    """Why the installed code would not go on with the study, in one line; None if it would."""
+
+
+def progress(store: Store) -> Progress:
+    """Return how far the study of an open store is."""
+    trials, refusal, states = store.planned(), outdated(store), store.states()
+    now = None if refusal is not None else look(store.directory)
+    begun = {} if now is None else now[1]
+    pending = [trial for trial in trials if trial.identity not in states]
+    running = [trial for trial in pending if trial.identity in begun]
+    left = [trial for trial in pending if trial.identity not in begun]
+    failed = [*states.values()].count("failed")
+    finished = len(trials) - len(pending)
+    usual = cores() if left and refusal is None else 0
+    processes = usual if now is None else now[0]
+    seconds = _estimate(
+        store.mean_seconds(),
+        [trial.condition for trial in left],
+        [(trial.condition, begun[trial.identity]) for trial in running],
+        processes,
+    )
+    return Progress(
+        total=len(trials),
+        done=finished - failed,
+        failed=failed,
+        left=len(trials) - finished - len(running),
+        running=tuple((t.condition, t.seed, begun[t.identity]) for t in running),
+        processes=processes,
+        seconds=seconds if refusal is None else None,
+        damaged=tuple(store.notes),
+        refusal=refusal,
+    )
+
+
+def _estimate(
+    means: Mapping[str, float], left: list[str], running: list[tuple[str, float]], processes: int
+) -> float | None:
+    """Return the time left [s], by what the finished trials of each condition took on average.
+
+    Conditions of which none has finished are taken to be like the others on average.
+    """
+    if not (left or running):
+        return 0.0
+    if not means or not processes:
+        return None
+    overall = fmean(means.values())
+    rest = [max(means.get(condition, overall) - spent, 0.0) for condition, spent in running]
+    waiting = sum(means.get(condition, overall) for condition in left)
+    return max((waiting + sum(rest)) / processes, max(rest, default=0.0))
+
+
+def describe(store: Store, now: Progress) -> Iterator[str]:
+    """Yield how many trials are done, running, failed and left, and for how long.
+
+    Parameters
+    ----------
+    store
+        The open store.
+    now
+        How far its study is.
+    """
+    outline = StudyOutline.kept(store)
+    extent = f"{count(len(outline.columns), 'condition')} x {count(len(outline.seeds), 'seed')}"
+    yield f"study    {outline.study}: {extent}"
+    yield f"done     {now.done} of {now.total} trials"
+    yield f"running  {len(now.running)}"
+    for condition, seed, seconds in now.running:
+        yield f"         {condition}, seed {seed}, for {duration(seconds)}"
+    yield f"failed   {now.failed}"
+    yield f"left     {now.left}"
+    if now.seconds:
+        yield f"time     about {duration(now.seconds)} with {count(now.processes, 'process', 'es')}"
+    if (remark := other_spec(store)) is not None:
+        yield f"spec     {remark}"
+    if (versions := store.versions_of_code()) > 1:
+        yield f"code     finished trials are of {versions} versions of the installed code"
+
+
+def warnings(now: Progress) -> Iterator[str]:
+    """Yield, each after an empty line, why nothing can be added to a study, and what is damaged."""
+    if now.refusal:
+        yield f"\nnothing can be added: {now.refusal}"
+    for line in now.damaged:
+        yield f"\n{line}"

@@ -38,11 +38,11 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "explain": ("reading", "Explain a trained team in words and figures."),
     "presets": ("describing", "List the named starting points of a spec, or print one."),
     "keys": ("describing", "List the keys of a spec: type, default, what is allowed, meaning."),
-    "topology": ("topology", "List the topologies, or show one of them."),
+    "topology": ("describing", "List the topologies, or show one of them."),
     "check": ("describing", "Check that scenarios keep their promises."),
     "cost": ("describing", "Print what hierarchies cost, by formula and measured."),
-    "benchmark": ("benchmark", "Enter a learner in the benchmark push-n, and compare entries."),
-    "claims": ("claims", "Print the claims of the paper and the verdict on each."),
+    "benchmark": ("committed", "Enter a learner in the benchmark push-n, and compare entries."),
+    "claims": ("committed", "Print the claims of the paper and the verdict on each."),
 }
 """The module of each command, imported when it is asked for, and what the help says of it."""
 

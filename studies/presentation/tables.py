@@ -148,8 +148,30 @@ class SummaryTable:
     """Its lines. Printed, it is as on a terminal of 80 columns; a notebook shows it as HTML."""
 
     def __str__(self) -> str:
-        table = [text_of(self.titles, self.rows), ""] if self.rows else []
-        return "\n".join([*table, *self.legend])
+        file = io.StringIO()
+        self.print(Console(file=file, width=80, color_system=None))
+        return "\n".join([*map(str.rstrip, file.getvalue().splitlines()), *self.legend])
+
+    def print(self, console: Console) -> None:
+        """Print estimates by condition, each over its 95 % interval.
+
+        Columns that do not fit side by side without breaking a word follow below, as a further
+        table.
+        """
+        for block in _blocks(self.titles, self.rows, console.width) if self.rows else ():
+            table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+            table.add_column("", overflow="fold")
+            for i, width in block.items():
+                heading = escape(self.titles[i])
+                table.add_column(heading, justify="right", overflow="fold", width=width)
+            for condition, seeds, cells in self.rows:
+                shown = (cells[i] for i in block)
+                table.add_row(
+                    f"{escape(condition)}\n[dim]{count(seeds, 'seed')}[/]",
+                    *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in shown),
+                )
+            console.print(table)
+            console.print()
 
     @property
     def legend(self) -> list[str]:
@@ -157,14 +179,10 @@ class SummaryTable:
         if not self.rows:
             return [NOTHING]
         lines = ["Means over seeds, and below them their 95 % intervals."]
-        return lines + [self.remark] * bool(self.remark)
-
-    @property
-    def remark(self) -> str:
-        """What must be said of intervals of few seeds, if there are any; else nothing."""
-        if all(seeds >= FEW for _, seeds, _ in self.rows):
-            return ""
-        return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
+        if any(seeds < FEW for _, seeds, _ in self.rows):
+            few = f"Intervals of fewer than {FEW} seeds"
+            lines.append(f"{few}: Student's (short if skewed), rates Wilson's.")
+        return lines
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
@@ -302,34 +320,6 @@ def ends(estimate: Estimate) -> tuple[float, float, float]:
 
 LABEL = 24
 """What a condition's label may be broken to, if there is no room for all of it [characters]."""
-
-
-def print_rows(titles: Sequence[str], rows: Sequence[Row], console: Console) -> None:
-    """Print estimates by condition, each over its 95 % interval.
-
-    Columns that do not fit side by side without breaking a word follow below, as a further table.
-    """
-    for block in _blocks(titles, rows, console.width):
-        table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
-        table.add_column("", overflow="fold")
-        for i, width in block.items():
-            table.add_column(escape(titles[i]), justify="right", overflow="fold", width=width)
-        for condition, seeds, cells in rows:
-            shown = (cells[i] for i in block)
-            table.add_row(
-                f"{escape(condition)}\n[dim]{count(seeds, 'seed')}[/]",
-                *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in shown),
-            )
-        console.print(table)
-        console.print()
-
-
-def text_of(titles: Sequence[str], rows: Sequence[Row], width: int = 80) -> str:
-    """Return what `print_rows` prints, without colours."""
-    file = io.StringIO()
-    print_rows(titles, rows, Console(file=file, width=width, color_system=None))
-    lines = file.getvalue().splitlines()
-    return "\n".join(line.rstrip() for line in lines).rstrip()
 
 
 def _blocks(titles: Sequence[str], rows: Sequence[Row], width: int) -> list[dict[int, int]]:

@@ -47,6 +47,10 @@ from ..workers.runner import installed
 
 MOST_BYTES = 1_500_000
 """Of all packed episodes together."""
+MOST_LINES = 24
+"""Of what a study says, that are shown unfolded."""
+NOT_SIGNIFICANT = re.compile(r"(?:^  no significant difference: .*\n(?:    .*\n)*)+", re.MULTILINE)
+"""Lines of differences that are not significant, in what a study says."""
 
 
 class Film(NamedTuple):
@@ -223,7 +227,8 @@ def page(directory: Path) -> str:
         compared=", ".join(next(iter(outline.columns.values()))),
         standing=standing(len(trials), counts["done"], counts["failed"]),
         complete=counts["done"] == len(trials),
-        notes=notes,
+        notes="\n".join(notes),
+        brief=brief("\n".join(notes)),
         table=tabulate(analysis.table),
         pictures=pictures(figures),
         replays=packed,
@@ -250,6 +255,18 @@ def _template() -> jinja2.Template:
     )
     environment.filters["count"] = count
     return environment.get_template("page.html.jinja")
+
+
+def brief(notes: str) -> str:
+    """Return what a study says; of more than `MOST_LINES`, how many are not significant."""
+    return (
+        notes
+        if notes.count("\n") < MOST_LINES
+        else NOT_SIGNIFICANT.sub(
+            lambda lines: f"  no significant difference: {lines[0].count('  no ')} conditions\n",
+            notes,
+        )
+    )
 
 
 def _own(name: str) -> Markup:

@@ -337,6 +337,15 @@ def verdicts(
     return lines + power_lines(compared, of_rates=of_rates)
 
 
+def judged(
+    groups: Mapping[str, Iterable[Pair]], less: str
+) -> tuple[dict[str, tuple[Difference, ...]], list[str]]:
+    """Return the `differences` of groups, and their `verdicts`; `less` is what the reference is."""
+    compared = differences(groups)
+    heads = {f"{group}, less that of {less}": own for group, own in compared.items()}
+    return compared, verdicts(heads)
+
+
 def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:
     r"""Return lines that say which conditions are identical, see `Results.identical`.
 

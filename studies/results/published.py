@@ -97,10 +97,10 @@ def loads(text: str) -> Published:
     }
     numbers, usage = (
         {
-            c: {prefix(n): _unpacked(v, is_rate=False) for n, v in named.items()}
+            c: {SECONDS * (n in parts) + n: _unpacked(v, is_rate=False) for n, v in named.items()}
             for c, named in content[key].items()
         }
-        for key, prefix in (("numbers", str), ("usage", _prefixed))
+        for key, parts in (("numbers", ()), ("usage", PARTS))
     )
     columns = content["columns"]
     results = from_arrays(phases, seeds, numbers, usage, columns, measures)
@@ -182,10 +182,6 @@ def _rounded(results: Results, wanted: Callable[[str], bool]) -> dict[str, dict[
         for condition in results.conditions
         if (numbers := {n: v for n, v in results.numbers(condition).items() if wanted(n)})
     }
-
-
-def _prefixed(name: str) -> str:
-    return f"{SECONDS}{name}" if name in PARTS else name
 
 
 STEP, FINAL = "step_", "absolute_metrics"

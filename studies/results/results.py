@@ -22,8 +22,7 @@ from ...core.interface.scenario import SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins import sources
 from ..errors import SpecError
-from ..spec.labels import label
-from ..spec.tables import flat
+from ..spec.tables import flat, label
 from ..store.database import EVALUATION
 from ..store.store import NamesAndRows, Store
 from ..trials.trial import joined as joined_measures

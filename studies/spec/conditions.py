@@ -30,9 +30,8 @@ from ...scenarios import DEFAULT, SCENARIOS
 from ...topologies import build
 from ...topologies.config import Topology, parse
 from ..errors import SpecError, refused, show
-from .labels import label, scalar
 from .presets import PRESETS
-from .tables import TomlTable, explain, nested, overlay
+from .tables import TomlTable, explain, label, nested, overlay, scalar
 
 SECTIONS = ("scenario", "topology", "learner")
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,10 +20,28 @@ from ...core.plugins.sources import Sources, meaning
 from ..errors import SpecError, show
 from ..store.database import DATABASE, SPEC_FILE
 from ..store.store import Store
-from .labels import lengths
 
 if TYPE_CHECKING:
     from .spec import Spec
+
+
+def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
+    """Return in words the episodes of training, stage by stage, that there are.
+
+    Parameters
+    ----------
+    curricula
+        Of every condition, the episodes of its stages.
+    episodes
+        Those after them.
+
+    Examples
+    --------
+    >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
+    ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
+    """
+    sums = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
+    return f"{' or '.join(sums)} episode{'' if list(sums) == ['1'] else 's'}"
 
 
 @dataclass(frozen=True)

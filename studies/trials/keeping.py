@@ -12,10 +12,9 @@ from ...core.interface.scenario import Measure
 from ...core.plugins.settings import closest
 from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ..errors import SpecError, show
-from ..spec.labels import aliases
-from ..spec.outline import outdated, present, sources_of
+from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
-from ..spec.tables import dumps, flat
+from ..spec.tables import aliases, dumps, flat
 from ..store import database
 from ..store.database import DATABASE, SPEC_FILE, Noted
 from ..store.store import Store, locked
@@ -56,26 +55,17 @@ def open_to_run(
         another process is writing to it. Nothing has been changed then.
     """
     noted = noted_of(spec, measures, trials)
-    examine(directory, spec, noted, accept_code=accept_code)  # what is refused leaves nothing
+    _examine(directory, spec, noted, accept_code=accept_code)  # what is refused leaves nothing
     with locked(directory):
         # Again: nobody else writes from here on.
-        damage = examine(directory, spec, noted, accept_code=accept_code)
-        known = None
-        if damage is None and database.holds_tables(directory / DATABASE):
-            with Store.open(directory) as reading:
-                known = reading.code()
-        computed = replace(noted, code=present(known))
-        with Store.create(directory, computed, _files(directory, spec, noted), damage) as store:
+        damage, code = _examine(directory, spec, noted, accept_code=accept_code)
+        computed = replace(noted, code=present(code))
+        copies = spec.sources.texts.items()  # to be read and run again, as is the spec
+        files = {f"{FOLDER}/{kept_name(name)}": text.encode() for name, text in copies}
+        if not is_copy(directory / SPEC_FILE, spec, noted):
+            files[SPEC_FILE] = dumps(spec.table()).encode()
+        with Store.create(directory, computed, files, damage) as store:
             yield store
-
-
-def _files(directory: Path, spec: Spec, noted: Noted) -> dict[str, bytes]:
-    """Return the spec and the users' files, which are kept to be read and run again."""
-    files = {}
-    if not is_copy(directory / SPEC_FILE, spec, noted):
-        files[SPEC_FILE] = dumps(spec.table()).encode()
-    copies = spec.sources.texts.items()
-    return files | {f"{FOLDER}/{kept_name(name)}": text.encode() for name, text in copies}
 
 
 def spec_of(store: Store) -> Spec:
@@ -139,8 +129,10 @@ def noted_of(spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Tria
     )
 
 
-def examine(directory: Path, spec: Spec, noted: Noted, *, accept_code: bool) -> str | None:
-    """Return what is wrong with a directory's database as a whole, if anything is.
+def _examine(
+    directory: Path, spec: Spec, noted: Noted, *, accept_code: bool
+) -> tuple[str | None, Code | None]:
+    """Return what is wrong with a directory's database as a whole, and the code of its results.
 
     Parameters
     ----------
@@ -156,15 +148,16 @@ def examine(directory: Path, spec: Spec, noted: Noted, *, accept_code: bool) -> 
     SpecError
         If the directory holds another study, or something that is none.
     """
-    damage = database.damage(directory / DATABASE)
+    damage, code = database.damage(directory / DATABASE), None
     if damage is None and database.holds_tables(directory / DATABASE):
         with Store.open(directory) as store:
             refusal = _of_study(store, spec, noted, accept_code)
+            code = store.code() if refusal is None else None
     else:
         refusal = _of_file(directory, spec, noted, damage)
     if refusal is not None:
         raise SpecError(refusal)
-    return damage
+    return damage, code
 
 
 def is_copy(path: Path, spec: Spec, noted: Noted) -> bool:

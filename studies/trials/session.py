@@ -10,7 +10,7 @@ from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,12 +31,10 @@ from ...core.numerics import IntArray
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings, Stage
+from ..spec.spec import Spec
 from ..store.database import EVALUATION, STAGE
 from ..store.durable import TEAM, Recording
-from .trial import EpisodeMeter, EpisodeRow, Stopwatch, Trial, TrialResult, joined
-
-if TYPE_CHECKING:
-    from ..spec.spec import Spec
+from .trial import EpisodeMeter, EpisodeRow, Trial, TrialResult, joined
 
 Evaluations = Sequence[tuple[str, ConditionSettings]]
 """Names and settings under which a trained team is evaluated beside its own."""
@@ -216,6 +214,21 @@ def _arrangements(condition: Condition) -> Iterator[Arrangement]:
             team, states = of_fuzzy_agents(there.team), there.scenario.reset(0)
             team.check(team.predict(there.scenario, states))
         yield there
+
+
+class Stopwatch:
+    """Sums the seconds that the parts of the control loop took."""
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), 0.0)
+
+    def add(self, record: StepRecord) -> None:
+        """Take in one step."""
+        spent: Mapping[str, float] = record.transition.info.get("seconds", {})
+        self.seconds["decision"] += record.deciding
+        self.seconds["physics"] += spent.get("physics", 0.0)
+        self.seconds["sensors"] += spent.get("sensors", 0.0)
+        self.seconds["learning"] += record.learning
 
 
 EVALUATION_WORLDS = 10**6

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, isfinite
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,13 +19,10 @@ from ...core.interface.scenario import Measure, Scenario, Transition
 from ...core.plugins.sources import Sources, named
 from ..errors import SpecError
 from ..spec.conditions import ConditionSettings, Stage
-from ..spec.labels import lengths
+from ..spec.outline import lengths
+from ..spec.spec import Spec
 from ..store.database import AFTER, BEFORE, RESULTS_VERSION, Planned
 from ..store.durable import Recording
-
-if TYPE_CHECKING:
-    from ...core.agents.loop import StepRecord
-    from ..spec.spec import Spec
 
 
 class EpisodeRow(NamedTuple):
@@ -129,21 +126,6 @@ def _taken(measure: Measure, transition: Transition) -> float:
             f"measure {measure.name!r}: its source {measure.source!r} must be one number at every "
             f"step, received {type(transition.info[measure.source]).__name__}"
         ) from None
-
-
-class Stopwatch:
-    """Sums the seconds that the parts of the control loop took."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), 0.0)
-
-    def add(self, record: StepRecord) -> None:
-        """Take in one step."""
-        spent: Mapping[str, float] = record.transition.info.get("seconds", {})
-        self.seconds["decision"] += record.deciding
-        self.seconds["physics"] += spent.get("physics", 0.0)
-        self.seconds["sensors"] += spent.get("sensors", 0.0)
-        self.seconds["learning"] += record.learning
 
 
 RESERVED = ("identity", "condition", "seed", "position", *BEFORE, *AFTER)

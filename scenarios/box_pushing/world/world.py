@@ -110,8 +110,7 @@ def place(
 
     Examples
     --------
-    >>> from nested_agents.scenarios.box_pushing.world.bodies import BOXES
-    >>> from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS
+    >>> from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS
     >>> pair = [ROBOTS["e-puck"]] * 2
     >>> robots, box, goal = place("easy", np.random.default_rng(0), pair, BOXES["square"])
     >>> round(float(np.hypot(*(goal - box)[:2])), 9), bool((robots[:, 0] < box[0]).all())
@@ -308,13 +307,8 @@ class World:
         The world itself goes on from the saved state as a restored one does, so that both have the
         same future to the last bit. (Otherwise Box2D might visit contacts in another order.)
         """
-        state = WorldState(
-            np.vstack([self.box_pose, self.robot_poses]),
-            self.twists,
-            self._last.copy(),
-            self._wrenches.copy(),
-            self.contact_time.copy(),
-        )
+        poses, touched = np.vstack([self.box_pose, self.robot_poses]), self.contact_time.copy()
+        state = WorldState(poses, self.twists, self._last.copy(), self._wrenches.copy(), touched)
         self.restore(state)
         return state
 
@@ -368,7 +362,9 @@ class World:
     @property
     def twists(self) -> FloatArray:
         """Velocities (vx, vy, omega) of the box and the robots ``(M + 1, 3)``, world frame."""
-        return np.array([_twist(handles) for handles in self._handles])
+        return np.array(
+            [(get_x(v) / UNIT, get_y(v) / UNIT, get_omega(body)) for body, _, v in self._handles]
+        )
 
     def infrared(self) -> FloatArray:
         """Return what the infrared sensors would read ``(2, M, S)``, free of noise.
@@ -436,11 +432,6 @@ class World:
 def _handles(body: Any) -> tuple[Any, Any, Any]:
     """Return the handles of a body, its position and its velocity; all show the present."""
     return body.this, body.position.this, body.linearVelocity.this
-
-
-def _twist(handles: tuple[Any, Any, Any]) -> tuple[float, float, float]:
-    body, _, velocity = handles
-    return get_x(velocity) / UNIT, get_y(velocity) / UNIT, get_omega(body)
 
 
 class WheelFailures(Failures):

@@ -9,7 +9,7 @@ conditions and both measures.
 
 from collections.abc import Sequence
 
-from ...results.analysis import Analysis, Figures, Pair, Summary, differences, phases_of, verdicts
+from ...results.analysis import Analysis, Figures, Pair, Summary, judged, phases_of
 from ...results.results import Results
 from ...results.statistics import exactly, rate
 from ..study import run_training as measure
@@ -30,7 +30,7 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
     for title, phase in phases.items() if others else ():
         base = results.means(conditions[0], phase)
         pairs[title] = [(name, title, results.means(c, phase), base) for c, name in others]
-    compared = differences(pairs)
+    compared, notes = judged(pairs, "".join(names[:1]))
     by_place = {(d.condition, d.measure): d.estimate for ds in compared.values() for d in ds}
     table = []
     for condition, name in zip(conditions, names, strict=True):
@@ -39,7 +39,6 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
             estimates[title] = rate(results.success(condition, phase))
             estimates[f"{title}, difference"] = by_place.get((name, title), exactly(0.0))
         table.append(Summary(name, len(results.seeds(condition)), estimates))
-    notes = verdicts({f"{title}, less that of {names[0]}": ds for title, ds in compared.items()})
     return Analysis(tuple(table), tuple(notes), differences=compared)
 
 

@@ -19,8 +19,8 @@ from ....core.interface.scenario import groups_of
 from ...results.analysis import EVALUATED, Analysis, Figures, Sizes
 from ...results.results import Results
 from ...results.statistics import two_figures
-from ...spec.labels import label_but
 from ...spec.spec import Spec
+from ...spec.tables import label_but
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..hierarchies import HierarchyCase, analysis_of, estimates

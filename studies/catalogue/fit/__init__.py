@@ -14,8 +14,8 @@ from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Sizes
 from ...results.results import Results
 from ...results.statistics import exactly, rate
-from ...spec.labels import label
 from ...spec.spec import Spec
+from ...spec.tables import label
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..hierarchies import HierarchyCase, analysis_of

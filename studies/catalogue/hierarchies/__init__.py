@@ -31,8 +31,8 @@ from ...results.analysis import (
 )
 from ...results.results import Results
 from ...results.statistics import Array, Estimate, bootstrap, exactly, rate
-from ...spec.labels import label_but
 from ...spec.spec import Spec
+from ...spec.tables import label_but
 from ..scaling import NUMBERS, measure
 from ..study import check_evaluated
 

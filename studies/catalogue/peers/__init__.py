@@ -11,15 +11,7 @@ from time import process_time
 
 import numpy as np
 
-from ...results.analysis import (
-    EVALUATED,
-    Analysis,
-    Figures,
-    Summary,
-    differences,
-    evaluated,
-    verdicts,
-)
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, judged
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stacked
 from ...trials.session import Session
@@ -108,10 +100,9 @@ def analyse(results: Results) -> Analysis:
         return Analysis(())
     success = [results.means(condition, "evaluation") for condition in conditions]
     pairs = [(c, EVALUATED, own, success[0]) for c, own in zip(conditions, success, strict=True)]
-    compared = differences({EVALUATED: pairs[1:]})
-    notes = ["success, N: when evaluated after N episodes of training."]
-    notes += verdicts({f"{EVALUATED}, less that of {conditions[0]}": compared[EVALUATED]})
-    return Analysis(tuple(table), tuple(notes), courses, compared)
+    compared, lines = judged({EVALUATED: pairs[1:]}, conditions[0])
+    notes = ("success, N: when evaluated after N episodes of training.", *lines)
+    return Analysis(tuple(table), notes, courses, compared)
 
 
 def draw(analysis: Analysis) -> Figures:

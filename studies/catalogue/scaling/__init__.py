@@ -23,8 +23,8 @@ from ....core.numerics import FloatArray, pd
 from ...results.analysis import EVALUATED, Analysis, Figures, Sizes, Summary, evaluated, shared
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
-from ...spec.labels import label_but
 from ...spec.spec import Spec
+from ...spec.tables import label_but
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
@@ -78,13 +78,23 @@ def measure(trial: Trial) -> TrialResult:
     period = getattr(trial.settings.scenario, "period", None)
     if period is not None:
         numbers["period_s"] = period
-    contact = ContactShares()
-    session.evaluate(contact)
+    touching: list[FloatArray] = []
+    least: list[float] = []
+
+    def note(record: StepRecord) -> None:
+        """Note of an episode the least time that a robot is in contact, of that which any is."""
+        if "contact_time" in record.transition.info:
+            touching.append(record.transition.info["contact_time"])
+            if record.last:
+                pushing = max(float(np.max(touching, axis=1).sum()), 1e-12)
+                least.append(float((np.sum(touching, axis=0) / pushing).min()))
+                touching.clear()
+
+    session.evaluate(note)
     session.run_other_evaluations()
-    shares = contact.shares
-    if len(shares):
-        numbers["least_touching"] = float(shares.min(axis=1).mean())
-        numbers["all_touching"] = float((shares.min(axis=1) >= 0.5).mean())
+    if least:
+        numbers["least_touching"] = float(np.mean(least))
+        numbers["all_touching"] = float((np.array(least) >= 0.5).mean())
     usage = {
         "decision_median": float(np.median(session.deciding)),
         "decision_99": float(np.quantile(session.deciding, 0.99)),
@@ -104,36 +114,6 @@ def _peak() -> int | None:
     """Return the peak of this process's resident memory [bytes], where Linux tells it."""
     match = re.search(r"VmHWM:\s+(\d+) kB", MEMORY.read_text()) if MEMORY.exists() else None
     return None if match is None else 1024 * int(match[1])
-
-
-class ContactShares:
-    """Takes in step records; see `Observer`.
-
-    A scenario tells it by ``contact_time`` ``(M,)`` in `Transition.info`, the fraction of the step
-    in which each robot was in contact.
-    """
-
-    def __init__(self) -> None:
-        self._touching: list[FloatArray] = []
-        self._shares: list[FloatArray] = []
-
-    def __call__(self, record: StepRecord) -> None:
-        """Take in one step."""
-        if "contact_time" not in record.transition.info:
-            return
-        self._touching.append(record.transition.info["contact_time"])
-        if record.last:
-            pushing = max(float(np.max(self._touching, axis=1).sum()), 1e-12)
-            self._shares.append(np.sum(self._touching, axis=0) / pushing)
-            self._touching = []
-
-    @property
-    def shares(self) -> FloatArray:
-        """``(n_episodes, M)`` how much of the time in which any robot is in contact each is.
-
-        Without episodes if the scenario does not tell.
-        """
-        return np.array(self._shares)
 
 
 @dataclass(frozen=True)

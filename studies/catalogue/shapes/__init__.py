@@ -10,7 +10,7 @@ import numpy as np
 
 from ...results.analysis import Analysis, Difference, Figures, Summary, adjusted, power_lines, ratio
 from ...results.results import Results
-from ...results.statistics import Estimate, bootstrap, rate
+from ...results.statistics import bootstrap, rate
 from ...spec.spec import Spec
 from ..study import check_evaluations
 from ..study import run_training as measure
@@ -40,10 +40,18 @@ def analyse(results: Results) -> Analysis:
             label = box if len(ratios) == 1 else f"{condition}: {box}"
             success = results.success(condition, phase)
             estimates = {"success": rate(success), "ratio": by_box.get(box, bootstrap([own]))}
-            estimates |= _further(results, condition, phase)
+            if results.has(condition, phase, "stopped_at_goal"):
+                stopped = results.values(condition, "stopped_at_goal", phase)
+                estimates["stopped"] = rate(stopped)
+            if results.has(condition, phase, "contact_fraction"):
+                shares = results.values(condition, "contact_fraction", phase).mean(axis=1)
+                estimates["contact"] = bootstrap(shares, bounds=(0, 1))
             table.append(Summary(label, len(success), estimates))
         if compared:
-            notes += [f"\n{condition}, ratio to the box of training:", *map(_line, compared)]
+            notes.append(f"\n{condition}, ratio to the box of training:")
+            for d, e in ((d, d.estimate) for d in compared):
+                interval = f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
+                notes.append(f"  {d.condition}: {interval}, p = {d.p:.2g} (adjusted)")
             notes += power_lines(compared)
     return Analysis(tuple(table), tuple(notes), ratios)
 
@@ -52,34 +60,12 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
     """Return the ratios of a condition, box by box; none if it has not been evaluated."""
     if not results.has(condition, "evaluation"):
         return ()
-    base = results.success(condition, "evaluation")
-    others = {
-        box: results.success(condition, phase)
-        for box, phase in results.other_evaluations(condition).items()
-    }
-    runs = base.mean(axis=1)
-    return adjusted(
-        [
-            (box, "ratio", outcomes.mean(axis=1), runs, ratio(outcomes, base))
-            for box, outcomes in others.items()
-        ]
-    )
-
-
-def _further(results: Results, condition: str, phase: str) -> dict[str, Estimate]:
-    """Return how the box was left, and how long robots were in contact."""
-    estimates = {}
-    if results.has(condition, phase, "stopped_at_goal"):
-        estimates["stopped"] = rate(results.values(condition, "stopped_at_goal", phase))
-    if results.has(condition, phase, "contact_fraction"):
-        shares = results.values(condition, "contact_fraction", phase).mean(axis=1)
-        estimates["contact"] = bootstrap(shares, bounds=(0, 1))
-    return estimates
-
-
-def _line(d: Difference) -> str:
-    e = d.estimate
-    return f"  {d.condition}: {e.value:.2f} [{e.low:.2f}, {e.high:.2f}], p = {d.p:.2g} (adjusted)"
+    base, pairs = results.success(condition, "evaluation"), []
+    for box, phase in results.other_evaluations(condition).items():
+        outcomes = results.success(condition, phase)
+        means = outcomes.mean(axis=1), base.mean(axis=1)
+        pairs.append((box, "ratio", *means, ratio(outcomes, base)))
+    return adjusted(pairs)
 
 
 def draw(analysis: Analysis) -> Figures:

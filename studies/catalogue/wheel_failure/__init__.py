@@ -24,11 +24,11 @@ from ....core.learners.learner import LearnerSettings
 from ....core.learners.td import FrozenSettings
 from ....core.numerics import pd
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures, Pair, Summary, differences, verdicts
+from ...results.analysis import Analysis, Figures, Pair, Summary, judged
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Array, bootstrap, rate
-from ...spec.labels import label_but
 from ...spec.spec import Spec
+from ...spec.tables import label_but
 from ...trials.session import Session, arrange
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
@@ -169,12 +169,11 @@ def analyse(results: Results) -> Analysis:
     adapts.
     """
     courses = courses_of(results)
-    gains = differences({AT_END: list(_gains(courses))})
+    gains, lines = judged({AT_END: _gains(courses)}, "nothing adapting")
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
     if not all(course.before.any() for course in courses):
         notes += ["No recovery is measured where no episode before the failure succeeded."]
-    notes += verdicts({f"{AT_END}, less that of nothing adapting": gains[AT_END]})
-    return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains)
+    return Analysis(tuple(map(_summary, courses)), (*notes, *lines), courses, gains)
 
 
 def courses_of(results: Results) -> list[Course]:

@@ -12,7 +12,7 @@ from ...store import durable
 from ...store.store import Store
 from .. import options
 from ..display import print_study, print_table
-from ..loading import load_results, opened, trust_files
+from ..loading import describe, load_results, opened, progress, trust_files, warnings
 
 
 @click.command()
@@ -22,8 +22,6 @@ def status(directory: Path) -> int:
 
     DIR is where the study is kept.
     """
-    from ..standing import describe, progress, warnings
-
     with Store.open(directory) as store:
         now = progress(store)
         print(*describe(store, now), sep="\n")

@@ -17,7 +17,7 @@ from rich.text import Text
 from ...results.results import NOTHING, Results, read
 from ...store.store import Store
 from .. import options
-from ..standing import Progress, describe, progress, warnings
+from ..loading import Progress, describe, progress, warnings
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 CURVE = 24

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nested_agents.core.agents.failures import AbsentAgents, LostMessages
 from nested_agents.core.agents.loop import control_loop, join_agents
-from nested_agents.core.agents.messages import AbsentAgents, LostMessages
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
 from nested_agents.core.evaluators.evaluator import (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.messages import LostMessages
+from nested_agents.core.agents.failures import LostMessages
 from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.interface.hierarchy import Hierarchy

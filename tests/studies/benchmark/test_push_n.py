@@ -14,7 +14,7 @@ from nested_agents.core.agents.loop import world_seed
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
 from nested_agents.studies.benchmark import push_n
-from nested_agents.studies.cli.commands import benchmark
+from nested_agents.studies.cli.commands import committed
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 
@@ -160,5 +160,5 @@ def test_a_learner_of_another_library_is_entered(
 
 
 def test_the_command_offers_what_entries_may_be() -> None:
-    assert tuple(map(int, benchmark.sizes.choices)) == push_n.SIZES
-    assert tuple(benchmark.given.choices) == get_args(push_n.Entry.model_fields["given"].annotation)
+    assert tuple(map(int, committed.sizes.choices)) == push_n.SIZES
+    assert tuple(committed.given.choices) == get_args(push_n.Entry.model_fields["given"].annotation)

@@ -3,8 +3,8 @@ import json
 import made_up
 import pytest
 
+from nested_agents.studies.cli.loading import _estimate, progress
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.cli.standing import _estimate, progress
 from nested_agents.studies.spec import outline
 from nested_agents.studies.store import database
 from nested_agents.studies.store.store import LOCK, MARK, Running, Store, look

@@ -7,7 +7,7 @@ import pytest
 
 from nested_agents import studies
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.report.page import page
+from nested_agents.studies.report.page import brief, page
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.trials.trial import trials_of
@@ -36,6 +36,16 @@ def test_a_finished_study_has_everything(finished):
     assert "success, evaluation, less that of default:" in html
     assert "preset = [\n    &#34;default&#34;,\n    &#34;frozen&#34;,\n]" in html
     assert len(html) < 500_000
+
+
+def test_a_summary_of_many_lines_counts_what_is_not_significant():
+    few = "success:\n  no significant difference: b, 0.00\n    [-0.1, +0.1]\nPower: none"
+    assert brief(few) == few
+    many = "success:\n  better: z, +0.50\n    [+0.3, +0.7]\n" + few[9:-11] * 12 + "Power: none"
+    assert brief(many) == (
+        "success:\n  better: z, +0.50\n    [+0.3, +0.7]\n"
+        "  no significant difference: 12 conditions\nPower: none"
+    )
 
 
 def test_equal_results_give_equal_bytes_wherever_they_are(finished, tmp_path):

@@ -1,4 +1,4 @@
-"""Statistics of the field: numbers worked by hand, and those that rliable 1.2.0 gave."""
+"""Conditions compared; statistics of the field as worked by hand and as rliable 1.2.0 gave them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Permutation tests against exact enumeration, scipy and known distributions."""
+"""Estimates with intervals and permutation tests, against exact enumeration and SciPy."""
 
 from fractions import Fraction
 from itertools import permutations, product

@@ -12,11 +12,12 @@ from nested_agents.core.numerics import FloatArray
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.states.kernels import COMPILED, angle_of
 from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES, View
 from nested_agents.scenarios.box_pushing.states.state_spaces import (
+    COMPILED,
     STATE_SPACES,
     BoxStateSpace,
+    angle_of,
     listed,
     state_space_for,
 )

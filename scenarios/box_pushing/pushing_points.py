@@ -33,16 +33,15 @@ import numpy as np
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
-from ....core.interface.scenario import Transition
-from ....core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ....core.numerics import FloatArray, IntArray, njit
-from ..config import BoxPushingSettings, BoxTaskSettings
-from ..prediction.predictors import push_model
-from ..scenario import MEASURES, BoxPushing
-from ..world.bodies import BoxSpec, nominal_effect
-from ..world.geometry import surface, wrap
-from ..world.settings import RobotSettings
-from .config import PushingPointsSettings
+from ...core.interface.scenario import Transition
+from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
+from ...core.numerics import FloatArray, IntArray, njit
+from .config import BoxPushingSettings, BoxTaskSettings, PushingPointsSettings
+from .prediction.predictors import push_model
+from .scenario import MEASURES, BoxPushing
+from .world.bodies import BoxSpec, nominal_effect
+from .world.geometry import surface, wrap
+from .world.settings import RobotSettings
 
 CLEARANCE = 0.006
 """Least gap [m] to box and other robots on the way to a slot."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.options.scenario import Drivers
+from nested_agents.scenarios.box_pushing.pushing_points import Drivers
 
 BOX = np.zeros(3)
 

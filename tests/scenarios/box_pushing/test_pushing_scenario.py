@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.learners.td import QLearning
-from nested_agents.scenarios.box_pushing.options.config import PushingPointsSettings
+from nested_agents.scenarios.box_pushing.config import PushingPointsSettings
 from nested_agents.scenarios.checking.checker import check_scenario
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec

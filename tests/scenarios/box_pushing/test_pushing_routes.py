@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.options.scenario import moved, paths
+from nested_agents.scenarios.box_pushing.pushing_points import moved, paths
 from nested_agents.scenarios.box_pushing.world.bodies import BOXES
 
 

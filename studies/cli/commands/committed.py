@@ -1,11 +1,80 @@
-"""``nested-agents benchmark``: enter a learner in the benchmark push-n, and compare the entries."""
+"""Commands on committed results: claims of a paper, and entries of the benchmark push-n."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import click
 
+from ....core.plugins.settings import closest
+from ...api.study import run as run_study
+from ...claims.claims import PAPERS, PUBLISHED, QUICK, SPECS, judge, print_claims, studies_of
+from ...errors import SpecError
+from ...presentation.progress import Terminal, say
+from ...results import published
+from ...store import durable
 from .. import options
+from ..display import print_table, print_wrapped
+
+
+@click.command()
+@options.out(
+    "Run the studies that the claims rest on, each in a directory of its own below this one; "
+    "what has been run before is read."
+)
+@options.flag(
+    "--quick", "Small versions of the studies: six minutes on two cores, and wide intervals."
+)
+@click.option(
+    "--of",
+    default="nested-agents",
+    metavar="PAPER",
+    help="Whose claims: this paper's, or those of action-dependency-graphs (arXiv 2506.00797).",
+)
+@options.jobs
+@options.formats("table", "json", "markdown")
+def claims(out: Path | None, quick: bool, of: str, jobs: int | None, form: Any) -> int:
+    """Print one table: each claim of a paper, its measure, the result, the verdict.
+
+    Without --out the table is made from the results that are committed in the repository.
+    """
+    if of not in PAPERS:
+        raise SpecError(f"--of = {of!r}: {closest(of, PAPERS)}")
+    if out is not None:
+        results = _run(out, of, quick=quick, jobs=jobs)
+    elif quick or jobs is not None:
+        raise SpecError(
+            f"{'--quick' if quick else '--jobs'}: needs --out, where to run the studies"
+        )
+    elif PUBLISHED.is_dir():
+        results = published.read(PUBLISHED, studies_of(of))
+    else:
+        raise SpecError(
+            "claims: the committed results are in the repository, in studies/claims/published, "
+            "not in the installed package; with --out DIR the studies are run"
+        )
+    for study, of_study in results.items():
+        if of_study.note:
+            say(f"{study}: {of_study.note}")
+    print_claims(judge({study: p.results for study, p in results.items()}, of), form)
+    return 0
+
+
+def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, published.Published]:
+    """Run the studies of the claims, or what is left of them; return the results by study."""
+    results = {}
+    for study in studies_of(of):
+        name = study.replace("-", "_")
+        folder = QUICK if quick else SPECS / name
+        ran = run_study(folder / f"{name}.toml", out / study, jobs=jobs, observer=Terminal())
+        if ran.failed:
+            raise SpecError(
+                f"{out / study}: {len(ran.failed)} trials failed: nested-agents status "
+                f"{out / study}"
+            )
+        results[study] = published.loads(published.dumps(ran.outline, ran.results))
+    return results
+
 
 entries = click.argument("entries", type=options.PATH, metavar="ENTRY.json...", nargs=-1)
 sizes = click.Choice(["2", "4", "8", "16", "32", "64"])
@@ -36,7 +105,6 @@ def run(
     missing.
     """
     from ...benchmark.push_n import Entry, run_spec
-    from ...store import durable
 
     teams = run_spec(spec, out, list(dict.fromkeys(map(int, robots))), seeds, jobs)
     text = Entry(teams=teams, **entry).model_dump_json(indent=1)
@@ -50,8 +118,6 @@ def run(
 @click.option("--schema", is_flag=True, help="Print the JSON schema of entries.")
 def check(entries: tuple[Path, ...], schema: bool) -> int:
     """Check the rules that a file can show."""
-    import json
-
     from ...benchmark.push_n import Entry, load_entry
 
     if schema:
@@ -71,7 +137,6 @@ def table(entries: tuple[Path, ...], measure: str, form: str) -> int:
     """Print entries by number of robots: the committed ones, then others."""
     from ...benchmark.push_n import committed_entries, load_entry, table_of
     from ...presentation.tables import tabulate
-    from ..display import print_table, print_wrapped
 
     shown = [*committed_entries(), *map(load_entry, entries)]
     printed = tabulate(table_of(shown, measure))

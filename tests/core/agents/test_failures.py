@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.messages import (
+from nested_agents.core.agents.failures import (
     AbsentAgents,
     DelayedMessages,
     LostMessages,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.options.config import PushingPointsSettings
-from nested_agents.scenarios.box_pushing.options.scenario import pushing_points
+from nested_agents.scenarios.box_pushing.config import PushingPointsSettings
+from nested_agents.scenarios.box_pushing.pushing_points import pushing_points
 from nested_agents.scenarios.box_pushing.world.bodies import BOXES
 from nested_agents.scenarios.box_pushing.world.geometry import surface
 

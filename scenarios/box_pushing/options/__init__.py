@@ -1,1 +1,0 @@
-"""Box pushing by one agent per robot, whose actions are ways to pushing points."""
