@@ -15,16 +15,8 @@ from ...core.numerics import pd
 from ..catalogue.chain_order import order_tests
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..results.analysis import (
-    EVALUATED,
-    BySeed,
-    Sizes,
-    difference,
-    paired_difference,
-    ratio,
-    shared,
-)
-from ..results.results import Results
+from ..results.analysis import EVALUATED, BySeed, difference, paired_difference, ratio, shared
+from ..results.results import Results, Sizes
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ..store.database import EVALUATION
 

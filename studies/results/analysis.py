@@ -4,8 +4,6 @@ The table has conditions against estimates. Conditions are compared with a refer
 on the worlds that both have met.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from textwrap import wrap
@@ -50,50 +48,6 @@ def evaluated(results: Results, condition: str) -> dict[str, Estimate]:
     others = results.other_evaluations(condition).items()
     phases = {EVALUATED: "evaluation", **{f"success, {name}": phase for name, phase in others}}
     return {title: rate(results.success(condition, phase)) for title, phase in phases.items()}
-
-
-UNKNOWN = "agent groups"
-"""What bodies are called if their number is not swept."""
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """Numbers of bodies.
-
-    Examples
-    --------
-    >>> joints = Sizes({"2": 2, "8": 8}, ("scenario.joints",))
-    >>> joints.shown(1), joints.shown(8), Sizes({"chain": 3, "star": 5}).shown(3)
-    ('1 joint', '8 joints', '3 agent groups')
-    >>> Sizes({"chain": 3, "star": 3}).shown(3)
-    ''
-    """
-
-    counts: Mapping[str, int]
-    """By condition."""
-    keys: Sequence[str] = ()
-    """Swept keys that are this number, whatever the scenario calls it."""
-
-    @classmethod
-    def of(cls, results: Results, conditions: Iterable[str]) -> Sizes:
-        """Return those of conditions whose trials have counted them."""
-        counts = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
-        swept = {c: results.columns.get(c, {}) for c in counts}
-        keys = dict.fromkeys(key for row in swept.values() for key in row)
-        own = (k for k in keys if all(str(swept[c].get(k)) == str(n) for c, n in counts.items()))
-        return cls(counts, tuple(own))
-
-    @property
-    def word(self) -> str:
-        """What bodies are called, in the plural."""
-        names = (k.removeprefix("scenario.") for k in self.keys if k.startswith("scenario."))
-        return next(names, UNKNOWN)
-
-    def shown(self, number: int) -> str:
-        """Return a number in words; nothing if it is the same everywhere, and nobody named it."""
-        if not self.keys and len(set(self.counts.values())) == 1:
-            return ""
-        return f"{number} {self.word.removesuffix('s') if number == 1 else self.word}"
 
 
 PHASES = {"training success": "training", EVALUATED: "evaluation"}
@@ -338,12 +292,15 @@ def verdicts(
 
 
 def judged(
-    groups: Mapping[str, Iterable[Pair]], less: str
+    groups: Mapping[str, Iterable[Pair]], less: str, measure: str = ""
 ) -> tuple[dict[str, tuple[Difference, ...]], list[str]]:
-    """Return the `differences` of groups, and their `verdicts`; `less` is what the reference is."""
+    """Return the `differences` of groups, and their `verdicts`.
+
+    `less` is what the reference is, `measure` what is compared, unless the groups say so.
+    """
     compared = differences(groups)
-    heads = {f"{group}, less that of {less}": own for group, own in compared.items()}
-    return compared, verdicts(heads)
+    heads = {group: ": ".join(filter(None, (group, measure))) for group in groups}
+    return compared, verdicts({f"{heads[g]}, less that of {less}": compared[g] for g in groups})
 
 
 def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:
