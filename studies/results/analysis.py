@@ -15,9 +15,17 @@ from numpy.typing import ArrayLike
 from ...core.interface.scenario import SUCCESS
 from ...core.numerics import pd
 from ..errors import WIDTH
-from .power import SMALLEST, deviation_of, power_text
 from .results import Results
-from .statistics import LEVEL, Array, Estimate, bootstrap, holm, paired_permutation, rate
+from .statistics import (
+    LEVEL,
+    Array,
+    Estimate,
+    bootstrap,
+    holm,
+    paired_permutation,
+    power_lines,
+    rate,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -288,7 +296,7 @@ def verdicts(
     if compared:
         counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
         lines.append(f"p: permutation of signs over seeds, adjusted over {counted} (Holm).")
-    return lines + power_lines(compared, of_rates=of_rates)
+    return lines + power_lines([d.sample for d in compared], of_rates=of_rates)
 
 
 def judged(
@@ -312,20 +320,3 @@ def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:
     """
     head = ["Identical in every episode, by every measure:"] if groups else []
     return head + [f"  {line}" for same in groups for line in wrap(" = ".join(same), WIDTH - 2)]
-
-
-def power_lines(differences: Sequence[Difference], *, of_rates: bool = True) -> list[str]:
-    """Return lines on which differences the comparisons could find, and how many seeds it takes.
-
-    Parameters
-    ----------
-    differences
-        All that were adjusted together, of one unit.
-    of_rates
-        Whether they are differences of success rates, of which `SMALLEST` is of interest.
-    """
-    if not differences:
-        return []
-    seeds = min(d.seeds for d in differences)
-    deviation = deviation_of([d.sample for d in differences], of_rates=of_rates)
-    return power_text(seeds, len(differences), deviation, SMALLEST if of_rates else None)
