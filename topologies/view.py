@@ -186,17 +186,11 @@ def printed(shown: HierarchyView, form: Form) -> str:
         subordinates = ", ".join(under[i]) or "-"
         tried = readable(shown.tries[i])
         rows.append((str(rank + 1), names[i], str(len(below[i])), tried, subordinates))
-    return "\n".join(
-        [
-            shown.title,
-            *shown.remarks,
-            "",
-            *aligned(rows, "><>><"),
-            "",
-            "In order of decision. below: agents whose actions it tries; tries: joint",
-            "actions tried a step.",
-        ]
-    )
+    legend = [
+        "In order of decision. below: agents whose actions it tries; tries: joint",
+        "actions tried a step.",
+    ]
+    return "\n".join([shown.title, *shown.remarks, "", *aligned(rows, "><>><"), "", *legend])
 
 
 def aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:

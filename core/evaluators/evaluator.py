@@ -251,11 +251,8 @@ class Aggregation:
     """Whether it makes plans for the other agents."""
 
     def __init__(self, problem: DecisionProblem) -> None:
-        for key, value, of_plans in (
-            ("unseen", problem.unseen, "plan"),
-            ("plan", problem.plan, "common"),
-        ):
-            if value == of_plans and not self.plans:
+        for key, of_plans in (("unseen", "plan"), ("plan", "common")):
+            if (value := getattr(problem, key)) == of_plans and not self.plans:
                 raise ValueError(
                     f"learner.decision.{key} = {value!r}: needs an evaluator that makes plans, use "
                     "best-response"

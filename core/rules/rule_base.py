@@ -145,13 +145,9 @@ class RuleBase:
                     "each once"
                 )
             terms.append(tuple(sorted(names.index(name) for name in product)))
+        counts = dict.fromkeys(names, settings.memberships) | dict.fromkeys(space.actions)
         partitions = [
-            Partition.of(
-                v,
-                settings.membership,
-                None if v.name in space.actions else settings.memberships,
-                settings.steepness,
-            )
+            Partition.of(v, settings.membership, counts[v.name], settings.steepness)
             for v in space.variables
         ]
         common = [names.index(name) for name in space.common]

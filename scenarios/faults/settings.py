@@ -90,7 +90,7 @@ class Stuck(FailureSettings):
 
 
 class Delayed(FailureSettings):
-    """It carries out its commands too late; `schedule.Failures` remembers them."""
+    """It carries out its commands too late; `Failures` remembers them."""
 
     periods: Annotated[int, Field(ge=1, le=1000)] = 8
     """Control periods by which commands are late."""

@@ -200,13 +200,8 @@ class KinematicChain:
 
     def _observe(self, before: float) -> FloatArray:
         """Return the states ``(n, d)`` of all agents: the error observation layer."""
-        view = ChainView(
-            self._places()[None],
-            self._angles[None],
-            self._speeds[None] / self.settings.top_speed,
-            self._goal,
-            before,
-        )
+        fractions = self._speeds[None] / self.settings.top_speed
+        view = ChainView(self._places()[None], self._angles[None], fractions, self._goal, before)
         return self._states.of_joints(view, 0, len(self.agents))[:, 0]
 
 

@@ -141,6 +141,9 @@ GAMES: dict[str, Callable[[str], FloatArray]] = {
 """Payoffs by name, given what follows the name."""
 
 
+SHARE_OF_BEST = Measure(
+    "share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0
+)
 MOST_ACTIONS = 26
 """Actions of an agent, which are called by letters."""
 
@@ -432,12 +435,7 @@ class TeamGame:
     (1.0, 0.0)
     """
 
-    measures = (
-        *OF_OPTIMA,
-        Measure(
-            "share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0
-        ),
-    )
+    measures = (*OF_OPTIMA, SHARE_OF_BEST)
 
     def __init__(self, settings: TeamGameSettings) -> None:
         self.settings, n = settings, settings.players

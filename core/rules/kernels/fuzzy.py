@@ -102,15 +102,11 @@ class Partition:
         With `count` the centres are spread evenly, on a line from end to end; without, they are
         the variable's own, or five spread evenly if it has none.
         """
-        period = variable.high - variable.low if variable.periodic else 0.0
-        centres = variable.centres
+        low, high, centres = variable.low, variable.high, variable.centres
+        period = high - low if variable.periodic else 0.0
         if count is not None or not centres:
-            centres = tuple(
-                float(c)
-                for c in np.linspace(
-                    variable.low, variable.high, count or 5, endpoint=not variable.periodic
-                )
-            )
+            even = np.linspace(low, high, count or 5, endpoint=not variable.periodic)
+            centres = tuple(map(float, even))
         return cls(centres, membership, period, steepness)
 
     @property

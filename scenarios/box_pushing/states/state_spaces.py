@@ -478,15 +478,7 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
     factor = max_speed / _MAX_SPEED
     if factor == 1.0:
         return space
-    variables = tuple(
-        replace(
-            variable,
-            low=factor * variable.low,
-            high=factor * variable.high,
-            centres=tuple(factor * centre for centre in variable.centres),
-        )
-        if variable.name == _SPEED.name
-        else variable
-        for variable in space.space.variables
-    )
+    centres = tuple(factor * centre for centre in _SPEED.centres)
+    speed = replace(_SPEED, low=factor * _SPEED.low, high=factor * _SPEED.high, centres=centres)
+    variables = tuple(speed if v.name == speed.name else v for v in space.space.variables)
     return replace(space, space=replace(space.space, variables=variables))

@@ -210,18 +210,11 @@ def disc_hit(cx: float, cy: float, radius: float, dx: float, dy: float, reach: f
 
 
 @njit(cache=True)
-def _ray_edge(
-    x0: float,
-    y0: float,
-    x1: float,
-    y1: float,
-    x: float,
-    y: float,
-    dx: float,
-    dy: float,
-    reach: float,
-) -> float:
-    """Return the distance at which a ray crosses a segment, or `reach`."""
+def _ray_edge(x0, y0, x1, y1, x, y, dx, dy, reach) -> float:  # type: ignore[no-untyped-def]
+    """Return the distance at which a ray crosses a segment, or `reach`.
+
+    The segment is from (x0, y0) to (x1, y1), the ray from (x, y) on along (dx, dy).
+    """
     ex, ey = x1 - x0, y1 - y0
     cross = dx * ey - dy * ex
     if cross == 0.0:

@@ -110,8 +110,7 @@ def place(
 
     Examples
     --------
-    >>> from nested_agents.scenarios.box_pushing.world.bodies import BOXES
-    >>> from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS
+    >>> from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS
     >>> pair = [ROBOTS["e-puck"]] * 2
     >>> robots, box, goal = place("easy", np.random.default_rng(0), pair, BOXES["square"])
     >>> round(float(np.hypot(*(goal - box)[:2])), 9), bool((robots[:, 0] < box[0]).all())
@@ -308,13 +307,8 @@ class World:
         The world itself goes on from the saved state as a restored one does, so that both have the
         same future to the last bit. (Otherwise Box2D might visit contacts in another order.)
         """
-        state = WorldState(
-            np.vstack([self.box_pose, self.robot_poses]),
-            self.twists,
-            self._last.copy(),
-            self._wrenches.copy(),
-            self.contact_time.copy(),
-        )
+        poses, touched = np.vstack([self.box_pose, self.robot_poses]), self.contact_time.copy()
+        state = WorldState(poses, self.twists, self._last.copy(), self._wrenches.copy(), touched)
         self.restore(state)
         return state
 
