@@ -154,12 +154,12 @@ def tune(
             for trial in everything
             if trial.condition in wanted and trial.seed < first_seed + n_seeds
         }
-        title = f"{count(len(names), 'configuration')} on {count(n_seeds, 'seed')}"
         with run_study(
             study, out, jobs=jobs, backend=backend, address=address, accept_code=accept_code,
-            observer=observer, chosen=list(planned.values()), title=title,
+            observer=observer, chosen=list(planned.values()),
         ) as store:  # fmt: skip
             results = read(store)
+        observer.note(f"compared {count(len(names), 'configuration')} on {count(n_seeds, 'seed')}")
         table = _table(results, points, range(first_seed, first_seed + n_seeds))
         names = [name for name in table["name"] if name in names]
     best = points[table["name"].iloc[0]]
