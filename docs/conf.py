@@ -11,6 +11,7 @@ sys.path.insert(0, str(HERE))
 
 import diagrams  # noqa: E402
 import reference  # noqa: E402
+from docutils import nodes  # noqa: E402
 
 reference.write(HERE / "reference")
 diagrams.draw(HERE / "diagrams")
@@ -74,7 +75,18 @@ def skip_signatures_of_c(app, what, name, thing, skip, options):
     return True if is_alias or isinstance(thing, BuiltinFunctionType) else None
 
 
+def keep_intervals_whole(app, doctree):
+    """Keep an estimate of a table and its interval in one line, and a count and its total."""
+    for entry in doctree.findall(nodes.entry):
+        for text in [*entry.findall(nodes.Text)]:
+            if not isinstance(text.parent, nodes.literal):
+                whole = re.sub(r"(\S) \[(\S+), (\S+)\]", "\\1\u00a0[\\2,\u00a0\\3]", text)
+                whole = re.sub(r"^(\d+) of (\d+)$", "\\1\u00a0of\u00a0\\2", whole)
+                text.parent.replace(text, nodes.Text(whole))
+
+
 def setup(app):
     """Connect what is above."""
+    app.connect("doctree-read", keep_intervals_whole)
     app.connect("autodoc-process-docstring", escape_bars)
     app.connect("autodoc-skip-member", skip_signatures_of_c)

@@ -76,10 +76,10 @@ MODULES = {
         "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.teams", "api.running", "api.recovery", "api.tuning",
+        "api.study", "api.running", "api.alternatives", "api.recovery",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.contrasts", "results.published", "results.power", "catalogue.study", "cost.cost",
+        "results.contrasts", "results.published", "catalogue.study", "cost.cost",
         "claims.claims",
     )),
 }  # fmt: skip
@@ -87,8 +87,12 @@ MODULES = {
 
 
 def write(folder: Path) -> None:
-    """Write the pages into a folder, those that have changed."""
+    """Write the pages into a folder, those that have changed; drop those of modules that went."""
     folder.mkdir(exist_ok=True)
+    named = {f"nested_agents.{room}.{m}" for room, (_, names) in MODULES.items() for m in names}
+    for path in (folder / "api").glob("nested_agents.*.rst"):
+        if path.stem not in named:
+            path.unlink()
     pages = {"keys": keys(), "columns": columns(), "commands": commands(), "api": api()}
     pages |= {name: modules(name) for name in MODULES}
     for name, lines in pages.items():

@@ -166,23 +166,11 @@ INEXPRESSIBLE: Mapping[Commands, str] = {"effort": "seized", "velocity": "free",
 """What no action expresses, by what actions command."""
 
 
-class Carried:
-    """The actuators of one or more action spaces under a schedule of faults.
+class _Faulty:
+    """An environment under a schedule of faults; inherited beside a library's wrapper.
 
-    Parameters
-    ----------
-    spaces
-        Action spaces by the prefix of their actuators' names.
-    faults
-        The schedule.
-    seed
-        Of what noise and draws follow, with the seed of the environment and the episode's number.
-    commands
-        What actions command.
-    rest
-        Actions at rest, by the same prefixes; see `ActionScale`.
-    mechanism
-        See `Mechanism`.
+    Its actuators are those of one or more action spaces, by the prefix of their names. Noise and
+    draws follow from `seed`, the seed of the environment, and the number of the episode.
 
     Raises
     ------
@@ -190,15 +178,23 @@ class Carried:
         If a fault names no actuator, or cannot be expressed.
     """
 
+    env: Any
+    """The environment beneath."""
+    _by_prefix: Callable[[Any, Any], Any]
+    """Returns the action spaces of an environment by prefix, and the actions at rest likewise."""
+
     def __init__(
         self,
-        spaces: Mapping[str, gymnasium.Space[Any]],
+        env: Any,
         faults: Sequence[ActuatorFault],
-        seed: int,
-        commands: Commands,
-        rest: Mapping[str, Any],
-        mechanism: Mechanism | None,
+        *,
+        seed: int = 0,
+        commands: Commands = "effort",
+        rest: Any = None,
+        mechanism: Mechanism | None = None,
+        inform: bool = False,
     ) -> None:
+        super().__init__(env)  # type: ignore[call-arg]  # of the wrapper
         if commands not in INEXPRESSIBLE:
             raise ValueError(f"commands = {commands!r}, allowed: {', '.join(INEXPRESSIBLE)}")
         for i, fault in enumerate(faults):
@@ -207,23 +203,26 @@ class Carried:
                     f"faults[{i}]: no {commands} makes an actuator {fault.kind}; give a "
                     f"mechanism that does, or say what else actions command"
                 )
-        self.scales: dict[str, ActionScale] = {}
+        spaces, rests = self._by_prefix(env, rest)
+        self._scales: dict[str, ActionScale] = {}
         self._spans: dict[str, slice] = {}
         names: list[str] = []
         for prefix, space in spaces.items():
-            scale = ActionScale(space, rest.get(prefix), f"action space {prefix}".rstrip())
-            self.scales[prefix] = scale
+            scale = ActionScale(space, rests.get(prefix), f"action space {prefix}".rstrip())
+            self._scales[prefix] = scale
             self._spans[prefix] = slice(len(names), len(names) + len(scale))
             names += [f"{prefix}.{i}" if prefix else str(i) for i in range(len(scale))]
-        self.names = tuple(names)
-        limits = np.concatenate([scale.limits for scale in self.scales.values()])
-        self._failures = Failures(faults, self.names, limits, "faults")
+        self.actuators = tuple(names)
+        limits = np.concatenate([scale.limits for scale in self._scales.values()])
+        self._failures = Failures(faults, self.actuators, limits, "faults")
         self._commands, self._mechanism, self._seed = commands, mechanism, seed
-        self._world, self._episode = 0, -1
-        self._hooked = False
+        self._inform, self._hooked = inform, False
+        self.carried: Any = None
         self._begin(0, 0)
 
-    def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    def _schedule(
+        self, seed: int | None, options: Mapping[str, Any] | None
+    ) -> dict[str, Any] | None:
         """Start the next episode; a seed starts their count afresh. Return the options left.
 
         The option ``fault_episode`` sets the number of the episode, by which faults are scheduled.
@@ -239,18 +238,18 @@ class Carried:
         root = np.random.SeedSequence([self._seed, world, episode])
         self._failures.begin(root, episode)
         self._rng = np.random.default_rng(root)
-        self._held = np.zeros(len(self.names))
+        self._held = np.zeros(len(self.actuators))
 
-    def carry(self, actions: Mapping[str, Any], environment: Any) -> dict[str, Any]:
+    def _carry(self, actions: Mapping[str, Any]) -> dict[str, Any]:
         """Return what is carried out of the actions of one step, by prefix.
 
         Spaces whose action is missing rest.
         """
         self._failures.strike(self._step)
         self._step += 1
-        places = np.zeros(len(self.names))
+        places = np.zeros(len(self.actuators))
         for prefix, action in actions.items():
-            places[self._spans[prefix]] = self.scales[prefix].place(action)
+            places[self._spans[prefix]] = self._scales[prefix].place(action)
         drawn = self._rng.random(len(places))  # as many whatever fails: runs stay paired
         driven = self._failures.driven(places, 1)[0]
         changed = self._failures.failed
@@ -261,51 +260,28 @@ class Carried:
                 driven[mask] = self._held[mask]
         self._held = np.where(changed, driven, places)
         unexpressed = {
-            name: kind for name, kind in self.now().items() if kind == INEXPRESSIBLE[self._commands]
+            name: kind
+            for name, kind in self._now().items()
+            if kind == INEXPRESSIBLE[self._commands]
         }
         if self._mechanism is not None and (unexpressed or self._hooked):
-            self._mechanism(environment, unexpressed)
+            self._mechanism(self.env, unexpressed)
         self._hooked = bool(unexpressed)
         return {
-            prefix: self.scales[prefix].action(
+            prefix: self._scales[prefix].action(
                 driven[span], action, changed[span], drawn[span]
             )
             for prefix, action in actions.items()
             for span in [self._spans[prefix]]
         }  # fmt: skip
 
-    def now(self) -> dict[str, str]:
+    def _now(self) -> dict[str, str]:
         """Return the kind of the fault of every actuator that has one; of several, the last."""
         return {
-            self.names[i]: fault.kind
+            self.actuators[i]: fault.kind
             for fault, mask in self._failures.active()
             for i in np.flatnonzero(mask)
         }
-
-
-class _Faulty:
-    """A schedule of faults over an environment; inherited beside a library's wrapper."""
-
-    _by_prefix: Callable[[Any, Any], Any]
-    """Returns action spaces of an environment and actions at rest, as `Carried` takes them."""
-
-    def __init__(
-        self,
-        env: Any,
-        faults: Sequence[ActuatorFault],
-        *,
-        seed: int = 0,
-        commands: Commands = "effort",
-        rest: Any = None,
-        mechanism: Mechanism | None = None,
-        inform: bool = False,
-    ) -> None:
-        super().__init__(env)  # type: ignore[call-arg]  # of the wrapper
-        spaces, rests = self._by_prefix(env, rest)
-        self._carrier = Carried(spaces, faults, seed, commands, rests, mechanism)
-        self.actuators = self._carrier.names
-        self._inform = inform
-        self.carried: Any = None
 
 
 class FaultyEnv(_Faulty, gymnasium.Wrapper):
@@ -355,15 +331,15 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start an episode of the environment beneath."""
-        left = self._carrier.reset(seed, options)
+        left = self._schedule(seed, options)
         return self.env.reset(seed=seed, options=left)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Do what faulty actuators make of an action."""
-        self.carried = self._carrier.carry({"": action}, self.env)[""]
+        self.carried = self._carry({"": action})[""]
         seen, reward, terminated, truncated, info = self.env.step(self.carried)
         if self._inform:
-            info = {**info, "faults": self._carrier.now(), "carried": self.carried}
+            info = {**info, "faults": self._now(), "carried": self.carried}
         return seen, reward, terminated, truncated, info
 
 
@@ -395,16 +371,16 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Start an episode of the environment beneath."""
-        left = self._carrier.reset(seed, options)
+        left = self._schedule(seed, options)
         seen, infos = self.env.reset(seed=seed, options=left)
         return seen, infos
 
     def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
         """Do what faulty actuators make of the agents' actions."""
-        self.carried = self._carrier.carry(actions, self.env)
+        self.carried = self._carry(actions)
         *given, infos = self.env.step(self.carried)
         if self._inform:
-            now = self._carrier.now()
+            now = self._now()
             infos = {
                 agent: {
                     **info,

@@ -32,7 +32,7 @@ from ...core.plugins.sources import is_reference
 from ..catalogue.study import load_study, measured
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
-from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
+from ..results.statistics import SMALLEST, USUAL_DEVIATION, power_text
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
 from ..store.store import Store
@@ -55,7 +55,6 @@ def run_study(
     accept_code: bool = False,
     observer: Observer | None = None,
     chosen: Sequence[Trial] = (),
-    title: str = "",
 ) -> Iterator[Store]:
     """Run what is left of a study; then its store is open for as long as the context lasts.
 
@@ -75,8 +74,6 @@ def run_study(
         Who is notified of progress; None: nobody.
     chosen
         Those of its trials that are run; none named: all.
-    title
-        What is noted first, once nothing is refused any more; empty: nothing.
 
     Yields
     ------
@@ -101,7 +98,7 @@ def run_study(
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
         run_one = measured if is_reference(spec.study) else load_study(spec.study).measure
-        for note in filter(None, (title, *store.notes, *spec.warnings())):
+        for note in (*store.notes, *spec.warnings()):
             observer.note(note)
         if left:
             observer.announce(spec, directory, workers.processes)

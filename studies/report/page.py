@@ -259,14 +259,10 @@ def _template() -> jinja2.Template:
 
 def brief(notes: str) -> str:
     """Return what a study says; of more than `MOST_LINES`, how many are not significant."""
-    return (
-        notes
-        if notes.count("\n") < MOST_LINES
-        else NOT_SIGNIFICANT.sub(
-            lambda lines: f"  no significant difference: {lines[0].count('  no ')} conditions\n",
-            notes,
-        )
-    )
+    if notes.count("\n") < MOST_LINES:
+        return notes
+    counted = "  no significant difference: {} conditions\n"
+    return NOT_SIGNIFICANT.sub(lambda lines: counted.format(lines[0].count("  no ")), notes)
 
 
 def _own(name: str) -> Markup:

@@ -24,6 +24,7 @@ from nested_agents.studies.claims import claims
 from nested_agents.studies.claims.claims import (
     OWN,
     PAPERS,
+    Measured,
     at_least,
     at_most,
     judge,
@@ -31,7 +32,6 @@ from nested_agents.studies.claims.claims import (
     print_claims,
     within,
 )
-from nested_agents.studies.claims.measures import Measured
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import Results
