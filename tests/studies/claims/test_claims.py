@@ -32,6 +32,7 @@ from nested_agents.studies.claims.claims import (
     print_claims,
     within,
 )
+from nested_agents.studies.cli.commands import committed
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import Results
@@ -252,7 +253,7 @@ def test_options_that_run_need_a_directory(capsys) -> None:
 
 
 def test_an_installed_package_says_where_the_results_are(tmp_path, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
+    monkeypatch.setattr(committed, "PUBLISHED", tmp_path / "published")
     assert main(["claims"]) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
