@@ -396,8 +396,8 @@ def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch)
         episodes = 10 if study == "wheel-failure" else 1
         text = TINY.format(study=study, episodes=episodes, rest=rest)
         (tmp_path / "quick" / f"{study.replace('-', '_')}.toml").write_text(text)
-    monkeypatch.setattr(claims, "QUICK", tmp_path / "quick")
-    monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
+    monkeypatch.setattr(committed, "QUICK", tmp_path / "quick")
+    monkeypatch.setattr(committed, "PUBLISHED", tmp_path / "published")
     arguments = ["claims", "--quick", "--out", str(tmp_path / "out"), "--jobs", "1"]
     arguments += ["--format", "markdown"]
     assert main(arguments) == 0
