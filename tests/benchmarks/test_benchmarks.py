@@ -110,3 +110,9 @@ def test_a_batch_of_mujoco_is_timed(run: Run) -> None:
     (line,) = run("benchmarks.rollout", "--ids", "Swimmer-v5", "--budget", "0.1").splitlines()
     assert line.startswith("Swimmer-v5: 9 joint actions, copies ")
     assert line.endswith("states off by 0")
+
+
+@pytest.mark.slow
+def test_rules_can_hold_the_pole(run: Run) -> None:
+    (line,) = run("benchmarks.cartpole", "--orders", "3", "--held", "5").splitlines()
+    assert line == "order 3, held for 5: 500 steps, least 500"

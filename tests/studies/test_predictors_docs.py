@@ -25,6 +25,7 @@ LAST = "success last 5", "evaluation success"
         ("predictors-pendulum-midpoint", LAST),
         ("predictors-cartpole", TRAINED),
         ("predictors-cartpole-long", (*LAST, "total reward")),
+        ("predictors-cartpole-fine", (*LAST, "evaluation steps")),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

@@ -319,6 +319,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "predictors-pendulum-midpoint",
         "predictors-cartpole",
         "predictors-cartpole-long",
+        "predictors-cartpole-fine",
         "predictors-midpoint",
         "peers-plans",
         "locked-joint",
