@@ -16,16 +16,7 @@ from ...core.interface.scenario import SUCCESS
 from ...core.numerics import pd
 from ..errors import WIDTH
 from .results import Results
-from .statistics import (
-    LEVEL,
-    Array,
-    Estimate,
-    bootstrap,
-    holm,
-    paired_permutation,
-    power_lines,
-    rate,
-)
+from .statistics import LEVEL, Array, Estimate, bootstrap, paired_tests, power_lines, rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -139,12 +130,10 @@ def adjusted(
 
     p is adjusted over all of them by Holm's method.
     """
-    raw = [paired_permutation(own, base) for _, _, own, base, _ in compared]
+    tests = paired_tests([(own, base) for _, _, own, base, _ in compared])
     return tuple(
-        Difference(condition, measure, len(own), estimate, p, float(q), own - base)
-        for (condition, measure, own, base, estimate), p, q in zip(
-            compared, raw, holm(raw), strict=True
-        )
+        Difference(condition, measure, len(own), estimate, *ps, own - base)
+        for (condition, measure, own, base, estimate), ps in zip(compared, tests, strict=True)
     )
 
 

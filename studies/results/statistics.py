@@ -336,6 +336,12 @@ def holm(ps: ArrayLike) -> Array:
     return adjusted
 
 
+def paired_tests(pairs: Sequence[tuple[Array, Array]]) -> list[tuple[float, float]]:
+    """Return p of each `paired_permutation`, as it is and adjusted over all of them by `holm`."""
+    raw = [paired_permutation(own, base) for own, base in pairs]
+    return list(zip(raw, map(float, holm(raw)), strict=True))
+
+
 MANY = 1e6
 """From here on a number in a table has a power of ten."""
 
