@@ -76,11 +76,12 @@ def skip_signatures_of_c(app, what, name, thing, skip, options):
 
 
 def keep_intervals_whole(app, doctree):
-    """Let no estimate of a table be parted from its interval, and no interval be broken."""
+    """Keep an interval of a table in one line, and a count and its total."""
     for entry in doctree.findall(nodes.entry):
         for text in [*entry.findall(nodes.Text)]:
             if not isinstance(text.parent, nodes.literal):
-                whole = re.sub(r"(\S) \[(\S+), (\S+)\]", "\\1\u00a0[\\2,\u00a0\\3]", text)
+                whole = re.sub(r"\[(\S+), (\S+)\]", "[\\1,\u00a0\\2]", text)
+                whole = re.sub(r"^(\d+) of (\d+)$", "\\1\u00a0of\u00a0\\2", whole)
                 text.parent.replace(text, nodes.Text(whole))
 
 

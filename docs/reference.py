@@ -76,10 +76,10 @@ MODULES = {
         "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.teams", "api.running", "api.recovery", "api.tuning",
+        "api.study", "api.running", "api.alternatives", "api.recovery",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.contrasts", "results.published", "results.power", "catalogue.study", "cost.cost",
+        "results.contrasts", "results.published", "catalogue.study", "cost.cost",
         "claims.claims",
     )),
 }  # fmt: skip

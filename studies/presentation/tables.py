@@ -179,10 +179,14 @@ class SummaryTable:
         if not self.rows:
             return [NOTHING]
         lines = ["Means over seeds, and below them their 95 % intervals."]
-        if any(seeds < FEW for _, seeds, _ in self.rows):
-            few = f"Intervals of fewer than {FEW} seeds"
-            lines.append(f"{few}: Student's (short if skewed), rates Wilson's.")
-        return lines
+        return lines + [self.remark] * bool(self.remark)
+
+    @property
+    def remark(self) -> str:
+        """What must be said of intervals of few seeds, if there are any; else nothing."""
+        if all(seeds >= FEW for _, seeds, _ in self.rows):
+            return ""
+        return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:

@@ -4,8 +4,6 @@ The table has conditions against estimates. Conditions are compared with a refer
 on the worlds that both have met.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from textwrap import wrap
@@ -17,9 +15,8 @@ from numpy.typing import ArrayLike
 from ...core.interface.scenario import SUCCESS
 from ...core.numerics import pd
 from ..errors import WIDTH
-from .power import SMALLEST, deviation_of, power_text
 from .results import Results
-from .statistics import LEVEL, Array, Estimate, bootstrap, holm, paired_permutation, rate
+from .statistics import LEVEL, Array, Estimate, bootstrap, paired_tests, power_lines, rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,50 +47,6 @@ def evaluated(results: Results, condition: str) -> dict[str, Estimate]:
     others = results.other_evaluations(condition).items()
     phases = {EVALUATED: "evaluation", **{f"success, {name}": phase for name, phase in others}}
     return {title: rate(results.success(condition, phase)) for title, phase in phases.items()}
-
-
-UNKNOWN = "agent groups"
-"""What bodies are called if their number is not swept."""
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """Numbers of bodies.
-
-    Examples
-    --------
-    >>> joints = Sizes({"2": 2, "8": 8}, ("scenario.joints",))
-    >>> joints.shown(1), joints.shown(8), Sizes({"chain": 3, "star": 5}).shown(3)
-    ('1 joint', '8 joints', '3 agent groups')
-    >>> Sizes({"chain": 3, "star": 3}).shown(3)
-    ''
-    """
-
-    counts: Mapping[str, int]
-    """By condition."""
-    keys: Sequence[str] = ()
-    """Swept keys that are this number, whatever the scenario calls it."""
-
-    @classmethod
-    def of(cls, results: Results, conditions: Iterable[str]) -> Sizes:
-        """Return those of conditions whose trials have counted them."""
-        counts = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
-        swept = {c: results.columns.get(c, {}) for c in counts}
-        keys = dict.fromkeys(key for row in swept.values() for key in row)
-        own = (k for k in keys if all(str(swept[c].get(k)) == str(n) for c, n in counts.items()))
-        return cls(counts, tuple(own))
-
-    @property
-    def word(self) -> str:
-        """What bodies are called, in the plural."""
-        names = (k.removeprefix("scenario.") for k in self.keys if k.startswith("scenario."))
-        return next(names, UNKNOWN)
-
-    def shown(self, number: int) -> str:
-        """Return a number in words; nothing if it is the same everywhere, and nobody named it."""
-        if not self.keys and len(set(self.counts.values())) == 1:
-            return ""
-        return f"{number} {self.word.removesuffix('s') if number == 1 else self.word}"
 
 
 PHASES = {"training success": "training", EVALUATED: "evaluation"}
@@ -177,12 +130,10 @@ def adjusted(
 
     p is adjusted over all of them by Holm's method.
     """
-    raw = [paired_permutation(own, base) for _, _, own, base, _ in compared]
+    tests = paired_tests([(own, base) for _, _, own, base, _ in compared])
     return tuple(
-        Difference(condition, measure, len(own), estimate, p, float(q), own - base)
-        for (condition, measure, own, base, estimate), p, q in zip(
-            compared, raw, holm(raw), strict=True
-        )
+        Difference(condition, measure, len(own), estimate, *ps, own - base)
+        for (condition, measure, own, base, estimate), ps in zip(compared, tests, strict=True)
     )
 
 
@@ -334,16 +285,19 @@ def verdicts(
     if compared:
         counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
         lines.append(f"p: permutation of signs over seeds, adjusted over {counted} (Holm).")
-    return lines + power_lines(compared, of_rates=of_rates)
+    return lines + power_lines([d.sample for d in compared], of_rates=of_rates)
 
 
 def judged(
-    groups: Mapping[str, Iterable[Pair]], less: str
+    groups: Mapping[str, Iterable[Pair]], less: str, measure: str = ""
 ) -> tuple[dict[str, tuple[Difference, ...]], list[str]]:
-    """Return the `differences` of groups, and their `verdicts`; `less` is what the reference is."""
+    """Return the `differences` of groups, and their `verdicts`.
+
+    `less` is what the reference is, `measure` what is compared, unless the groups say so.
+    """
     compared = differences(groups)
-    heads = {f"{group}, less that of {less}": own for group, own in compared.items()}
-    return compared, verdicts(heads)
+    heads = {group: ": ".join(filter(None, (group, measure))) for group in groups}
+    return compared, verdicts({f"{heads[g]}, less that of {less}": compared[g] for g in groups})
 
 
 def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:
@@ -355,20 +309,3 @@ def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:
     """
     head = ["Identical in every episode, by every measure:"] if groups else []
     return head + [f"  {line}" for same in groups for line in wrap(" = ".join(same), WIDTH - 2)]
-
-
-def power_lines(differences: Sequence[Difference], *, of_rates: bool = True) -> list[str]:
-    """Return lines on which differences the comparisons could find, and how many seeds it takes.
-
-    Parameters
-    ----------
-    differences
-        All that were adjusted together, of one unit.
-    of_rates
-        Whether they are differences of success rates, of which `SMALLEST` is of interest.
-    """
-    if not differences:
-        return []
-    seeds = min(d.seeds for d in differences)
-    deviation = deviation_of([d.sample for d in differences], of_rates=of_rates)
-    return power_text(seeds, len(differences), deviation, SMALLEST if of_rates else None)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple, cast
 
@@ -31,7 +31,7 @@ from ...topologies import build
 from ...topologies.config import Topology, parse
 from ..errors import SpecError, refused, show
 from .presets import PRESETS
-from .tables import TomlTable, explain, label, nested, overlay, scalar
+from .tables import TomlTable, explain, flat, label, misplaced, nested, overlay, scalar
 
 SECTIONS = ("scenario", "topology", "learner")
 
@@ -192,7 +192,7 @@ def below(table: Mapping[str, Any]) -> tuple[type[Settings], TomlTable]:
 
 def grid(
     preset: str,
-    tables: Mapping[str, Any],
+    spec: Settings,
     sweep: Mapping[str, Sequence[Any]],
     overrides: Sequence[Override] = (),
     evaluations: Mapping[str, Mapping[str, Any]] | None = None,
@@ -204,8 +204,8 @@ def grid(
     ----------
     preset
         Name of the preset under conditions that name none.
-    tables
-        The spec's own layer, see `layer_of`.
+    spec
+        What has sections of its own, which lie over the preset, see `layer_of`.
     sweep
         Lists of values by dotted key.
     overrides
@@ -229,7 +229,7 @@ def grid(
     for override, point in _points(overrides, sweep):
         name = label(point, override.name if override else "") or preset
         where = f" (condition {name!r})" if point or override else ""
-        settings = resolve(preset, tables, point, where, override)
+        settings = resolve(preset, layer_of(spec), point, where, override)
         own = override.curriculum if override else None
         stages = tuple(
             Stage(s.name, s.episodes, _stage(settings, s.scenario, f" (stage {s.name!r}){where}"))
@@ -348,3 +348,30 @@ def section(name: str, value: object) -> TomlTable:
         raise SpecError(f"{name} = {show(value)}: must be {allowed}")
     with refused(name.removesuffix("topology")):
         return parse(value).model_dump()
+
+
+def expand(table: Mapping[str, Any], where: str) -> TomlTable:
+    """Return a spec's or an override's table with its sections and sweep spelled out."""
+    table = dict(table)
+    for name in SECTIONS:
+        if name in table:
+            table[name] = section(f"{where}{name}", table[name])
+    reach = below({} if where else table)
+    for name in ("sweep", "tune"):
+        if isinstance(table.get(name), Mapping):
+            table[name] = dict(_sweep(table[name], f"{where}{name}", reach))
+    return table
+
+
+def _sweep(
+    table: Mapping[str, Any], where: str, reach: tuple[type[Settings], TomlTable]
+) -> Iterable[tuple[str, Any]]:
+    for key, values in flat(table):
+        head, _, tail = key.partition(".")
+        if key not in ("preset", "agents", "topology") and not (head in SECTIONS and tail):
+            known = [*(f"{name}.*" for name in SECTIONS), "preset", "agents", "topology"]
+            hint = misplaced(key, *reach) or closest(key, known)
+            raise SpecError(f"{where}.{key}: unknown key; {hint}")
+        if not isinstance(values, list | tuple) or not values:
+            raise SpecError(f"{where}.{key} = {show(values)}: must be a list of at least one value")
+        yield key, values

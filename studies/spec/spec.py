@@ -6,8 +6,8 @@
 ``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
 conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
 conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams. ``[tune]``
-are the values that `nested_agents.studies.api.tuning` tries. Objects are put in the words that a
-TOML file would have for them.
+are the values that `nested_agents.studies.api.alternatives` tries. Objects are put in the words
+that a TOML file would have for them.
 """
 
 from __future__ import annotations
@@ -34,22 +34,11 @@ from ...core.plugins.sources import Sources, is_reference, named
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ...topologies.builders import listed
-from ..errors import SpecError, refused, show
-from .conditions import (
-    SECTIONS,
-    Condition,
-    Curriculum,
-    Length,
-    Name,
-    Override,
-    below,
-    grid,
-    layer_of,
-    section,
-)
+from ..errors import SpecError, refused
+from .conditions import Condition, Curriculum, Length, Name, Override, below, expand, grid, section
 from .presets import PRESETS
 from .studies import STUDIES
-from .tables import TomlTable, assignment, explain, flat, misplaced, overlay
+from .tables import TomlTable, assignment, explain, overlay
 
 REGISTRIES: dict[str, Registry] = {
     "study": STUDIES,
@@ -258,10 +247,10 @@ class Spec(Settings):
 
     @classmethod
     def _of(cls, table: Mapping[str, Any], sources: Sources) -> Spec:
-        table = _read(plain(table), "")
+        table = expand(plain(table), "")
         if isinstance(table.get("overrides"), list | tuple):
             table["overrides"] = tuple(
-                _read(override, f"overrides[{i}].") if isinstance(override, Mapping) else override
+                expand(override, f"overrides[{i}].") if isinstance(override, Mapping) else override
                 for i, override in enumerate(table["overrides"])
             )
         try:
@@ -274,7 +263,7 @@ class Spec(Settings):
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
         spec._conditions = grid(
-            spec.preset, layer_of(spec), spec.sweep, spec.overrides, spec.evaluations,
+            spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations,
             spec.curriculum,
         )  # fmt: skip
         spec._sources = sources.only(
@@ -394,30 +383,3 @@ def _changed(table: TomlTable, change: TomlTable) -> TomlTable:
 
 def _filled(table: TomlTable) -> TomlTable:
     return {key: value for key, value in table.items() if value not in ({}, None)}
-
-
-def _read(table: Mapping[str, Any], where: str) -> TomlTable:
-    """Return a spec's or an override's table with its sections and sweep spelled out."""
-    table = dict(table)
-    for name in SECTIONS:
-        if name in table:
-            table[name] = section(f"{where}{name}", table[name])
-    reach = below({} if where else table)
-    for name in ("sweep", "tune"):
-        if isinstance(table.get(name), Mapping):
-            table[name] = dict(_sweep(table[name], f"{where}{name}", reach))
-    return table
-
-
-def _sweep(
-    table: Mapping[str, Any], where: str, reach: tuple[type[Settings], TomlTable]
-) -> Iterable[tuple[str, Any]]:
-    for key, values in flat(table):
-        head, _, tail = key.partition(".")
-        if key not in ("preset", "agents", "topology") and not (head in SECTIONS and tail):
-            known = [*(f"{name}.*" for name in SECTIONS), "preset", "agents", "topology"]
-            hint = misplaced(key, *reach) or closest(key, known)
-            raise SpecError(f"{where}.{key}: unknown key; {hint}")
-        if not isinstance(values, list | tuple) or not values:
-            raise SpecError(f"{where}.{key} = {show(values)}: must be a list of at least one value")
-        yield key, values

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, isfinite
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,9 +20,11 @@ from ...core.plugins.sources import Sources, named
 from ..errors import SpecError
 from ..spec.conditions import ConditionSettings, Stage
 from ..spec.outline import lengths
-from ..spec.spec import Spec
 from ..store.database import AFTER, BEFORE, RESULTS_VERSION, Planned
 from ..store.durable import Recording
+
+if TYPE_CHECKING:
+    from ..spec.spec import Spec
 
 
 class EpisodeRow(NamedTuple):

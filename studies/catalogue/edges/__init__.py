@@ -16,8 +16,8 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.interface.scenario import groups_of
-from ...results.analysis import EVALUATED, Analysis, Figures, Sizes
-from ...results.results import Results
+from ...results.analysis import EVALUATED, Analysis, Figures
+from ...results.results import Results, Sizes
 from ...results.statistics import two_figures
 from ...spec.spec import Spec
 from ...spec.tables import label_but

@@ -11,8 +11,8 @@ edges are compared with none, as in the study `hierarchies`.
 
 from ....core.interface.scenario import groups_of
 from ...errors import SpecError
-from ...results.analysis import EVALUATED, Analysis, Figures, Sizes
-from ...results.results import Results
+from ...results.analysis import EVALUATED, Analysis, Figures
+from ...results.results import Results, Sizes
 from ...results.statistics import exactly, rate
 from ...spec.spec import Spec
 from ...spec.tables import label

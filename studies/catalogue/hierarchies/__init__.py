@@ -18,18 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import SpecError
-from ...results.analysis import (
-    EVALUATED,
-    NOTHING,
-    Analysis,
-    Figures,
-    Pair,
-    Sizes,
-    Summary,
-    differences,
-    verdicts,
-)
-from ...results.results import Results
+from ...results.analysis import EVALUATED, NOTHING, Analysis, Figures, Pair, Summary, judged
+from ...results.results import Results, Sizes
 from ...results.statistics import Array, Estimate, bootstrap, exactly, rate
 from ...spec.spec import Spec
 from ...spec.tables import label_but
@@ -124,11 +114,10 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
     for case, own in zip(cases, success, strict=True):
         if case.setting in bases and case.hierarchy != reference:
             pairs[case.setting].append((case.hierarchy, EVALUATED, own, bases[case.setting]))
-    compared = {setting: own for setting, own in differences(pairs).items() if own}
-    what = f"success, evaluation, less that of {reference}"
+    judgement, lines = judged(pairs, reference, "success, evaluation")
+    compared = {setting: own for setting, own in judgement.items() if own}
     notes = ["Rows: what else is swept, hierarchy.", ""] * any(case.value_of for case in cases)
-    notes += verdicts({": ".join(filter(None, (s, what))): own for s, own in compared.items()})
-    return Analysis(tuple(table), tuple(notes) if compared else (*notes, NOTHING), cases, compared)
+    return Analysis(tuple(table), (*notes, *(lines or [NOTHING])), cases, compared)
 
 
 def estimates(

@@ -20,8 +20,8 @@ from ....core.agents.loop import StepRecord
 from ....core.agents.team import of_fuzzy_agents
 from ....core.interface.scenario import groups_of
 from ....core.numerics import FloatArray, pd
-from ...results.analysis import EVALUATED, Analysis, Figures, Sizes, Summary, evaluated, shared
-from ...results.results import Results
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, shared
+from ...results.results import Results, Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
 from ...spec.spec import Spec
 from ...spec.tables import label_but

@@ -8,9 +8,9 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 import numpy as np
 
-from ...results.analysis import Analysis, Difference, Figures, Summary, adjusted, power_lines, ratio
+from ...results.analysis import Analysis, Difference, Figures, Summary, adjusted, ratio
 from ...results.results import Results
-from ...results.statistics import bootstrap, rate
+from ...results.statistics import bootstrap, power_lines, rate
 from ...spec.spec import Spec
 from ..study import check_evaluations
 from ..study import run_training as measure
@@ -52,7 +52,7 @@ def analyse(results: Results) -> Analysis:
             for d, e in ((d, d.estimate) for d in compared):
                 interval = f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
                 notes.append(f"  {d.condition}: {interval}, p = {d.p:.2g} (adjusted)")
-            notes += power_lines(compared)
+            notes += power_lines([d.sample for d in compared])
     return Analysis(tuple(table), tuple(notes), ratios)
 
 

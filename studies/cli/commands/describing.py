@@ -328,7 +328,6 @@ def show(
     SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json,
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
-    from ....topologies.drawing import draw
     from ....topologies.view import printed, view
 
     with refused():
@@ -339,6 +338,8 @@ def show(
             raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
         for number, shown in enumerate(views, 1):
             if plot is not None:
+                from ....topologies.drawing import draw  # matplotlib takes its time
+
                 several = f"-{number}" if len(views) > 1 else ""
                 path = plot.with_name(f"{plot.stem}{several}{plot.suffix}")
                 bodies, failing = shown.bodies, shown.failing

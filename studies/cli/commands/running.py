@@ -99,14 +99,14 @@ def tune(spec: Path, out: Path, changes: tuple[str, ...], **choice: Any) -> int:
     SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
     configurations are tried on two seeds, the better half on four, and so on.
     """
-    from ...api import tuning
+    from ...api import alternatives
     from ...spec.spec import Spec
 
-    tuned = tuning.tune(Spec.load(spec, changes, study=out), out, **choice)
+    tuned = alternatives.tune(Spec.load(spec, changes, study=out), out, **choice)
     print_table(tuned.study.table(tuned.columns))
     print("", *tuned.lines, "", sep="\n")
-    print(f"spec    {out / tuning.BEST_FILE}")
-    print(f"table   {out / tuning.TABLE_FILE}")
+    print(f"spec    {out / alternatives.BEST_FILE}")
+    print(f"table   {out / alternatives.TABLE_FILE}")
     return 0
 
 

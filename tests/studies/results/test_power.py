@@ -2,17 +2,20 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from nested_agents.studies.results.analysis import Difference, adjusted, power_lines, verdict_lines
-from nested_agents.studies.results.power import (
+from nested_agents.studies.results.analysis import Difference, adjusted, verdict_lines
+from nested_agents.studies.results.statistics import (
+    LEVEL,
+    bootstrap,
     detectable,
     deviation_of,
+    paired_permutation,
     power,
+    power_lines,
     power_of_t,
     power_text,
     seeds_for,
     seeds_needed,
 )
-from nested_agents.studies.results.statistics import LEVEL, bootstrap, paired_permutation
 
 
 def found_in_simulation(
@@ -87,7 +90,7 @@ def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
     assert [round(d.raw, 4) for d in found] == [0.0625, 0.0625]
     text = " ".join(" ".join(verdict_lines(found)).split())
     assert "+1.00 [+0.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
-    said = " ".join(line.strip() for line in power_lines(found))
+    said = " ".join(line.strip() for line in power_lines([d.sample for d in found]))
     assert "5 seeds and 2 comparisons cannot give an adjusted p below .05" in said
     assert "It needs at least 7 seeds; for a difference of .20, about" in said
 

@@ -1,32 +1,44 @@
-"""Tuning: which settings learn best, of some that are drawn at random, on seeds of their own.
+"""Alternatives tried: other settings of a spec, other hierarchies for teams that a study keeps.
 
-Configurations are conditions of one ordinary study, so what has run is kept and never run again. By
-successive halving (Jamieson and Talwalkar 2016) all of them are tried on two seeds, the better half
-on four, and so on: seeds are spent on what may be best. All meet the same worlds.
+Settings are drawn at random and tried on seeds of their own. They are conditions of one ordinary
+study, so what has run is kept and never run again. By successive halving (Jamieson and Talwalkar
+2016) all of them are tried on two seeds, the better half on four, and so on: seeds are spent on
+what may be best. All meet the same worlds.
 """
+
+from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
+from itertools import product
 from os import PathLike
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from ...core.interface.scenario import roles_of
 from ...core.numerics import pd
+from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
 from ..presentation.progress import Terminal, count
-from ..results.results import Results, read
-from ..spec.spec import Spec
-from ..spec.tables import TomlTable, dumps, nested, overlay
+from ..results.results import DONE, Results, read
+from ..spec.spec import Spec, plain
+from ..spec.tables import TomlTable, dumps, label, nested, overlay
 from ..store import durable
-from ..trials.session import check
-from ..trials.trial import Trial, trials_of
-from ..workers.runner import Backend, Observer
+from ..store.database import EVALUATION
+from ..store.durable import TEAM
+from ..store.store import Store
+from ..trials.keeping import check_teams, open_to_run
+from ..trials.session import Session, check
+from ..trials.trial import Trial, TrialResult, trials_of
+from ..workers.runner import Backend, Observer, Outcome, run_trials
+from ..workers.workers import start_workers
 from .running import run_study
-from .study import StudyResults, load
+from .study import Place, StudyResults, load
 
 FIRST_SEED = 10_000
 """The smallest seed to tune on: those below it are for reports."""
@@ -284,3 +296,108 @@ def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) 
     values = pd.DataFrame(list(points.values()), dtype=object)
     table = lines.astype({"seeds": int}).join(values).astype(object)
     return table.sort_values(list(means), ascending=False, ignore_index=True)
+
+
+def reevaluate(
+    study: StudyResults | Place,
+    topology: Sequence[Any] = (),
+    decision: Sequence[Any] = (),
+    *,
+    jobs: int | None = None,
+    observer: Observer | None = None,
+) -> pd.DataFrame:
+    """Evaluate the trained teams of a study under other topologies and ways to decide.
+
+    Every team acts with its weights on the worlds of its own evaluation, and begins with the random
+    numbers that it began that one with: under what it was trained with, it does the same again.
+    Files of yours that the study keeps are taken as it keeps them.
+
+    Parameters
+    ----------
+    study
+        What `load` or `run` returned, or a part of it by ``where``; or the directory of a study
+        that keeps its teams (``keep_teams = true``).
+    topology
+        Topologies, as a spec has them: text, or a table laid over that of training.
+    decision
+        Tables laid over ``learner.decision`` of training. If both are given, each of these is
+        evaluated with each topology.
+    jobs
+        Processes; None: one for every core.
+    observer
+        Is notified of the progress; None: it is shown on standard error.
+
+    Returns
+    -------
+    DataFrame
+        A row per episode as in `StudyResults.episodes`, with a column `entry`: which of the
+        topologies and decisions it is of.
+
+    Raises
+    ------
+    SpecError
+        If there are no such teams, or they cannot act so; one line.
+    """
+    study = study if isinstance(study, StudyResults) else load(study)
+    done = study.trials[study.trials["state"] == DONE]
+    identities = {(row.condition, row.seed): str(row.identity) for row in done.itertuples()}
+    directory = study.directory.resolve()
+    with Store.open(directory) as store:
+        check_teams(store, {*identities.values()})
+        table = {**store.spec(), "evaluations": _entries(topology, decision), "keep_teams": False}
+        sources = Sources(Path(), store.sources(), brought_by=str(directory))
+    spec = Spec.of(table, sources)
+    if spec.evaluation < 1:
+        raise SpecError("evaluation = 0: reevaluate needs a study of 1 or more")
+    measures = check(spec, {condition for condition, _ in identities})
+    trials = [t for t in trials_of(spec) if (t.condition, t.seed) in identities]
+    with (
+        TemporaryDirectory() as folder,
+        start_workers("loky", jobs, None, len(trials)) as workers,
+        open_to_run(Path(folder), spec, trials, measures) as store,
+    ):
+        evaluate = partial(_evaluate, directory, identities)
+        outcomes = _succeeding(run_trials(trials, store, evaluate, workers))
+        (observer or Terminal()).follow(outcomes, len(trials), 0)
+        frame = read(store).episodes
+    frame.insert(0, "entry", frame["phase"].str.removeprefix(EVALUATION))
+    meaning = "topology and decision by which the trained team acts"
+    frame.attrs["columns"]["entry"] = {"unit": "", "meaning": meaning}
+    return frame
+
+
+def _succeeding(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
+    """Yield outcomes until one is a failure."""
+    for outcome in outcomes:
+        if outcome.error is not None:
+            where = f"{outcome.trial.condition}, seed {outcome.trial.seed}"
+            raise SpecError(f"{where}: {outcome.error.splitlines()[-1]}")
+        yield outcome
+
+
+def _entries(topology: Sequence[Any], decision: Sequence[Any]) -> dict[str, dict[str, Any]]:
+    """Return the table of ``[evaluations]``, by what tells its entries apart."""
+    given = {"topology": topology, "decision": decision}
+    lists = {key: plain(values, key) for key, values in given.items() if values}
+    if not lists or not all(isinstance(values, list | tuple) for values in lists.values()):
+        asked = ", ".join(f"{key} = {show(values)}" for key, values in given.items())
+        raise SpecError(f"{asked}: must be lists, one of them not empty")
+    entries = {}
+    for values in product(*lists.values()):
+        point: dict[str, Any] = dict(zip(lists, values, strict=True))
+        name = label(point)
+        if "decision" in point:
+            point["learner"] = {"decision": point.pop("decision")}
+        entries[name] = point
+    return entries
+
+
+def _evaluate(
+    directory: Path, identities: Mapping[tuple[str, int], str], trial: Trial
+) -> TrialResult:
+    """Evaluate the kept team of a trial in its `evaluations`; imported by name in workers."""
+    with Store.open(directory) as store:
+        arrays = store.recording(identities[trial.condition, trial.seed], TEAM)
+    session = Session.restored(trial, arrays)
+    session.run_other_evaluations()
+    return session.result()
