@@ -112,8 +112,8 @@ class Perception:
         places |= angles
         self.variables = tuple(self._described(settings, places, cache(partial(met, self.numbers))))
         names = [variable.name for variable in self.variables]
-        for key, given in (("ranges", settings.ranges), ("success", settings.success)):
-            for name in given:
+        for key in ("ranges", "centres", "success"):
+            for name in getattr(settings, key):
                 if name not in names and (key, name) != ("success", "return"):
                     known = ", ".join(names)
                     raise ValueError(f"scenario.{key}.{name}: no state variable, known: {known}")
@@ -153,8 +153,9 @@ class Perception:
         """Yield the variables; of all that there are, those that change."""
         is_discrete = isinstance(next(iter(self._spaces.values())), Discrete)
         for name, rows in places.items():
+            own = settings.centres.get(name, ())
             if name in self._angles:
-                yield Variable(name, "rad", -np.pi, np.pi, periodic=True)
+                yield Variable(name, "rad", -np.pi, np.pi, periodic=True, centres=own)
                 continue
             bounds = self._bounds[:, : self._count]
             if name not in settings.ranges and not np.isfinite(bounds[:, rows]).all():
@@ -163,8 +164,8 @@ class Perception:
             low, high = map(float, settings.ranges.get(name, given))
             if low < high:
                 values = np.arange(low, high + 1.0).tolist() if is_discrete else []
-                centres = tuple(values) if len(values) <= MOST_CENTRES else ()
-                yield Variable(name, "1", low, high, centres=centres)
+                each = tuple(values) if len(values) <= MOST_CENTRES else ()
+                yield Variable(name, "1", low, high, centres=own or each)
             elif settings.variables:
                 raise ValueError(
                     f"scenario.variables.{name}: the environment gives it no bounds, and in "

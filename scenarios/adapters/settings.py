@@ -8,9 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from ...core.plugins.settings import ScenarioSettings, Settings
+from ...core.plugins.settings import ScenarioSettings, Settings, unwritten
 
 Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends))]
+Centres = Annotated[tuple[float, ...], Field(min_length=2)]
 Index = Annotated[int, Field(ge=0)]
 Entry = Index | str
 """Which number of an observation: counted from 0, or by name."""
@@ -80,6 +81,10 @@ class AdaptedSettings(ScenarioSettings):
     ranges: dict[str, Range] = Field(default_factory=dict)
     """Ranges of state variables; of others they are those of the environment, and where it has
     none, what random episodes meet."""
+    centres: Annotated[dict[str, Centres], unwritten({})] = Field(default_factory=dict)
+    """Centres of the membership functions of state variables, increasing: close together where
+    little decides. Of others they are spread evenly, and ``learner.rule_base.memberships`` spreads
+    all evenly."""
     rewards: Literal["joint", "own"] = "joint"
     """Whether all agents receive the mean reward, or those of each body its own."""
     success: Annotated[dict[str, float | Range], AfterValidator(_measurable)] = Field(

@@ -125,18 +125,16 @@ MOST_LINES = 8
 
 def draw(explained: Explanation) -> dict[str, Figure]:
     """Return all figures that there is something for, by name."""
+    drawn: dict[str, Figure] = {}
     with figures.styled():
-        return dict(_figures(explained))
-
-
-def _figures(explained: Explanation) -> Iterator[tuple[str, Figure]]:
-    if any(p.variance > 0 for p in explained.parts):
-        blocks = range(0, len(explained.agents), MOST_LINES)
-        for number, first in enumerate(blocks, 1):
-            name = "functions" if len(blocks) == 1 else f"functions-{number}"
-            yield name, _functions(explained, slice(first, first + MOST_LINES))
-    if not isinstance(explained.policy, str):
-        yield "policy", explained.policy.figure()
+        if any(p.variance > 0 for p in explained.parts):
+            blocks = range(0, len(explained.agents), MOST_LINES)
+            for number, first in enumerate(blocks, 1):
+                name = "functions" if len(blocks) == 1 else f"functions-{number}"
+                drawn[name] = _functions(explained, slice(first, first + MOST_LINES))
+        if not isinstance(explained.policy, str):
+            drawn["policy"] = explained.policy.figure()
+    return drawn
 
 
 def _functions(explained: Explanation, block: slice) -> Figure:

@@ -102,3 +102,11 @@ def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
     told = [f"| {' | '.join(row)} |" for row in rows if row]
     assert len(told) == 6
     assert [row for row in told if row not in page] == []
+
+
+@pytest.mark.slow
+def test_a_batch_of_mujoco_is_timed(run: Run) -> None:
+    pytest.importorskip("mujoco", reason="extra [mujoco]")
+    (line,) = run("benchmarks.rollout", "--ids", "Swimmer-v5", "--budget", "0.1").splitlines()
+    assert line.startswith("Swimmer-v5: 9 joint actions, copies ")
+    assert line.endswith("states off by 0")

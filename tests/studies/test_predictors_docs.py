@@ -20,6 +20,7 @@ LAST = "success last 5", "evaluation success"
         ("predictors-midpoint", TRAINED),
         ("predictors-teams", TRAINED),
         ("predictors-teams-three", LAST),
+        ("predictors-eight", TRAINED),
         ("predictors-pendulum", TRAINED),
         ("predictors-pendulum-midpoint", LAST),
         ("predictors-cartpole", TRAINED),

@@ -20,6 +20,7 @@ COLUMNS = ("success last 5", "evaluation success", "total reward")
         ("pendulum", COLUMNS),
         ("spread", ("evaluation steps", "total reward")),
         ("swimmer", COLUMNS),
+        ("multiwalker", ("evaluation steps", "total reward")),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

@@ -278,6 +278,8 @@ IMAGE = Box(0, 255, (8, 8, 3), np.uint8)
         (lambda: from_gymnasium(Carts(), variables={"a": (1, 1, 1)}), "one for each of 2"),
         (lambda: from_gymnasium(Carts(), ranges={"b": (0.0, 1.0)}), r"ranges\.b: no state variab"),
         (lambda: from_gymnasium(Carts(), ranges={"o0": (1.0, 0.0)}), "the lower end first"),
+        (lambda: from_gymnasium(Carts(), centres={"b": (0.0, 1.0)}), r"centres\.b: no state varia"),
+        (lambda: from_gymnasium(Carts(), centres={"o0": (1.0, 0.0)}), "centres .* must increase"),
         (lambda: from_gymnasium(Carts(), success={"b": (0.0, 1.0)}), r"success\.b: no state vari"),
         (lambda: from_gymnasium(Carts(), success={"o0": 3.0}), "o0 must be a range"),
         (lambda: from_gymnasium(Carts(), success={"return": (0, 1)}), "return must be a number"),
@@ -315,6 +317,16 @@ def test_tables_and_discrete_observations() -> None:
     assert names == ["height", "side0", "side1"]
     (variable,) = from_gymnasium(Odd(Discrete(3))).state_space.variables
     assert variable.centres == (0.0, 1.0, 2.0)
+
+
+def test_centres_of_membership_functions_are_given_by_name() -> None:
+    fine = (-1.0, -0.1, 0.0, 0.1, 1.0)
+    world = from_gymnasium(
+        Odd(Box(-1.0, 1.0, (2,))), angles={"turn": 1}, centres={"o0": fine, "turn": (-0.1, 0.1)}
+    )
+    assert [variable.centres for variable in world.state_space.variables] == [fine, (-0.1, 0.1)]
+    plain = GymnasiumSettings(id="CartPole-v1")
+    assert "centres" not in plain.model_dump()  # the identity of studies begun before is the same
 
 
 def test_check_and_run_say_it_in_one_line(

@@ -32,6 +32,7 @@ from nested_agents.studies.claims.claims import (
     print_claims,
     within,
 )
+from nested_agents.studies.cli.commands import committed
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import Results
@@ -252,7 +253,7 @@ def test_options_that_run_need_a_directory(capsys) -> None:
 
 
 def test_an_installed_package_says_where_the_results_are(tmp_path, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
+    monkeypatch.setattr(committed, "PUBLISHED", tmp_path / "published")
     assert main(["claims"]) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
@@ -289,6 +290,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "own-value",
         "crowds",
         "peers-arm",
+        "peers-arm-16",
         "peers-boxes",
         "transfer",
         "curriculum",
@@ -309,9 +311,11 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "predictors-arm",
         "predictors-teams",
         "predictors-teams-three",
+        "predictors-eight",
         "pendulum",
         "spread",
         "swimmer",
+        "multiwalker",
         "predictors-pendulum",
         "predictors-pendulum-midpoint",
         "predictors-cartpole",
@@ -393,8 +397,8 @@ def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch)
         episodes = 10 if study == "wheel-failure" else 1
         text = TINY.format(study=study, episodes=episodes, rest=rest)
         (tmp_path / "quick" / f"{study.replace('-', '_')}.toml").write_text(text)
-    monkeypatch.setattr(claims, "QUICK", tmp_path / "quick")
-    monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
+    monkeypatch.setattr(committed, "QUICK", tmp_path / "quick")
+    monkeypatch.setattr(committed, "PUBLISHED", tmp_path / "published")
     arguments = ["claims", "--quick", "--out", str(tmp_path / "out"), "--jobs", "1"]
     arguments += ["--format", "markdown"]
     assert main(arguments) == 0
