@@ -76,11 +76,11 @@ def skip_signatures_of_c(app, what, name, thing, skip, options):
 
 
 def keep_intervals_whole(app, doctree):
-    """Keep an estimate of a table and its interval in one line, and a count and its total."""
+    """Keep a short interval of a table in one line, and a count and its total."""
     for entry in doctree.findall(nodes.entry):
         for text in [*entry.findall(nodes.Text)]:
             if not isinstance(text.parent, nodes.literal):
-                whole = re.sub(r"(\S) \[(\S+), (\S+)\]", "\\1\u00a0[\\2,\u00a0\\3]", text)
+                whole = re.sub(r"\[([-.]?\S{1,3}), ([-.]?\S{1,3})\]", "[\\1,\u00a0\\2]", text)
                 whole = re.sub(r"^(\d+) of (\d+)$", "\\1\u00a0of\u00a0\\2", whole)
                 text.parent.replace(text, nodes.Text(whole))
 

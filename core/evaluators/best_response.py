@@ -50,7 +50,7 @@ class BestResponseSettings(EvaluatorSettings):
     kind: Literal["best-response"] = "best-response"
     sweeps: Annotated[int, Field(ge=0, le=100), unwritten(1)] = 1
     """How often every body improves the plan before anything is decided. Where all hear all that is
-    decided, the decisions are a sweep, too: with 0 they take half the time."""
+    decided, the decisions are a sweep, too: with 0 they take three quarters of the time."""
 
     def build(self, problem: DecisionProblem) -> Aggregation:
         """Return the evaluator of a team."""

@@ -47,8 +47,8 @@ def check_reward(reward: object, agents: Sequence[str]) -> None:
         If it is neither a finite number nor one for each of them.
     """
     array = np.asarray(reward)
-    is_number = array.dtype.kind in "biuf" and np.isfinite(array).all()
-    if not is_number or array.shape not in ((), (len(agents),)):
+    is_numeric = array.dtype.kind in "biuf" and array.shape in ((), (len(agents),))
+    if not (is_numeric and np.isfinite(array).all()):
         raise ValueError(
             f"reward = {reward!r:.60}, allowed: a finite number, or one for each of "
             f"{len(agents)} agents"

@@ -137,6 +137,8 @@ TRIED = 1.0
 """Processor time [s] for which episodes of training are tried of every condition."""
 EPISODES = 2
 """That are tried at least, of training and of every evaluation."""
+WHOLE = 10_000
+"""Agents times steps up to which an episode is tried: of more agents its first steps only."""
 QUICK, LONG = 0.25, 2.0
 """Steps of the other episodes, from and to, as a fraction of the mean and of the longest tried
 last."""
@@ -289,7 +291,9 @@ def try_out(trial: Trial) -> Tried:
     alone = replace(trial, seed=SEED, curriculum=(), evaluation=min(trial.evaluation, EPISODES))
     brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
     loading, building = _seconds(partial(run_trial, brief)), _seconds(partial(Session, alone))
-    session = Session(alone)
+    most, cut = trial.evaluation_steps or trial.steps, max(2, WHOLE // len(trial.world().agents))
+    first = replace(alone, steps=min(trial.steps, cut), evaluation_steps=min(most, cut))
+    session = Session(first)
     held, taken = _bytes(session), list[float]()
     while (k := len(taken)) < min(EPISODES, trial.episodes) or (
         k < trial.episodes and sum(taken) < TRIED
@@ -299,14 +303,20 @@ def try_out(trial: Trial) -> Tried:
     lengths: dict[str, list[float]] = {}
     for row in session.result().rows:
         lengths.setdefault(row.phase, []).append(float(row.steps))
-    steps, most = np.array(lengths.pop("training")), trial.evaluation_steps or trial.steps
+    steps = np.array(lengths.pop("training"))
     acting = own / sum(lengths.get("evaluation", [1.0]))
     evaluated = (own + others) / max(sum(map(sum, lengths.values())), 1.0)
-    evaluating = evaluated * sum((_others(each, most) for each in lengths.values()), np.zeros(2))
+    evaluating = evaluated * sum(
+        (_others(each, most, cut) for each in lengths.values()), np.zeros(2)
+    )
     episodes = np.array([*(stage.episodes for stage in trial.curriculum), trial.episodes])
-    left = episodes.sum() - k
-    mean = (steps.sum() + left * _others(steps[k // 2 :], trial.steps)) / episodes.sum()
-    learning = learned(steps, np.array(taken) - acting * steps, mean, episodes)
+    whole = steps[steps < cut]
+    left = episodes.sum() - len(whole)
+    mean = (whole.sum() + left * _others(steps[k // 2 :], trial.steps, cut)) / episodes.sum()
+    beside = np.array(taken) - acting * steps
+    learning = learned(steps, beside, mean, episodes)
+    if not len(whole):  # beginnings do not tell how learning grows
+        learning = mean * episodes.sum() * max(beside.sum(), 0.0) / steps.sum()
     seconds = building + acting * mean * episodes.sum() + learning
     kept = mean[1] * episodes.sum() / steps.sum()
     memory = held + kept * max(_bytes(session) - held, 0.0)
@@ -337,9 +347,12 @@ def learned(
     return total
 
 
-def _others(tried: Sequence[float] | FloatArray, most: int) -> FloatArray:
-    """Return the mean steps of episodes that were not tried, from and to."""
-    return np.array([QUICK * np.mean(tried), min(most, LONG * max(tried))])
+def _others(tried: Sequence[float] | FloatArray, most: int, cut: int) -> FloatArray:
+    """Return the mean steps of episodes that were not tried to their ends, from and to."""
+    longest = max(tried)
+    if longest >= cut:
+        return np.array([np.mean(tried), most])
+    return np.array([QUICK * np.mean(tried), min(most, LONG * longest)])
 
 
 def _used() -> float:

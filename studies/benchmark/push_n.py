@@ -92,11 +92,10 @@ def load_entry(path: Path) -> Entry:
         If it cannot be read or breaks a rule; one line.
     """
     try:
-        entry = tuples(json.loads(path.read_text(encoding="utf-8")))
-        if not isinstance(entry, dict):
-            raise TypeError("must be one table with the keys of an entry")
-        return Entry(**entry)
-    except (ValueError, TypeError, RecursionError) as error:  # of JSON, or of a rule
+        return Entry(**tuples(json.loads(path.read_text(encoding="utf-8"))))
+    except TypeError:  # it is a list
+        raise SpecError(f"{path}: must be one table with the keys of an entry") from None
+    except (ValueError, RecursionError) as error:  # of JSON, or of a rule
         raise SpecError(f"{path}: {error}") from None
 
 

@@ -319,17 +319,9 @@ def embedded(svg: str, prefix: str) -> str:
 
 
 PACKAGES = (
-    "nested-agents",
-    "Box2D",
-    "joblib",
-    "matplotlib",
-    "networkx",
-    "numba",
-    "numpy",
-    "pydantic",
-    "scipy",
-    "shapely",
-)
+    "nested-agents", "Box2D", "joblib", "matplotlib", "networkx", "numba", "numpy", "pydantic",
+    "scipy", "shapely",
+)  # fmt: skip
 """The packages that results and figures come from."""
 
 

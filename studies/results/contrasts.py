@@ -138,7 +138,7 @@ def contrasts(
     return Contrasts(shown_as, phase, tuple(made), results.identical)
 
 
-_Members = list[tuple[str, str]]
+_Pairs = list[tuple[str, str]]
 """Names of the conditions of a group, and their labels; the reference first."""
 
 
@@ -167,7 +167,7 @@ def _groups(
     columns: Mapping[str, Mapping[str, object]],
     by: str | None,
     reference: str | None,
-) -> list[tuple[str, _Members]]:
+) -> list[tuple[str, _Pairs]]:
     if by is None:
         members = [(c, c) for c in conditions]
         known = {c: aliases(c, columns[c]) for c in conditions}
@@ -176,7 +176,7 @@ def _groups(
     key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
     if key is None:
         raise SpecError(f"by = {by!r}: {closest(by, keys)}")
-    groups: dict[str, _Members] = {}
+    groups: dict[str, _Pairs] = {}
     for c in conditions:
         level = _level(key, columns[c][key])
         rest = ", ".join(_level(k, v) for k, v in columns[c].items() if k != key and v != "")
@@ -194,9 +194,7 @@ def _level(key: str, value: object) -> str:
     return value if isinstance(value, str) else f"{key.rpartition('.')[2]}={label({key: value})}"
 
 
-def _led(
-    members: _Members, reference: str | None, known: Mapping[str, Collection[str]]
-) -> _Members:
+def _led(members: _Pairs, reference: str | None, known: Mapping[str, Collection[str]]) -> _Pairs:
     """Return the members of a group, the reference first, by a name or another `known` one."""
     if reference is None:
         return members

@@ -23,6 +23,7 @@ LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
     ("name", "columns"),
     [
         ("peers-arm", ARM),
+        ("peers-arm-16", ARM),
         ("peers-boxes", COLUMNS),
         ("fit-games-ppo", EDGES),
         ("fit-ring-ppo", EDGES),

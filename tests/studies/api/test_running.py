@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import nested_agents as na
+from nested_agents.core.agents.team import Team
+from nested_agents.studies.api import running
 from nested_agents.studies.api.running import learned, try_out
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.trials.trial import trials_of
@@ -52,6 +54,22 @@ def test_what_a_condition_takes_is_tried_out() -> None:
     tried = try_out(trials_of(SPEC)[0])
     assert 0.0 < tried.seconds[0] <= tried.seconds[1] < 60.0
     assert tried.memory > 0.0
+
+
+def test_of_many_agents_first_steps_are_tried(monkeypatch) -> None:
+    monkeypatch.setattr(running, "WHOLE", 8)
+    acted: list[int] = []
+    act = Team.act
+    monkeypatch.setattr(
+        Team, "act", lambda team, *args, **kwargs: acted.append(1) or act(team, *args, **kwargs)
+    )
+    try_out(trials_of(SPEC)[0])
+    assert len(acted) == 2 + 2 * 2 + 4 * 4 + 2 * 4, "brief, then four steps of two carts' episodes"
+
+
+def test_episodes_that_were_not_tried_last_from_a_quarter_to_twice_as_long() -> None:
+    assert running._others([4.0, 8.0], 20, 100).tolist() == [1.5, 16.0]
+    assert running._others([4.0, 4.0], 20, 4).tolist() == [4.0, 20.0], "not tried to their ends"
 
 
 @pytest.mark.parametrize(

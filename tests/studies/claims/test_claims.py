@@ -290,6 +290,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "own-value",
         "crowds",
         "peers-arm",
+        "peers-arm-16",
         "peers-boxes",
         "transfer",
         "curriculum",
