@@ -18,6 +18,7 @@ COLUMNS = ("success last 5", "evaluation success", "total reward")
     ("name", "columns"),
     [
         ("pendulum", COLUMNS),
+        ("cartpole", ("success last 5", "evaluation success", "evaluation steps")),
         ("spread", ("evaluation steps", "total reward")),
         ("swimmer", COLUMNS),
         ("multiwalker", ("evaluation steps", "total reward")),

@@ -313,6 +313,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "predictors-teams-three",
         "predictors-eight",
         "pendulum",
+        "cartpole",
         "spread",
         "swimmer",
         "multiwalker",
