@@ -16,6 +16,7 @@ LAST = "success last 5", "evaluation success"
     ("name", "columns"),
     [
         ("predictors", TRAINED),
+        ("predictors-controls", LAST),
         ("predictors-arm", TRAINED),
         ("predictors-midpoint", TRAINED),
         ("predictors-teams", TRAINED),

@@ -309,6 +309,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "peers-predictors",
         "predictors",
         "predictors-arm",
+        "predictors-controls",
         "predictors-teams",
         "predictors-teams-three",
         "predictors-eight",
