@@ -249,7 +249,7 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
     lines
         Its lines.
     columns
-        Titles of the estimates that it has; all of them if none are named.
+        Titles of the estimates that it has, with or without units; all if none are named.
 
     Raises
     ------
@@ -257,6 +257,10 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
         If there are no estimates of a title.
     """
     titles = tuple(dict.fromkeys(title for line in lines for title in line.estimates))
+    without_units = {title.partition(" [")[0]: title for title in titles}
+    columns = [
+        column if column in titles else without_units.get(column, column) for column in columns
+    ]
     for column in columns:
         if column not in titles:
             has = f"it has {', '.join(map(repr, titles)) or 'none'}"

@@ -50,6 +50,10 @@ def test_markdown_has_chosen_columns_and_keeps_bars_out_of_cells():
     ]
 
 
+def test_a_heading_needs_no_unit():
+    assert tabulate(LINES, ["x_1", "success"]).titles == ("x_1 [m]", "success")
+
+
 def test_cells_are_as_in_the_terminal():
     table = tabulate(LINES)
     assert table.titles == ("success", "x_1 [m]")
