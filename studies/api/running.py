@@ -88,7 +88,7 @@ def run_study(
         If it is interrupted. What has finished is kept; the same call continues.
     """
     observer = observer or Observer()
-    measures, trials = examine(spec), chosen or trials_of(spec)
+    measures, trials = examine(spec, may_fail=True), chosen or trials_of(spec)
     with (
         start_workers(backend, jobs, address, len(trials)) as workers,
         open_to_run(directory, spec, trials, measures, accept_code=accept_code) as store,
@@ -116,8 +116,8 @@ def run_study(
         yield store
 
 
-def examine(spec: Spec) -> tuple[Measure, ...]:
-    """Return what a study measures of its episodes, if it can be run.
+def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
+    """Return what a study measures of its episodes, if it can be run; see `check`.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def examine(spec: Spec) -> tuple[Measure, ...]:
         If a condition cannot be built, or the study has not what it needs; before anything is run
         or written.
     """
-    measures = check(spec)
+    measures = check(spec, may_fail=may_fail)
     with spec.sources.active():
         getattr(load_study(spec.study), "check", lambda spec: None)(spec)
     return measures

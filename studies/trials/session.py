@@ -152,7 +152,9 @@ def _naming(key: str) -> Iterator[None]:
         raise ValueError(f"{key}: {error}") from error
 
 
-def check(spec: Spec, chosen: Container[str] | None = None) -> tuple[Measure, ...]:
+def check(
+    spec: Spec, chosen: Container[str] | None = None, *, may_fail: bool = False
+) -> tuple[Measure, ...]:
     """Return what a study measures of its episodes, if all its conditions can be built.
 
     Parameters
@@ -161,12 +163,15 @@ def check(spec: Spec, chosen: Container[str] | None = None) -> tuple[Measure, ..
         The study.
     chosen
         Labels of the conditions that matter; None: all.
+    may_fail
+        Whether code of the user's may fail in some conditions: their trials will fail, others run.
 
     Raises
     ------
     SpecError
         If one cannot be, or their measures do not fit together; before anything is run or written.
     """
+    failing: SpecError | None = None
     conditions = [c for c in spec.conditions() if chosen is None or c.label in chosen]
     measures: list[Sequence[Measure]] = []
     with spec.sources.active():
@@ -177,14 +182,19 @@ def check(spec: Spec, chosen: Container[str] | None = None) -> tuple[Measure, ..
                 if spec.keep_teams:
                     _check_saved(condition.settings)
             except ValueError as error:
-                raise SpecError(f"{error}{where}") from None
+                refusal = SpecError(f"{error}{where}")
+                if isinstance(error.__cause__, ValueError | None):
+                    raise refusal from None
+                failing = failing or refusal
             except KeyboardInterrupt:
                 raise
             except BaseException as error:
                 if isinstance(error, Exception) and not place(error):
                     raise  # no code of the user's
                 problem = f"the scenario or topology raises {format_error(error)}{place(error)}"
-                raise SpecError(f"{problem}{where}") from None
+                failing = failing or SpecError(f"{problem}{where}")
+    if failing and not (measures and may_fail):
+        raise failing
     return joined(measures, conditions[0].columns)
 
 
