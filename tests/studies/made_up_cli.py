@@ -10,5 +10,5 @@ from nested_agents.studies.cli.main import main
 
 if __name__ == "__main__":
     learning_curve.measure = getattr(made_up, sys.argv[1])
-    studies_run.check = lambda spec: made_up.MEASURES
+    studies_run.check = lambda spec, **_: made_up.MEASURES
     sys.exit(main(sys.argv[2:]))

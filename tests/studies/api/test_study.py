@@ -17,7 +17,7 @@ def places(tmp_path_factory: pytest.TempPathFactory):
     here = [tmp_path_factory.mktemp("studies") / name for name in ("one", "two")]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(learning_curve, "measure", made_up.measure)
-        patch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
+        patch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
         na.run(TABLE, here[0], jobs=1, progress=False)
         na.run(na.Spec(**{**TABLE, "seeds": [0, 1, 2, 3]}), str(here[1]), jobs=1, progress=False)
     return here
@@ -122,7 +122,7 @@ def test_what_holds_no_study_is_refused_in_one_line(tmp_path) -> None:
 
 def test_failed_trials_are_warned_of(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(learning_curve, "measure", made_up.failing)
-    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
+    monkeypatch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
     with pytest.warns(UserWarning, match=r"1 trial failed: study\.failed says why"):
         study = na.run(TABLE, tmp_path / "out", jobs=1, progress=False)
     ((condition, seed, error),) = study.failed

@@ -268,6 +268,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "fit-landmarks",
         "fit-arms",
         "fit-three-actions",
+        "fit-boxes",
         "fit-games",
         "fit-games-ppo",
         "fit-ring-ppo",

@@ -188,7 +188,7 @@ def test_the_demo_draws_a_replay_of_the_first_and_of_the_last_episode(tmp_path, 
         sys.modules, "nested_agents.scenarios.box_pushing.pictures.rendering", rendering
     )
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
+    monkeypatch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
     assert main(["demo", "--out", str(tmp_path)]) == 0
     assert len(drawn) == 2
     assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [

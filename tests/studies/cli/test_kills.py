@@ -21,12 +21,12 @@ from nested_agents.studies.workers.runner import save
 CLAIMS = """
 import sys
 import made_up, made_up_cli
-from nested_agents.studies.api import run_study as run
+from nested_agents.studies.api import running
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.claims import claims
 from nested_agents.studies.cli.main import main
 learning_curve.measure = made_up.slow
-run.check = lambda spec: made_up.MEASURES
+running.check = lambda spec, **_: made_up.MEASURES
 claims.studies_of = lambda paper: ("learning-curve",)
 sys.exit(main(sys.argv[1:]))
 """

@@ -26,7 +26,7 @@ def built_in_models() -> set[type[Settings]]:
         model
         for model in found
         if model.__module__.startswith("nested_agents.")
-        and not model.__module__.endswith((".scripted", ".actuators", ".push_n"))
+        and not model.__module__.endswith((".scripted", ".wrappers", ".push_n"))
         and set(model.model_fields) - {"kind"}
     }
 

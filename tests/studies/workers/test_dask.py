@@ -129,7 +129,7 @@ def run(tmp_path, *arguments):
 @pytest.fixture
 def made_up_results(monkeypatch):
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
+    monkeypatch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
 
 
 @pytest.mark.usefixtures("made_up_results")
