@@ -81,10 +81,8 @@ def draw(analysis: Analysis) -> Figures:
 
     names = {case.hierarchy for case in analysis.cases}
     figures = _draw_parted(analysis) if {*sum(PARTED, ())} <= names else {}
-    figure = draw_forest(analysis.differences, f"success less that {TRAINED}")
-    if figure is not None:
-        figures["differences"] = figure
-    return figures
+    unit = f"success less that {TRAINED}"
+    return figures | draw_forest("differences", analysis.differences, unit)
 
 
 def _draw_parted(analysis: Analysis) -> Figures:
