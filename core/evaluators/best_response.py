@@ -283,8 +283,7 @@ class BestResponse(Aggregation):
         if free not in self._starts:
             self._starts[free] = self._starting(free)
         tried = _with(deliberation.joint_action, [(free, self._starts[free])])
-        plan: IntArray = tried[greatest(self.worth(deliberation, tried), deliberation.rng)]
-        return plan
+        return tried[greatest(self.worth(deliberation, tried), deliberation.rng)]
 
     def _starting(self, free: tuple[int, ...]) -> IntArray:
         """Return actions ``(m, k)`` of the k free agents, in the order of decision."""
