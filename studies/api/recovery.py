@@ -12,7 +12,7 @@ fault. A seed that does not recover counts with all the episodes that were run: 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -62,8 +62,7 @@ class RandomPolicy:
         return self.space.sample()
 
 
-@dataclass(frozen=True)
-class FaultCourse:
+class FaultCourse(NamedTuple):
     """The returns of one policy under one schedule of faults."""
 
     name: str
@@ -100,17 +99,13 @@ class FaultCourse:
             "end": self.faulty[:, -BLOCK:],
             "end, no fault": self.healthy[:, -BLOCK:],
         }
-        levels = {title: bootstrap(block.mean(axis=1)) for title, block in blocks.items()}
-        return Summary(
-            self.name,
-            len(self.faulty),
-            {
-                **levels,
-                "cumulative loss": bootstrap(self.shortfall.sum(axis=1)),
-                "recovered": rate(recovered[:, None]),
-                "recovery time": bootstrap(episodes, bounds=NOT_NEGATIVE),
-            },
-        )
+        estimates = {title: bootstrap(block.mean(axis=1)) for title, block in blocks.items()}
+        estimates |= {
+            "cumulative loss": bootstrap(self.shortfall.sum(axis=1)),
+            "recovered": rate(recovered[:, None]),
+            "recovery time": bootstrap(episodes, bounds=NOT_NEGATIVE),
+        }
+        return Summary(self.name, len(self.faulty), estimates)
 
 
 @dataclass(frozen=True)

@@ -261,8 +261,7 @@ class StudyResults:
             If there is no such study.
         """
         load_study(name)
-        outline = replace(self.outline, study=name)
-        return replace(self, outline=outline, _is_whole=False)
+        return replace(self, outline=self.outline._replace(study=name), _is_whole=False)
 
     @property
     def figures(self) -> dict[str, Figure]:
@@ -492,15 +491,13 @@ def load(*places: Place) -> StudyResults:
         [(n, s.results) for n, s in zip(names, loaded, strict=True)],
         [study._settings for study in loaded],
     )
-    settings = {
-        new[c]: own for s, new in zip(loaded, labels, strict=True) for c, own in s._settings.items()
-    }
-    failed = [
-        (new[c], *rest) for s, new in zip(loaded, labels, strict=True) for c, *rest in s.failed
-    ]
-    outline = replace(loaded[0].outline, columns=results.columns)
+    settings, failed = dict[str, Any](), []
+    for study, new in zip(loaded, labels, strict=True):
+        settings |= {new[condition]: own for condition, own in study._settings.items()}
+        failed += [(new[condition], seed, error) for condition, seed, error in study.failed]
+    outline = loaded[0].outline._replace(columns=results.columns)
     return StudyResults(
-        outline, results, tuple(failed), tuple(r for s in loaded for r in s.remarks),  # type: ignore[arg-type]
+        outline, results, tuple(failed), tuple(r for s in loaded for r in s.remarks),
         loaded[0]._sources, settings, tuple(d for s in loaded for d in s._directories),
         _is_whole=False,
     )  # fmt: skip

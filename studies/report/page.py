@@ -16,7 +16,6 @@ import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from pkgutil import resolve_name
@@ -62,8 +61,7 @@ class Film(NamedTuple):
     """A GIF in base64."""
 
 
-@dataclass(frozen=True)
-class Replays:
+class Replays(NamedTuple):
     """What the page plays."""
 
     scenes: list[dict[str, Any]]
@@ -268,8 +266,7 @@ def _own(name: str) -> Markup:
     return Markup((FOLDER / name).read_text(encoding="utf-8"))
 
 
-@dataclass(frozen=True)
-class Picture:
+class Picture(NamedTuple):
     """A figure."""
 
     name: str

@@ -76,7 +76,8 @@ class Difference:
         """Value, interval, p as it is and adjusted, as text."""
         e = self.estimate
         interval = f"{_signed(e.value)} [{_signed(e.low)}, {_signed(e.high)}]"
-        return f"{interval}, {_p(self.p)} ({_p(self.raw, '')} unadjusted)"
+        raw, adjusted = _compared(self.raw), _compared(self.p)
+        return f"{interval}, p {adjusted} ({raw.removeprefix('= ')} unadjusted)"
 
 
 def _signed(value: ArrayLike) -> str:
@@ -85,10 +86,8 @@ def _signed(value: ArrayLike) -> str:
     return "0.00" if text in ("+0.00", "-0.00") else text
 
 
-def _p(value: float, name: str = "p ") -> str:
-    if value < 0.001:
-        return f"{name}< .001"
-    return f"{name}{'= ' if name else ''}{value:.2g}"
+def _compared(p: float) -> str:
+    return "< .001" if p < 0.001 else f"= {p:.2g}"
 
 
 BySeed: TypeAlias = "pd.Series | pd.DataFrame"

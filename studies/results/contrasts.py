@@ -9,6 +9,7 @@ where all runs of a task ended alike, they have no width there.
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,8 +45,7 @@ class Group:
     """Values of each episode of training ``(n_seeds, n_episodes)``, if it is measured there."""
 
 
-@dataclass(frozen=True)
-class Contrasts:
+class Contrasts(NamedTuple):
     """Conditions against references by one measure; p is adjusted over all of them."""
 
     measure: Measure
@@ -254,10 +254,8 @@ def probability_of_improvement(tasks: Tasks) -> Array:
     return np.mean(each, axis=0)
 
 
-def stratified_bootstrap(
-    tasks: Tasks, statistic: Callable[[Tasks], Array], level: float = 0.95, seed: int = 0
-) -> Estimate:
-    """Return a statistic of tasks with its percentile interval, runs resampled within each task.
+def stratified_bootstrap(tasks: Tasks, statistic: Callable[[Tasks], Array]) -> Estimate:
+    """Return a statistic of tasks with its 95 % percentiles, runs resampled within each task.
 
     Parameters
     ----------
@@ -265,18 +263,15 @@ def stratified_bootstrap(
         Scores ``(n_runs,)`` of each task.
     statistic
         Of tasks; resamples are along the first axis of each.
-    level, seed
-        Coverage of the interval, and the seed of the resamples.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     drawn = [own[rng.integers(len(own), size=(RESAMPLES, len(own)))] for own in tasks]
-    tail = 0.5 - level / 2.0
+    tail = 0.5 - 0.95 / 2.0
     low, high = np.quantile(statistic(drawn), [tail, 1.0 - tail], axis=0)
     return Estimate(statistic(tasks), low, high)
 
 
-@dataclass(frozen=True)
-class Aggregates:
+class Aggregates(NamedTuple):
     """Conditions by the statistics of the field, aggregated over tasks."""
 
     title: str

@@ -146,23 +146,19 @@ Packed = list[Any] | dict[str, Any]
 
 
 def _packed(values: np.ndarray, *, is_rate: bool) -> Packed:
-    if is_rate and len(values) < FEW:
-        return ["".join("1" if v else "0" for v in row) for row in values]
-    if is_rate:
-        flags = "".join("1" if v else "0" for v in values.flat)
-        return {"flags": flags, "shape": list(values.shape)}
-    rounded = np.round(values, DECIMALS)
-    return _constant(rounded) or rounded.tolist()
+    if not is_rate:
+        rounded = np.round(values, DECIMALS)
+        return _constant(rounded) or rounded.tolist()
+    rows = ["".join("1" if v else "0" for v in row) for row in values]
+    return rows if len(rows) < FEW else {"flags": "".join(rows), "shape": list(values.shape)}
 
 
 def _unpacked(packed: Packed, *, is_rate: bool) -> np.ndarray:
-    if isinstance(packed, dict):
-        if is_rate:
-            return np.array(list(map(int, packed["flags"]))).reshape(packed["shape"])
-        return np.full(packed["shape"], packed["all"])
+    if not isinstance(packed, dict):
+        return np.array([list(map(int, row)) for row in packed] if is_rate else packed)
     if is_rate:
-        return np.array([[int(character) for character in row] for row in packed])
-    return np.array(packed)
+        return np.array(list(map(int, packed["flags"]))).reshape(packed["shape"])
+    return np.full(packed["shape"], packed["all"])
 
 
 def _constant(values: np.ndarray) -> dict[str, Any] | None:
@@ -209,11 +205,10 @@ def dumps_marl_eval(results: Results, environments: Mapping[str, str], task: str
 
 
 def _runs(results: Results, condition: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    names = [*(measure.name for measure in results.measures), "return"]
     measured = {
         phase: {
             name: results.values(condition, name, phase).astype(float)
-            for name in ("steps", *names)
+            for name in ("steps", *(measure.name for measure in results.measures), "return")
             if results.has(condition, phase, name)
         }
         for phase in ("training", "evaluation")
@@ -258,8 +253,7 @@ def _from_marl_eval(table: Mapping[str, Any]) -> Results:
         raise ValueError("no run has measured anything")
     others = (Measure(n, n, better="higher") for n in names if n not in KNOWN)
     measures = (*([SUCCESS] if SUCCESS.name in names else []), *others)
-    nothing: dict[str, dict[str, Array]] = {label: {} for label in columns}
-    return from_arrays(phases, seeds, nothing, nothing, columns, measures)
+    return from_arrays(phases, seeds, {}, {}, columns, measures)
 
 
 def _arrays(runs: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Array]]:

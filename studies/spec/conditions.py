@@ -14,7 +14,6 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple, cast
 
 from pydantic import AfterValidator, Field, ValidationError
@@ -148,8 +147,7 @@ class Override(Settings):
     """Stages in place of the spec's; none: the spec's."""
 
 
-@dataclass(frozen=True)
-class Condition:
+class Condition(NamedTuple):
     """What one part of a study's trials have in common."""
 
     label: str

@@ -10,9 +10,8 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from annotated_types import MinLen
 from pydantic.fields import FieldInfo
@@ -33,8 +32,7 @@ SIGNS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
 """By the attribute of a field's metadata that holds the bound."""
 
 
-@dataclass(frozen=True)
-class Key:
+class Key(NamedTuple):
     """A key of a table."""
 
     name: str
@@ -59,8 +57,7 @@ class Key:
         return f"{self.default} (preset default: {self.preset})" if self.preset else self.default
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """A table of a spec, or the part of it that things of one kind have."""
 
     name: str
@@ -119,7 +116,7 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
             if not prefix or f"{name}.".startswith(f"{prefix}.")
         )
         if kept:
-            below.append(replace(table, keys=kept))
+            below.append(table._replace(keys=kept))
     return tuple(below)
 
 

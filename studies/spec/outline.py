@@ -11,10 +11,9 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...core.plugins.sources import Sources, meaning
 from ..errors import SpecError, show
@@ -44,8 +43,7 @@ def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
     return f"{' or '.join(sums)} episode{'' if list(sums) == ['1'] else 's'}"
 
 
-@dataclass(frozen=True)
-class StudyOutline:
+class StudyOutline(NamedTuple):
     """A spec as plain words and numbers."""
 
     study: str

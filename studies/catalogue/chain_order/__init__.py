@@ -11,7 +11,8 @@ them, by evaluation success alone, and a verdict says whether they are equal but
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,8 +55,7 @@ def equivalence(group: Group) -> str:
     return f"{group.setting}, {len(lows) + 1} orders, within {MARGIN:g}: {verdict} ({ends})"
 
 
-@dataclass(frozen=True)
-class OrderTest:
+class OrderTest(NamedTuple):
     """Whether the orders differ at all by one measure."""
 
     title: str

@@ -13,7 +13,7 @@ hierarchy that succeeds only where it is easy looks quick.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,8 +47,7 @@ def check(spec: Spec) -> None:
         )
 
 
-@dataclass(frozen=True)
-class HierarchyCase:
+class HierarchyCase(NamedTuple):
     """One hierarchy under which teams are evaluated."""
 
     condition: str

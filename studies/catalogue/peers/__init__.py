@@ -6,8 +6,8 @@ against the CPU seconds that training took, physics included, evaluations not. T
 is compared with all others at the end, paired by seed.
 """
 
-from dataclasses import dataclass
 from time import process_time
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,8 +53,7 @@ def measure(trial: Trial) -> TrialResult:
     return session.finish(usage=usage)
 
 
-@dataclass(frozen=True)
-class LearningCourse:
+class LearningCourse(NamedTuple):
     """How one condition fares with experience."""
 
     condition: str

@@ -11,8 +11,8 @@ closure; n (n - 1) / 2 in a chain of n agents.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -116,8 +116,7 @@ def _peak() -> int | None:
     return None if match is None else 1024 * int(match[1])
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(NamedTuple):
     """One condition."""
 
     evaluator: str

@@ -12,10 +12,9 @@ and steps that were run, so that those columns are lower bounds. The cumulative 
 what the episodes after the onset fall short of the level before, in episodes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from textwrap import wrap
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -111,8 +110,7 @@ def _keeping_weights(session: Session) -> Team:
     return team
 
 
-@dataclass(frozen=True)
-class Course:
+class Course(NamedTuple):
     """One case: what happened to a fault, given what adapts."""
 
     fault: str
@@ -183,7 +181,9 @@ def courses_of(results: Results) -> list[Course]:
         numbers = results.numbers(condition)
         onset = int(numbers["onset"][0])
         onsets = tuple(int(v[0]) for name, v in numbers.items() if name.startswith("onset"))
-        fault, enabled = _counterpart(condition, results.columns.get(condition, {}))
+        columns = results.columns.get(condition, {})
+        enabled = str(columns.get(SWEPT, ""))
+        fault = (label_but(columns, [SWEPT]) or "the failure") if enabled else condition
         for phase in (KEPT, "training"):
             success, steps = (
                 results.values(condition, name).astype(float) for name in ("success", "steps")
@@ -196,14 +196,6 @@ def courses_of(results: Results) -> list[Course]:
     order = {adapts: i for i, adapts in enumerate(ADAPTS.values())}
     faults = list(dict.fromkeys(course.fault for course in courses))
     return sorted(courses, key=lambda c: (faults.index(c.fault), order.get(c.adapts, 0)))
-
-
-def _counterpart(condition: str, columns: Mapping[str, Any]) -> tuple[str, str]:
-    """Return what a condition has in common with its counterpart, as a label, and which it is."""
-    enabled = str(columns.get(SWEPT, ""))
-    if not enabled:
-        return condition, ""
-    return label_but(columns, [SWEPT]) or "the failure", enabled
 
 
 def _summary(course: Course) -> Summary:

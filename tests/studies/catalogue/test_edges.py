@@ -71,7 +71,7 @@ def test_told_by_considered_is_drawn_as_four_fields_for_each_size() -> None:
     results = made_up(OUTCOMES | {"neither": 0.0})
     results.columns["own-value"] = {"name": "", "scenario.robots": 2}
     analysis = analyse(results.frames())
-    larger = [replace(case, robots=4) for case in analysis.cases]
+    larger = [case._replace(robots=4) for case in analysis.cases]
     figure = draw(replace(analysis, cases=[*analysis.cases, *larger]))["edges"]
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["2 robots", "4 robots"]
     fields = [text.get_text() for text in figure.axes[0].texts[::2]]
