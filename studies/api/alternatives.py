@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
-from itertools import product
+from functools import partial, reduce
+from itertools import product, starmap
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -216,9 +216,7 @@ def _check(spec: Spec, trials: int, seeds: int, first_seed: int, draw: int) -> N
 
 def _over(table: TomlTable, point: Point) -> TomlTable:
     """Return a table with values laid over it."""
-    for key, value in point.items():
-        table = overlay(table, nested(key, value))
-    return table
+    return reduce(overlay, starmap(nested, point.items()), table)
 
 
 def _laid(spec: Spec, point: Point) -> Spec:

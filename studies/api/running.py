@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.interface.scenario import Measure
-from ...core.numerics import FloatArray, IntArray, optimize
+from ...core.numerics import FloatArray, IntArray, optimize, pd
 from ...core.plugins.sources import is_reference
 from ..catalogue.study import load_study, measured
 from ..errors import WIDTH, SpecError
@@ -300,10 +300,9 @@ def try_out(trial: Trial) -> Tried:
     ):
         taken.append(_seconds(partial(session.train, 1, k)))
     own, others = _seconds(session.evaluate), _seconds(session.run_other_evaluations)
-    lengths: dict[str, list[float]] = {}
-    for row in session.result().rows:
-        lengths.setdefault(row.phase, []).append(float(row.steps))
-    steps = np.array(lengths.pop("training"))
+    by_phase = pd.DataFrame(session.result().rows).groupby("phase")["steps"]
+    lengths = {phase: own.to_numpy(float) for phase, own in by_phase}
+    steps = lengths.pop("training")
     acting = own / sum(lengths.get("evaluation", [1.0]))
     evaluated = (own + others) / max(sum(map(sum, lengths.values())), 1.0)
     evaluating = evaluated * sum(
@@ -357,8 +356,7 @@ def _others(tried: Sequence[float] | FloatArray, most: int, cut: int) -> FloatAr
 
 def _used() -> float:
     """Return the processor time of this process and of those that it has waited for [s]."""
-    times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    return sum(os.times()[:4])
 
 
 def _seconds(call: Callable[[], object]) -> float:

@@ -22,7 +22,7 @@ from functools import cached_property
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...core.interface.scenario import SUCCESS, Actors, Scenario, can_draw
 from ...core.numerics import pd
@@ -106,8 +106,7 @@ MOST_BYTES = 20_000_000
 """Of an animation that a notebook is given."""
 
 
-@dataclass(frozen=True)
-class Replay:
+class Replay(NamedTuple):
     """An animation."""
 
     path: Path

@@ -61,7 +61,7 @@ def load_study(name: str) -> Study:
     return cast(Study, study)
 
 
-def run_training(trial: Trial) -> TrialResult:
+def measure(trial: Trial) -> TrialResult:
     """Run a trial that is measured by its episodes alone."""
     from ..trials.session import run_trial  # who only reads results needs nothing that learns
 

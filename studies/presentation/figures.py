@@ -100,12 +100,13 @@ def draw_curve(
 
 
 def draw_row(
-    axes: Axes, row: float, estimate: Estimate, colour: str, marker: str = "o", **kwargs: Any
+    axes: Axes, row: float, estimate: Estimate, *, color: str, marker: str = "o", **kwargs: Any
 ) -> None:
     """Draw an estimate as a point with its interval, on a row of a chart."""
-    if np.isfinite([estimate.low, estimate.high]).all():
-        axes.plot([float(estimate.low), float(estimate.high)], [row, row], color=colour)
-    axes.plot(float(estimate.value), row, marker, color=colour, **kwargs)
+    value, *ends = map(float, estimate)
+    if np.isfinite(ends).all():
+        axes.plot(ends, [row, row], color=color)
+    axes.plot(value, row, marker, color=color, **kwargs)
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:
@@ -261,7 +262,7 @@ def draw_forest(
             colour = COLOURS[0] if line.estimate.value >= null else COLOURS[1]
             face = colour if line.p < LEVEL else "white"
             row = names.index(line.condition)
-            draw_row(axes, row, line.estimate, colour, markerfacecolor=face, markersize=5)
+            draw_row(axes, row, line.estimate, color=colour, markerfacecolor=face, markersize=5)
         axes.grid(axis="x", alpha=0.25)
         axes.set_title(title, loc="left")
         axes.set_xlabel(unit)

@@ -16,7 +16,6 @@ import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, NamedTuple
@@ -132,8 +131,10 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
             scripts.add(player.SCRIPT.read_text(encoding="utf-8"))
             size += len(episode["data"])
     films: list[Film] = []
-    # Of a study that the canvas plays nothing is asked for, and no file of its is run.
-    readable = _trials(store) if others else {}
+    readable: dict[str, Trial] = {}
+    if others:  # else nothing is asked for, and no file of the study's is run
+        with suppress(SpecError):  # of another version
+            readable = {trial.identity: trial for trial in trials_of(spec_of(store))}
     first: dict[str, Planned] = {}
     for trial in others:
         first.setdefault(trial.condition, trial)
@@ -146,14 +147,6 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
     if not_drawn := Counter(t.condition for t in others if t.condition not in filmed):
         missing["Not shown, as the scenario cannot draw it, or there is no room"] = not_drawn
     return Replays(scenes, episodes, "".join(scripts), films, missing)
-
-
-def _trials(store: Store) -> Mapping[str, Trial]:
-    """Return the trials of a study by identity; none if this version cannot read its spec."""
-    try:
-        return {trial.identity: trial for trial in trials_of(spec_of(store))}
-    except SpecError:
-        return {}
 
 
 def _drawn(store: Store, trial: Trial) -> str:
@@ -170,17 +163,12 @@ def _drawn(store: Store, trial: Trial) -> str:
 
 def _scene_of(recording: Recording) -> tuple[Any, dict[str, Any]]:
     """Return who plays a recording, and in which scene; none if nobody can."""
-    for player in _players():
+    models: list[Any] = [SCENARIOS.model(name) for name in SCENARIOS.built_in]
+    for name in dict.fromkeys(model.player for model in models if model.player):
+        player: Any = resolve_name(name)
         with suppress(ValueError):
             return player, player.scene_of(recording)
     return None, {}
-
-
-@cache
-def _players() -> tuple[Any, ...]:
-    """Return the players of the built-in scenarios."""
-    models: list[Any] = [SCENARIOS.model(name) for name in SCENARIOS.built_in]
-    return tuple(map(resolve_name, dict.fromkeys(m.player for m in models if m.player)))
 
 
 def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:
@@ -240,7 +228,6 @@ def page(directory: Path) -> str:
     )
 
 
-@cache
 def _template() -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER),

@@ -8,7 +8,6 @@ where all runs of a task ended alike, they have no width there.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from ...core.interface.scenario import Measure
 from ...core.numerics import pd, stats
 from ...core.plugins.settings import closest
 from ..errors import SpecError
-from ..spec.tables import aliases, label
+from ..spec.tables import aliases, label, named
 from .analysis import NOTHING, BySeed, Difference, Summary, differences, identity_lines, verdicts
 from .results import SECONDS, Results, shown
 from .statistics import Array, Estimate, bootstrap, rate, stacked
@@ -27,8 +26,7 @@ EPISODES = (STEPS, Measure("return", "return", "1", better="higher"))
 """What is known of every episode besides the measures of its scenario."""
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(NamedTuple):
     """Conditions that are compared with each other."""
 
     setting: str
@@ -39,9 +37,9 @@ class Group:
     """Of the others from it."""
     table: tuple[Summary, ...]
     """A line for each, the reference first."""
-    values: Mapping[str, Array] = field(default_factory=dict)
+    values: Mapping[str, Array]
     """By the name of each, the means of its seeds ``(n_seeds,)``."""
-    training: Mapping[str, Array] = field(default_factory=dict)
+    training: Mapping[str, Array]
     """Values of each episode of training ``(n_seeds, n_episodes)``, if it is measured there."""
 
 
@@ -202,14 +200,10 @@ def _led(members: _Pairs, reference: str | None, known: Mapping[str, Collection[
     """Return the members of a group, the reference first, by a name or another `known` one."""
     if reference is None:
         return members
-    names = [name for name, _ in members]
-    matches = [i for i, (_, c) in enumerate(members) if reference in known[c]]
-    if reference in names:
-        matches = [names.index(reference)]
-    if len(matches) != 1:
-        raise SpecError(f"reference = {reference!r}: {closest(reference, names)}")
-    first = matches[0]
-    return [members[first], *members[:first], *members[first + 1 :]]
+    first = named(reference, {name: known[c] for name, c in members})
+    if first is None:
+        raise SpecError(f"reference = {reference!r}: {closest(reference, dict(members))}")
+    return sorted(members, key=lambda member: member[0] != first)
 
 
 RESAMPLES = 2000

@@ -427,7 +427,17 @@ def power(effect: float, deviation: float, seeds: int, comparisons: int = 1) -> 
             f"power: deviation = {deviation}, seeds = {seeds}, comparisons = {comparisons}, "
             "allowed: above 0, 1 or more, 1 or more"
         )
-    return _power(abs(effect) / deviation, seeds, comparisons)
+    if seeds < seeds_needed(comparisons):
+        return 0.0
+    level = LEVEL / comparisons
+    if 2**seeds <= EXACT:
+        # So many of the 2 ** (seeds - 1) patterns, up to sign, are significant at most.
+        extreme = math.ceil(level * 2.0 ** (seeds - 1)) - 1
+        if extreme <= FEW_PATTERNS:
+            return _simulated(abs(effect) / deviation, seeds, extreme)
+        level = extreme * 2.0 ** (1 - seeds)
+    shift, freedom = abs(effect) / deviation * math.sqrt(seeds), seeds - 1
+    return power_of_t(freedom, shift, float(special.stdtrit(freedom, 1.0 - level / 2.0)))
 
 
 def detectable(deviation: float, seeds: int, comparisons: int = 1, wanted: float = WANTED) -> float:
@@ -441,11 +451,11 @@ def detectable(deviation: float, seeds: int, comparisons: int = 1, wanted: float
     if seeds < seeds_needed(comparisons):
         return math.inf
     low, high = 0.0, 1.0
-    while _power(high, seeds, comparisons) < wanted:
+    while power(high, 1.0, seeds, comparisons) < wanted:
         low, high = high, 2.0 * high
     while high - low > 0.002 * high:
         middle = (low + high) / 2.0
-        is_found = _power(middle, seeds, comparisons) >= wanted
+        is_found = power(middle, 1.0, seeds, comparisons) >= wanted
         low, high = (low, middle) if is_found else (middle, high)
     return deviation * high
 
@@ -531,22 +541,6 @@ def power_of_t(freedom: int, shift: float, beyond: float) -> float:
     density = weights * np.exp((freedom - 1) * np.log(s) - 0.5 * freedom * (s**2 - 1.0))
     outside = special.ndtr(shift - beyond * s) + special.ndtr(-shift - beyond * s)
     return float(density @ outside / density.sum())
-
-
-@lru_cache(maxsize=1024)
-def _power(effect: float, seeds: int, comparisons: int) -> float:
-    """Return the power for an effect in units of the deviation."""
-    if seeds < seeds_needed(comparisons):
-        return 0.0
-    level = LEVEL / comparisons
-    if 2**seeds <= EXACT:
-        # So many of the 2 ** (seeds - 1) patterns, up to sign, are significant at most.
-        extreme = math.ceil(level * 2.0 ** (seeds - 1)) - 1
-        if extreme <= FEW_PATTERNS:
-            return _simulated(effect, seeds, extreme)
-        level = extreme * 2.0 ** (1 - seeds)
-    shift, freedom = effect * math.sqrt(seeds), seeds - 1
-    return power_of_t(freedom, shift, float(special.stdtrit(freedom, 1.0 - level / 2.0)))
 
 
 def _simulated(effect: float, seeds: int, extreme: int) -> float:

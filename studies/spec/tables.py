@@ -347,6 +347,20 @@ def aliases(condition: str, columns: Mapping[str, Any]) -> set[str]:
     return {condition, *map(", ".join, spelt)}
 
 
+def named(name: str, known: Mapping[str, Collection[str]]) -> str | None:
+    """Return the one label that a name stands for, by the `aliases` of each; None if none does.
+
+    Examples
+    --------
+    >>> named("8", {"chain, robots=8": {"8", "robots=8"}, "star": {"star"}})
+    'chain, robots=8'
+    """
+    labels = [label for label, own in known.items() if name in own]
+    if name in known:
+        return name
+    return labels[0] if len(labels) == 1 else None
+
+
 def label_but(columns: Mapping[str, Any], keys: Collection[str]) -> str:
     """Return the label that a condition of these columns would have without some swept keys.
 

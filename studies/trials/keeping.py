@@ -14,7 +14,7 @@ from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ..errors import SpecError, show
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
-from ..spec.tables import aliases, dumps, flat
+from ..spec.tables import aliases, dumps, flat, named
 from ..store import database
 from ..store.database import DATABASE, SPEC_FILE, Noted
 from ..store.store import Store, locked
@@ -93,15 +93,13 @@ def finished_trial(store: Store, condition: str | None, seed: int | None) -> Tri
     """
     spec = spec_of(store)
     known = {c.label: aliases(c.label, c.columns) for c in spec.conditions()}
-    labels = [label for label, own in known.items() if condition in own]
-    if condition is None or condition in known:
-        labels = [next(iter(known)) if condition is None else condition]
-    if len(labels) != 1:
+    label = next(iter(known)) if condition is None else named(condition, known)
+    if label is None:
         raise SpecError(f"condition = {condition!r}: {closest(condition, known)}")
     seed = spec.seeds[0] if seed is None else seed
     if seed not in spec.seeds:
         raise SpecError(f"seed = {seed}: known: {', '.join(map(str, spec.seeds))}")
-    trial = next(t for t in trials_of(spec) if (t.condition, t.seed) == (labels[0], seed))
+    trial = next(t for t in trials_of(spec) if (t.condition, t.seed) == (label, seed))
     if store.states().get(trial.identity) != "done":
         unfinished = f"{trial.condition}, seed {seed}: has not finished"
         raise SpecError(store.damage().get(trial.identity, unfinished))

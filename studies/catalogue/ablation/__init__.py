@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from ...results.analysis import Analysis, Figures, Pair, Summary, judged, phases_of
 from ...results.results import Results
 from ...results.statistics import exactly, rate
-from ..study import run_training as measure
+from ..study import measure as measure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -47,6 +47,3 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation.figures import draw_forest
 
     return draw_forest("ablation", analysis.differences, "difference from the first condition")
-
-
-__all__ = ["analyse", "draw", "measure"]

@@ -21,7 +21,7 @@ from ...results.contrasts import Group, contrasts
 from ...results.results import Results
 from ...results.statistics import LEVEL, Friedman, friedman, holm, two_figures
 from .. import ablation
-from ..study import run_training as measure
+from ..study import measure as measure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -120,6 +120,3 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation.figures import draw_forest
 
     return draw_forest("chain-order", analysis.differences, "difference from the first order")
-
-
-__all__ = ["analyse", "draw", "measure"]

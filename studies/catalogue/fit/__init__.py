@@ -74,9 +74,8 @@ def draw(analysis: Analysis) -> Figures:
     for axes, game in zip(panels.flat, games, strict=False):
         axes.set_title(game, loc="left")
         for case in (case for case in cases if case.setting == game):
-            look = f.look(edges.index(case.hierarchy))
             row, success = edges.index(case.hierarchy), case.values[EVALUATED]
-            f.draw_row(axes, row, success, look["color"], f.marker(row))
+            f.draw_row(axes, row, success, color=f.look(row)["color"], marker=f.marker(row))
         f.as_rates(axes, "x")
         axes.grid(axis="x", alpha=0.25)
     f.name_rows(panels[0, 0], edges)

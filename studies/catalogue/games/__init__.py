@@ -8,8 +8,10 @@ random numbers as they were.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from string import ascii_uppercase
 from textwrap import wrap
+from typing import Any
 
 from ...errors import WIDTH
 from ...results.analysis import Analysis, Case, Figures, Summary
@@ -104,26 +106,21 @@ def draw(analysis: Analysis) -> Figures:
     games = list(dict.fromkeys(case.setting[:1] for case in cases))
     rests = list(dict.fromkeys(case.setting[1:] for case in cases))
     plays = sorted({count for case in cases for count in case.values})
-    looks = [(rest, count) for rest in rests for count in plays]
+    looks: dict[Any, dict[str, str]] = {}
+    for (i, rest), count in product(enumerate(rests), plays):
+        colour = f.look(i)["color"]
+        face = colour if count == plays[-1] else "white"
+        looks[rest, count] = {"color": colour, "marker": f.marker(i), "markerfacecolor": face}
+    places = {look: APART * (i - (len(looks) - 1) / 2) for i, look in enumerate(looks)}
     each = 2.3, 0.5 + 0.24 * len(systems)
     figure, panels = f.grid(len(games), COLUMNS, each, (1.8, 0.9), sharex=True, sharey=True)
-
-    def colours(rest: tuple[str, ...], count: int) -> dict[str, str]:
-        colour = f.look(rests.index(rest))["color"]
-        return {"color": colour, "markerfacecolor": colour if count == plays[-1] else "white"}
-
     for axes, game in zip(panels.flat, games, strict=False):
         axes.set_title(", ".join(game), loc="left")
         for case in (case for case in cases if case.setting[:1] == game):
-            rest = case.setting[1:]
             for count, estimate in case.values.items():
-                beside = looks.index((rest, count)) - (len(looks) - 1) / 2
-                row = systems.index(case.system) + APART * beside
-                own, marker = colours(rest, count), f.marker(rests.index(rest))
-                face = own["markerfacecolor"]
-                f.draw_row(
-                    axes, row, estimate, own["color"], marker, markerfacecolor=face, markersize=3.5
-                )
+                key = case.setting[1:], count
+                row = systems.index(case.system) + places[key]
+                f.draw_row(axes, row, estimate, **looks[key], markersize=3.5)
         f.as_rates(axes, "x")
         axes.grid(axis="x", alpha=0.25)
         for line in range(len(systems) - 1):
@@ -132,12 +129,9 @@ def draw(analysis: Analysis) -> Figures:
     for axes in panels[-1]:
         axes.set_xlabel("P(optimal joint action)")
     handles = [
-        f.handle(
-            ", ".join((*rest, f"{count:,} plays")), marker=f.marker(rests.index(rest)),
-            **colours(rest, count),
-        )
-        for rest, count in looks
-    ]  # fmt: skip
+        f.handle(", ".join((*rest, f"{count:,} plays")), **look)
+        for (rest, count), look in looks.items()
+    ]
     f.add_legend(figure, handles, "bars: 95 % intervals", ncols=2)
     return {"games": figure}
 

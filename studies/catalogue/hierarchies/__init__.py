@@ -70,6 +70,11 @@ class HierarchyCase(NamedTuple):
         """What it has in common with those that it is compared with."""
         return f"{self.sizes.shown(self.robots)}, {self.value_of}".strip(", ")
 
+    @property
+    def label(self) -> str:
+        """How its line of the table is called."""
+        return f"{self.setting}, {self.hierarchy}".removeprefix(", ")
+
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
@@ -95,14 +100,7 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
     """Compare cases with those of the reference hierarchy; of the first one if it is missing."""
     whose = list(dict.fromkeys(case.value_of for case in cases))
     cases = sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of)))
-    table = [
-        Summary(
-            f"{c.setting}, {c.hierarchy}".removeprefix(", "),
-            len(results.seeds(c.condition)),
-            c.values,
-        )
-        for c in cases
-    ]
+    table = [Summary(c.label, len(results.seeds(c.condition)), c.values) for c in cases]
     if not cases:
         return Analysis(())
     hierarchies = [case.hierarchy for case in cases]

@@ -15,7 +15,7 @@ from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated
 from ...results.contrasts import EPISODES, STEPS
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rate, rates
-from ..study import run_training as measure
+from ..study import measure as measure
 
 if TYPE_CHECKING:
     from ...spec.spec import Spec
@@ -127,6 +127,3 @@ def draw(analysis: Analysis) -> Figures:
     note = f"mean over {next(iter(seeds.values()))} seeds" if same else "mean over seeds"
     f.name_curves(figure, labels, f"{note}, band: 95 % interval")
     return {"learning-curves": figure}
-
-
-__all__ = ["analyse", "check", "draw", "measure"]

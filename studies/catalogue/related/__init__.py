@@ -129,7 +129,7 @@ def draw(analysis: Analysis) -> Figures:
             which = worlds.index(case.setting)
             colour = f.look(which)["color"]
             row = systems.index(case.system) + APART * (which - (len(worlds) - 1) / 2)
-            f.draw_row(axes, row, case.values[name], colour, markersize=3)
+            f.draw_row(axes, row, case.values[name], color=colour, markersize=3)
         axes.set_title(title, loc="left")
         axes.grid(axis="x", alpha=0.25)
         if name in LEAST:

@@ -13,7 +13,7 @@ from ...results.results import Results
 from ...results.statistics import bootstrap, power_lines, rate
 from ...spec.spec import Spec
 from ..study import check_evaluations
-from ..study import run_training as measure
+from ..study import measure as measure
 
 TRAINED = "trained on"
 """How the box of training is called among the others."""
@@ -74,6 +74,3 @@ def draw(analysis: Analysis) -> Figures:
 
     unit = "success over that with the box of training"
     return draw_forest("shapes", dict(analysis.cases), unit, null=1.0)
-
-
-__all__ = ["analyse", "check", "draw", "measure"]
