@@ -15,19 +15,12 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from ...core.numerics import FloatArray
 from ...scenarios.faults.wrappers import ActuatorFault, FaultyEnv, FaultyParallelEnv
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
-from ..results.statistics import NOT_NEGATIVE, bootstrap, rate
-
-BLOCK = 5
-"""Episodes that a level is measured over."""
-REGAINED = 0.9
-"""Share of what was lost just after the onset that counts as recovered when it is back."""
-
+from ..results.statistics import BLOCK, NOT_NEGATIVE, REGAINED, bootstrap, rate, recovery
 
 Policy = Callable[[Any], Any]
 """What may act: a function of an observation, or of observations by agent, that returns the action.
@@ -82,12 +75,8 @@ class FaultCourse(NamedTuple):
 
     def recovery(self) -> tuple[FloatArray, FloatArray]:
         """Return per seed whether it recovered, and after how many episodes."""
-        short = sliding_window_view(self.shortfall, BLOCK, axis=1).mean(axis=2)
-        lost = np.maximum(short[:, :1], 0.0)
-        regained = short <= (1.0 - REGAINED) * lost + 1e-12
-        recovered = regained.any(axis=1)
-        episodes = np.where(recovered, regained.argmax(axis=1), self.shortfall.shape[1])
-        return recovered.astype(float), episodes.astype(float)
+        lost = np.maximum(self.shortfall[:, :BLOCK].mean(axis=1, keepdims=True), 0.0)
+        return recovery(self.shortfall, (1.0 - REGAINED) * lost)
 
     def summary(self) -> Summary:
         """Return its line of the table."""

@@ -256,9 +256,7 @@ def plan(
     examine(made)
     trials = trials_of(made)
     processes = max(1, min(jobs or cores(), len(trials)))
-    seconds = memory = None
-    if timed:
-        seconds, memory = _taken(made, trials, processes)
+    seconds, memory = _taken(made, trials, processes) if timed else (None, None)
     return Plan(
         StudyOutline.of(made), len(trials), processes, seconds, memory, len(made.conditions()) - 1,
         deviation, smallest, made.warnings(),
@@ -295,9 +293,7 @@ def try_out(trial: Trial) -> Tried:
     first = replace(alone, steps=min(trial.steps, cut), evaluation_steps=min(most, cut))
     session = Session(first)
     held, taken = _bytes(session), list[float]()
-    while (k := len(taken)) < min(EPISODES, trial.episodes) or (
-        k < trial.episodes and sum(taken) < TRIED
-    ):
+    while (k := len(taken)) < trial.episodes and (k < EPISODES or sum(taken) < TRIED):
         taken.append(_seconds(partial(session.train, 1, k)))
     own, others = _seconds(session.evaluate), _seconds(session.run_other_evaluations)
     by_phase = pd.DataFrame(session.result().rows).groupby("phase")["steps"]
@@ -305,9 +301,7 @@ def try_out(trial: Trial) -> Tried:
     steps = lengths.pop("training")
     acting = own / sum(lengths.get("evaluation", [1.0]))
     evaluated = (own + others) / max(sum(map(sum, lengths.values())), 1.0)
-    evaluating = evaluated * sum(
-        (_others(each, most, cut) for each in lengths.values()), np.zeros(2)
-    )
+    evaluating = evaluated * np.sum([_others(own, most, cut) for own in lengths.values()], axis=0)
     episodes = np.array([*(stage.episodes for stage in trial.curriculum), trial.episodes])
     whole = steps[steps < cut]
     left = episodes.sum() - len(whole)

@@ -266,8 +266,7 @@ class StudyResults:
     def figures(self) -> dict[str, Figure]:
         """The figures of the study by name."""
         with self._sources.active():
-            study = load_study(self.outline.study)
-            return drawn(study, self.analysis)
+            return drawn(load_study(self.outline.study), self.analysis)
 
     def figure(self, name: str | None = None) -> Figure:
         """Return a figure of the study as matplotlib has it; the first unless named.

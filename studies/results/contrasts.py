@@ -73,12 +73,10 @@ class Contrasts(NamedTuple):
     @property
     def notes(self) -> tuple[str, ...]:
         """The verdicts, and what the comparisons could have detected."""
-        groups = {
-            ": ".join(filter(None, (g.setting, f"{self.title}, less that of {g.reference}"))): (
-                g.differences
-            )
-            for g in self.groups
-        }
+        groups = {}
+        for group in self.groups:
+            head = ": ".join(filter(None, (group.setting, self.title)))
+            groups[f"{head}, less that of {group.reference}"] = group.differences
         lines = verdicts(groups, self.measure.better, of_rates=self.measure.is_rate) or [NOTHING]
         return (*lines, *identity_lines(self.identical))
 

@@ -352,12 +352,11 @@ def chosen(results: Results, choice: str, settings: Mapping[str, Any]) -> Result
         If it is no choice, or names what trials have not; one line.
     """
     trials = results.trials[["condition", "seed"]]
-    set_ = [dict(flat(settings.get(c, {}))) for c in trials["condition"]]
-    swept = results.columns.get
     truths = {"true": True, "false": False}  # as they stand in a column
     known = [
-        own | {k: truths.get(v, v) for k, v in swept(c, {}).items() if v != ""}
-        for own, c in zip(set_, trials["condition"], strict=True)
+        dict(flat(settings.get(c, {})))
+        | {k: truths.get(v, v) for k, v in results.columns.get(c, {}).items() if v != ""}
+        for c in trials["condition"]
     ]
     frame = pd.DataFrame(known, index=trials.index).assign(**trials)
     ends = [name.rpartition(".")[2] for name in frame]

@@ -62,8 +62,8 @@ class LearningCourse(NamedTuple):
     """``(k,)`` decisions experienced until each evaluation, means over seeds."""
     seconds: Array
     """``(k,)`` CPU seconds spent until each evaluation, means over seeds."""
-    success: tuple[Estimate, ...]
-    """The evaluations' success rates."""
+    success: Estimate
+    """The evaluations' success rates ``(k,)``."""
 
 
 def analyse(results: Results) -> Analysis:
@@ -92,7 +92,7 @@ def analyse(results: Results) -> Analysis:
                 condition,
                 np.array([steps[:, :count].sum(axis=1).mean() for count in every]),
                 np.array([np.nan if s is None else float(np.mean(s)) for s in cpu]),
-                tuple(rate(success) for success in every.values()),
+                stacked([rate(success) for success in every.values()]),
             )
         )
     if not courses:
@@ -114,8 +114,7 @@ def draw(analysis: Analysis) -> Figures:
     figure, panels = f.panels(1, 2, (7.2, 3.4), sharey=True)
     for i, course in enumerate(analysis.cases):
         for axes, spent in zip(panels[0], (course.decisions, course.seconds), strict=True):
-            success = stacked(course.success)
-            f.draw_curve(axes, spent, success, i, alpha=0.08, marker="o", markersize=3.5)
+            f.draw_curve(axes, spent, course.success, i, alpha=0.08, marker="o", markersize=3.5)
     for axes, title in zip(panels[0], ("decisions", "CPU time of training [s]"), strict=True):
         f.log_axis(axes, "x")
         axes.set_xlabel(title)

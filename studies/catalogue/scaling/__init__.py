@@ -35,11 +35,6 @@ PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
 TIMES = {"deciding": "decision [ms]", "learning": "learning [ms]"}
 """Times whose growth with the number of agents is estimated, by what they are of."""
-COLUMNS = (
-    "success", "all touch", "decision [ms]", "learning [ms]", "team [MB]", "process [MB]",
-    "messages",
-)  # fmt: skip
-"""What the table shows, and after the first of them the evaluations."""
 PANELS = (
     (EVALUATED, EVALUATED, "linear"),
     ("decision [ms]", "deciding, per step [ms]", "log"),
@@ -61,7 +56,8 @@ def check(spec: Spec) -> None:
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and note what it takes; imported by name in workers."""
     session = Session.compiled(trial)
-    _forget_peak()
+    if CLEAR.exists():  # the peak of the process's memory is counted from now on, in Linux
+        CLEAR.write_text("5")
     session.train(trial.episodes)
     peak = _peak()
     team = of_fuzzy_agents(session.team)
@@ -104,12 +100,6 @@ def measure(trial: Trial) -> TrialResult:
     return session.result(numbers, usage)
 
 
-def _forget_peak() -> None:
-    """Let the peak of this process's memory be counted from now on, where Linux allows."""
-    if CLEAR.exists():
-        CLEAR.write_text("5")
-
-
 def _peak() -> int | None:
     """Return the peak of this process's resident memory [bytes], where Linux tells it."""
     match = re.search(r"VmHWM:\s+(\d+) kB", MEMORY.read_text()) if MEMORY.exists() else None
@@ -142,12 +132,9 @@ def analyse(results: Results) -> Analysis:
     points = [_point(results, c, sizes) for c in conditions]
     table: list[Summary] = []
     for condition, point in zip(conditions, points, strict=True):
-        evaluations = evaluated(results, condition)
-        titles = (*COLUMNS[:1], *evaluations, *COLUMNS[1:])
-        shown = {title: point.values[title] for title in titles if title in point.values}
         is_size = condition == str(point.robots)
         label = sizes.shown(point.robots) if is_size else condition
-        table.append(Summary(label, len(results.seeds(condition)), shown))
+        table.append(Summary(label, len(results.seeds(condition)), point.values))
     notes = [
         f"\n{evaluator}, time with n agents:\n  "
         + "\n  ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
@@ -167,10 +154,10 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
     if "process_bytes" in numbers:
         costs["process [MB]"] = 1e-6 * numbers["process_bytes"]
     values = {"success": rate(results.success(condition)[:, -5:])} | evaluated(results, condition)
-    values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
-    values["messages"] = exactly(numbers["messages"][0])
     if "all_touching" in numbers:
         values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
+    values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
+    values["messages"] = exactly(numbers["messages"][0])
     evaluator = label_but(results.columns.get(condition, {}), sizes.keys) or "default"
     return Point(
         evaluator, sizes.word, sizes.counts[condition], int(numbers["agents"][0]),

@@ -25,7 +25,15 @@ from ....core.numerics import pd
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures, Pair, Summary, judged
 from ...results.results import Results
-from ...results.statistics import NOT_NEGATIVE, Array, bootstrap, rate
+from ...results.statistics import (
+    BLOCK,
+    NOT_NEGATIVE,
+    REGAINED,
+    Array,
+    bootstrap,
+    rate,
+    recovery,
+)
 from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ...trials.session import Session, arrange
@@ -38,10 +46,6 @@ PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
 AT_END = "success at the end"
 """What is compared."""
-BLOCK = 5
-"""Episodes that a level is measured over."""
-REGAINED = 0.9
-"""Share of the level before that counts as recovered."""
 KEPT = "weights kept"
 """The phase of the copied team."""
 SWEPT = "learner.self_model.enabled"
@@ -138,26 +142,18 @@ class Course(NamedTuple):
         return self.success[:, -BLOCK:]
 
     @property
-    def lost(self) -> Array:
-        """Cumulative loss ``(n_seeds,)`` [episodes]."""
-        short = self.before.mean() - self.success[:, self.onset :]
-        return np.asarray(short.sum(axis=1))
+    def short(self) -> Array:
+        """What the episodes from the failure on fall short of the level before."""
+        return np.asarray(self.before.mean() - self.success[:, self.onset :])
 
     def recovery(self) -> tuple[Array, Array, Array]:
         """Return per seed whether it recovered, after how many episodes and steps."""
-        level = REGAINED * self.before.mean()
-        followed = np.lib.stride_tricks.sliding_window_view(
-            self.success[:, self.onset :], BLOCK, axis=1
-        ).mean(axis=2)
-        regained = followed >= level - 1e-12
-        recovered = regained.any(axis=1)
-        ran = self.success.shape[1] - self.onset
-        episodes = np.where(recovered, regained.argmax(axis=1), ran)
+        recovered, episodes = recovery(self.short, (1.0 - REGAINED) * self.before.mean())
         steps = [
-            run[self.onset : self.onset + count].sum()
+            run[self.onset : self.onset + int(count)].sum()
             for run, count in zip(self.steps, episodes, strict=True)
         ]
-        return recovered.astype(float), episodes.astype(float), np.array(steps, dtype=float)
+        return recovered, episodes, np.array(steps, dtype=float)
 
 
 def analyse(results: Results) -> Analysis:
@@ -210,7 +206,7 @@ def _summary(course: Course) -> Summary:
             "recovered": rate(recovered[:, None]),
             "episodes": bootstrap(episodes, bounds=NOT_NEGATIVE),
             "steps": bootstrap(steps, bounds=NOT_NEGATIVE),
-            "cumulative loss": bootstrap(course.lost),
+            "cumulative loss": bootstrap(course.short.sum(axis=1)),
         }
     return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
 

@@ -41,7 +41,7 @@ def test_levels_recovery_and_area_by_hand() -> None:
     assert recovered.tolist() == [1.0, 0.0]
     assert episodes.tolist() == [2.0, 8.0]
     assert spent.tolist() == [20.0, 80.0]
-    assert course.lost.tolist() == [2.0, 8.0]
+    assert course.short.sum(axis=1).tolist() == [2.0, 8.0]
     assert (course.before.mean(), course.end.mean()) == (1.0, 0.5)
 
 
