@@ -70,8 +70,7 @@ class FaultCourse(NamedTuple):
     @property
     def shortfall(self) -> FloatArray:
         """What the episodes from the onset on fall short of their like without fault."""
-        short: FloatArray = (self.healthy - self.faulty)[:, self.onset :]
-        return short
+        return np.asarray((self.healthy - self.faulty)[:, self.onset :])
 
     def recovery(self) -> tuple[FloatArray, FloatArray]:
         """Return per seed whether it recovered, and after how many episodes."""

@@ -336,8 +336,7 @@ def learned(
         np.stack([steps, steps * np.cumsum(steps)], axis=1), np.maximum(taken, 0.0)
     )
     kept = mean * (episodes * (episodes + 1)).sum() / 2
-    total: FloatArray = mean * (per_step * episodes.sum() + per_kept * kept)
-    return total
+    return np.asarray(mean * (per_step * episodes.sum() + per_kept * kept))
 
 
 def _others(tried: Sequence[float] | FloatArray, most: int, cut: int) -> FloatArray:

@@ -105,10 +105,10 @@ def committed_entries() -> list[Entry]:
         return []
     entries = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     for entry in entries["entries"]:
-        rows = (
-            (published.load(PUBLISHED / row.pop("file")).results, row) for row in entry["teams"]
+        entry["teams"] = tuple(
+            team_of(published.load(PUBLISHED / row.pop("file")).results, **row)
+            for row in entry["teams"]
         )
-        entry["teams"] = tuple(team_of(results, **row) for results, row in rows)
     return [Entry(**entry) for entry in entries["entries"]]
 
 

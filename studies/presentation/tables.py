@@ -110,8 +110,7 @@ def in_csv(frame: pd.DataFrame) -> str:
 
 def rows_of(frame: pd.DataFrame) -> Iterator[tuple[Any, ...]]:
     """Yield the rows of a frame as values of Python's own types; None is what is missing."""
-    values: Any = frame.astype(object).where(frame.notna(), None)
-    yield from values.itertuples(index=False, name=None)
+    yield from frame.astype(object).where(frame.notna(), None).itertuples(index=False, name=None)
 
 
 def harmless(value: Any) -> Any:
@@ -134,7 +133,6 @@ def harmless(value: Any) -> Any:
 
 
 MATHS_SPACE = r"\;"
-NOTHING = "no trial has finished"
 UNKNOWN = exactly(np.nan)
 
 
@@ -177,7 +175,7 @@ class SummaryTable:
     def legend(self) -> list[str]:
         """Lines that say what stands in the cells."""
         if not self.rows:
-            return [NOTHING]
+            return ["no trial has finished"]
         lines = ["Means over seeds, and below them their 95 % intervals."]
         return lines + [self.remark] * bool(self.remark)
 

@@ -91,12 +91,9 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
     """
     reached = _reached(store)
     done = {(condition, seed) for condition, seed, _ in reached}
-    scenes: list[dict[str, Any]] = []
-    episodes: list[dict[str, Any]] = []
+    scenes, episodes = list[dict[str, Any]](), list[dict[str, Any]]()
+    scripts, others, size = set[str](), list[Planned](), 0
     missing: defaultdict[str, Counter[str]] = defaultdict(Counter)
-    scripts: set[str] = set()
-    others: list[Planned] = []
-    size = 0
 
     for trial in trials:
         if (trial.condition, trial.seed) not in done:
@@ -135,10 +132,8 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
     if others:  # else nothing is asked for, and no file of the study's is run
         with suppress(SpecError):  # of another version
             readable = {trial.identity: trial for trial in trials_of(spec_of(store))}
-    first: dict[str, Planned] = {}
-    for trial in others:
-        first.setdefault(trial.condition, trial)
-    for trial in first.values():
+    for condition in dict.fromkeys(trial.condition for trial in others):
+        trial = next(trial for trial in others if trial.condition == condition)
         gif = _drawn(store, readable[trial.identity]) if trial.identity in readable else ""
         if 0 < len(gif) <= most_bytes - size:
             films.append(Film(trial.condition, trial.seed, gif))

@@ -220,8 +220,7 @@ def interquartile_mean(tasks: Tasks) -> Array:
     >>> float(interquartile_mean([np.array([0.0, 1.0, 2.0, 9.0])]))
     1.5
     """
-    trimmed: Array = np.asarray(stats.trim_mean(np.concatenate(tasks, axis=-1), 0.25, axis=-1))
-    return trimmed
+    return np.asarray(stats.trim_mean(np.concatenate(tasks, axis=-1), 0.25, axis=-1))
 
 
 def probability_of_improvement(tasks: Tasks) -> Array:

@@ -276,8 +276,7 @@ def _arrays(runs: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Array]]:
     final = {n: [np.ravel(own[n]).astype(float) for own in finals] for n in _shared(finals)}
     most = min((len(values) for own in final.values() for values in own), default=0)
     evaluation = {n: np.array([values[:most] for values in own]) for n, own in final.items()}
-    phases = {"training": training, "evaluation": evaluation if most else {}}
-    return {phase: arrays for phase, arrays in phases.items() if arrays}
+    return {"training": training, "evaluation": evaluation if most else {}}
 
 
 def _shared(tables: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -301,10 +301,9 @@ NOTHING = partial(from_arrays, {}, {}, {}, {}, {}, (SUCCESS,))
 """Returns results of no trials."""
 
 
-_TABLES = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
-EPISODE_COLUMNS, TRIAL_COLUMNS, NUMBERS = (
-    {name: (unit, meaning) for name, (unit, meaning) in table.items()} for table in _TABLES.values()
-)
+EPISODE_COLUMNS, TRIAL_COLUMNS, NUMBERS = tomllib.loads(
+    Path(__file__).with_name("columns.toml").read_text(encoding="utf-8")
+).values()
 """Unit and meaning by name: of the columns of episodes that every scenario has, of those of trials,
 and of numbers of whole trials."""
 

@@ -582,9 +582,7 @@ def _simulated(effect: float, seeds: int, extreme: int) -> float:
     negative = np.minimum(negative, sizes.sum(axis=1) - negative)
     largest = int(math.log2(extreme + 1)) + 1
     sets = [s for k in range(largest + 1) for s in combinations(range(seeds), k)]
-    members = np.zeros((seeds, len(sets)))
-    for column, chosen in enumerate(sets):
-        members[list(chosen), column] = 1.0
+    members = np.array([[seed in chosen for chosen in sets] for seed in range(seeds)], dtype=float)
     reached = ((sizes @ members) <= negative[:, None] + 1e-12).sum(axis=1)
     return float((reached <= extreme).mean())
 
@@ -606,17 +604,14 @@ def power_text(
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
     among = f" and {comparisons} comparisons" if comparisons > 1 else ""
     needed = seeds_needed(comparisons)
-    wanted = None
-    if smallest is not None and deviation is not None:
-        wanted = seeds_for(smallest, deviation, comparisons)
+    enough = seeds_for(smallest, deviation, comparisons) if smallest and deviation else None
+    goal = two_figures(smallest or 0.0)
     if seeds < needed:
         text = (
             f"{counted}{among} cannot give an adjusted p below .05, whatever the outcome. "
             f"It needs at least {needed} seeds"
         )
-        if smallest is not None and wanted is not None:
-            text += f"; for a difference of {two_figures(smallest)}, about {wanted}"
-        text += "."
+        text += f"; for a difference of {goal}, about {enough}." if enough else "."
     elif deviation is None:
         text = f"{counted}{among} that deviate by nothing: how small a difference they would find "
         text += "cannot be determined."
@@ -624,8 +619,7 @@ def power_text(
         least = two_figures(detectable(deviation, seeds, comparisons))
         text = f"with {counted}{among}, a difference of {least} is found with probability "
         text += f"{two_figures(WANTED)}."
-        if smallest is not None and wanted is not None:
-            text += f" For a difference of {two_figures(smallest)} it takes about {wanted} seeds."
+        text += f" For a difference of {goal} it takes about {enough} seeds." if enough else ""
     return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 
 

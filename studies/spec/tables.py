@@ -220,7 +220,7 @@ def explain(
     (keys, first) = (inside or problems)[0]
     path = dotted(keys) or "spec"
     if first["type"] == "extra_forbidden":
-        owner = _owner(keys[:-1], model, data)
+        owner = model_at(*_reach(keys[:-1], model, data))
         kind = f" for kind {kind_of(owner)!r}" if owner is not None and kind_of(owner) else ""
         known = set() if owner is None else set(owner.model_fields)
         misspelt = near(keys[-1], known, cutoff=0.85)
@@ -236,12 +236,12 @@ def explain(
         return f"{path} = {show(value)}: {first['msg']}"
     if first["type"].startswith("union_tag"):
         path, value = f"{path}.kind", value.get("kind") if isinstance(value, Mapping) else value
-        slot = _slot(keys, model, data)
+        slot, _ = _reach(keys, model, data)
         kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
         return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
     # The members of a union complain one by one about the same place: say what any would take.
     text = ", or ".join(dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys))
-    owner = _owner(keys[:-1], model, data) if keys else None
+    owner = model_at(*_reach(keys[:-1], model, data)) if keys else None
     is_other_type = ("string" in text) is not isinstance(value, str)
     other = mistaken(keys[-1], owner.model_fields, first) if owner and is_other_type else ""
     return f"{path} = {show(value)}: {text}{other}"
@@ -283,28 +283,17 @@ def _places(key: str, model: type[BaseModel], data: object, name: str = "") -> I
             yield from _places(key, inner, table, f"{name}{field}.")
 
 
-def _slot(keys: Sequence[int | str], model: type[BaseModel], data: Any) -> Slot:
-    """Return the model or field that the value at `keys` is for."""
-    slot: Slot = model
-    for key in keys:
-        if isinstance(key, int):  # an item of a list is one of the models that the list may hold
-            data = data[key]
-            continue
-        slot = field_of(model_at(slot, data), str(key))
-        if slot is None:
-            return None
-        data = data[key]
-    return slot
-
-
-def _owner(
+def _reach(
     keys: Sequence[int | str], model: type[BaseModel], data: Mapping[str, Any]
-) -> type[BaseModel] | None:
-    """Return the model of the table at `keys`."""
-    inner: Any = data
+) -> tuple[Slot, Any]:
+    """Return the model or field that the value at `keys` is for, and the value."""
+    slot: Slot = model
+    value: Any = data
     for key in keys:
-        inner = inner[key]
-    return model_at(_slot(keys, model, data), inner)
+        if isinstance(key, str):  # an item of a list is one of the models that the list may hold
+            slot = field_of(model_at(slot, value), key)
+        value = value[key]
+    return slot, value
 
 
 LONGEST_TABLE = 40

@@ -107,12 +107,12 @@ def draw(analysis: Analysis) -> Figures:
     followed = analysis.cases
     width = 3.6 * COLUMNS
     figure, panels = f.grid(len(followed), COLUMNS, (3.6, 2.1), (0.0, 1.2), width, sharex=True)
-    conditions = [line.condition for line in analysis.table]
+    seeds = {line.condition: line.seeds for line in analysis.table}
     for axes, (measured, training) in zip(panels.flat, followed, strict=False):
         for condition, curve in curves_of(measured, training).items():
             episodes = range(len(curve.value))  # counted from 0, as in rows and specs
             marker = "o" if len(curve.value) == 1 else None
-            f.draw_curve(axes, episodes, curve, conditions.index(condition), marker=marker)
+            f.draw_curve(axes, episodes, curve, list(seeds).index(condition), marker=marker)
         axes.set_title(measured.heading, loc="left")
         if measured.is_rate:
             f.as_rates(axes)
@@ -121,7 +121,6 @@ def draw(analysis: Analysis) -> Figures:
         axes.grid(axis="y", alpha=0.25)
     for axes in panels.flat[len(followed) - panels.shape[1] : len(followed)]:
         f.as_episodes(axes)
-    seeds = {line.condition: line.seeds for line in analysis.table}
     same = len(set(seeds.values())) == 1
     labels = [c if same else f"{c} ({n} seeds)" for c, n in seeds.items()]
     note = f"mean over {next(iter(seeds.values()))} seeds" if same else "mean over seeds"

@@ -121,8 +121,7 @@ def draw(analysis: Analysis) -> Figures:
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
     panels[0, 0].set_ylabel(EVALUATED)
-    conditions = [course.condition for course in analysis.cases]
-    f.name_curves(figure, conditions, marker="o", markersize=3.5)
+    f.name_curves(figure, [c.condition for c in analysis.cases], marker="o", markersize=3.5)
     return {"peers": figure}
 
 
