@@ -131,10 +131,10 @@ class Drivers:
                     self.robot.radius + CLEARANCE, self.box.reach,
                 )  # fmt: skip
                 turn = np.abs(wrap(poses[:, 2] - target[2]))
-                cost = cost + 0.1 * (path + 0.06 * turn * np.exp(-path / 0.05))
-            arrived = path + 0.06 * turn * np.exp(-path / 0.05)
+                left = path + 0.06 * turn * np.exp(-path / 0.05)
+                cost = cost + 0.1 * left
         assert first is not None
-        return int(first[(cost + arrived).argmin()])
+        return int(first[(cost + left).argmin()])
 
 
 def _distinct(speeds: FloatArray) -> Any:

@@ -54,7 +54,7 @@ from ...core.agents.team import Team
 from ...core.coordination.graphs import Elimination, Shape, shaped
 from ...core.interface.scenario import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ...core.numerics import FloatArray, IntArray, nx
+from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings, closest
 
 OF_OPTIMA = (
@@ -402,11 +402,9 @@ class Landmarks(Game):
 
     def advance(self, rng: np.random.Generator) -> None:
         """Draw other places, and find the assignment of least distance."""
-        from scipy.optimize import linear_sum_assignment
-
         agents, landmarks = rng.random((2, len(self.seen), 2))
         self.seen = np.linalg.norm(agents[:, None] - landmarks, axis=2)
-        assigned = linear_sum_assignment(self.seen)[1]
+        assigned = optimize.linear_sum_assignment(self.seen)[1]
         self.best = float(self.payoffs(assigned[None])[0])
 
 
@@ -453,9 +451,8 @@ class TeamGame:
         self.interactions = sorted(tuple(sorted(edge)) for edge in edges.edges)
         """Pairs of agents whose actions matter to each other."""
         self._numbers = np.arange(float(n))[:, None][:, : len(number)]
-        self._drawn: Any = 0
-        self.game = self._of_seed(0)
-        self._rng = np.random.default_rng(0)
+        self._drawn: Any = None
+        TeamGame.reset(self, 0)
 
     def _of_seed(self, seed: Any) -> Game:
         s = self.settings

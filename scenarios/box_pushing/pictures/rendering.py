@@ -72,10 +72,8 @@ class _BoxScene(Scene):
         self.robot: RobotSettings = robot_for(str(recording["robot"]))
         robots = recording["robot_poses"].shape[1]
         self.box = box_for(str(recording["box"]), robots)
-        self.infrared: InfraredSettings | None = None
-        if sensors:
-            described = str(recording.get("infrared", "{}"))
-            self.infrared = InfraredSettings.model_validate_json(described)
+        described = str(recording.get("infrared", "{}"))
+        self.infrared = InfraredSettings.model_validate_json(described) if sensors else None
         low, high = self._extent()
         # One metre is as long both ways: widen what is too narrow for the picture.
         room = np.array([SIDES[0] * AXES[2], SIDES[1] * AXES[3]])
@@ -139,9 +137,8 @@ class _BoxScene(Scene):
         colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
         touching = bool(self.recording["contact"][step, r])
         speeds = self.recording["wheel_speeds"][step, wheels]
-        failed: FloatArray = np.zeros(len(speeds))
-        if "failed" in self.recording:
-            failed = self.recording["failed"][step, wheels]
+        none = np.zeros_like(self.recording["wheel_speeds"])
+        failed = self.recording.get("failed", none)[step, wheels]
         radius, scale = self.radius, min(1.0, self.pixels_of_robot / 20)
         self._trail(poses, step, colour)
         small = self.pixels_of_robot < WHEELS_FROM
@@ -186,12 +183,10 @@ class _BoxScene(Scene):
         eyes = poses[:, None, :2] + radius * along
         segments = np.stack([eyes, eyes + distances[..., None] * along], axis=2)
         hits = linear > 0
-        grey = LineCollection(segments[~hits], colors=RAY_COLOUR, linewidths=0.6, zorder=1.5)
-        readings = infrared.reading(distances[hits])
-        violet = LineCollection(
-            segments[hits], colors=HIT_COLOUR, linewidths=0.8 + 2.2 * readings, zorder=1.5
-        )
-        self._moving += [self.axes.add_collection(lines, autolim=False) for lines in (grey, violet)]
+        widths = 0.8 + 2.2 * infrared.reading(distances[hits])
+        for shown, colour, width in ((~hits, RAY_COLOUR, 0.6), (hits, HIT_COLOUR, widths)):
+            rays = LineCollection(segments[shown], colors=colour, linewidths=width, zorder=1.5)
+            self._moving.append(self.axes.add_collection(rays, autolim=False))
 
     def _patch(self, patch: Patch, pose: FloatArray) -> None:
         patch.set_transform(_at(pose) + self.axes.transData)
@@ -277,7 +272,7 @@ def scene_of(recording: Recording) -> dict[str, Any]:
         "speed": robot.max_speed,
         "wheels": [[wheel.x, wheel.y] for wheel in robot.wheels],
         "agents": [f"robot{r + 1}.{name}" for r in range(robots) for name in robot.wheel_names],
-        "rings": [] if box.radius else [_rounded(ring[:-1]) for ring in box.rings],
+        "rings": [] if box.radius else [ring[:-1].round(5).tolist() for ring in box.rings],
         "disc": round(box.radius, 5),
         "reach": round(box.reach, 5),
     }
@@ -318,10 +313,6 @@ def pack(recording: Recording, scene: Mapping[str, Any]) -> dict[str, Any]:
         "talking": silent.shape[1],
         "scale": round(scale, 9),
         "dt": float(recording["dt"]),
-        "goal": [round(float(v), 5) for v in recording["goal_pose"]],
+        "goal": recording["goal_pose"].round(5).tolist(),
         "data": base64.b64encode(content).decode("ascii"),
     }
-
-
-def _rounded(points: FloatArray) -> list[list[float]]:
-    return [[round(float(v), 5) for v in point] for point in points]

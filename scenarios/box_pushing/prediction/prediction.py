@@ -56,15 +56,9 @@ class BoxPrediction:
         return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
 
     def _after(self, choices: IntArray, seconds: float) -> View:
-        robots, box, gaps = push(
-            self.situation.robots,
-            self.situation.box,
-            self.wheel_commands.twists,
-            choices,
-            seconds,
-            self.model,
-        )
-        return self.premises.seen(self.situation, robots, box, gaps, seconds)
+        now, twists = self.situation, self.wheel_commands.twists
+        robots, box, gaps = push(now.robots, now.box, twists, choices, seconds, self.model)
+        return self.premises.seen(now, robots, box, gaps, seconds)
 
     def _view_again(self, choices: IntArray) -> View:
         """Return the view of `choices`: the last one, if they are the same."""
@@ -195,11 +189,8 @@ class BoxPrediction:
         """
         choices = self._choices(joint_action[None])[0]
         twists = self.wheel_commands.twists[np.arange(len(choices)), choices]
-        moved: FloatArray = outcomes(
-            self.situation.robots, self.situation.box, twists,
-            self.premises.hold, self.premises.belief, constants,
-        )  # fmt: skip
-        return moved
+        now, premises = self.situation, self.premises
+        return outcomes(now.robots, now.box, twists, premises.hold, premises.belief, constants)
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""
@@ -211,16 +202,9 @@ class BoxPrediction:
         return self._rewards(view)[row]
 
     def _rewards(self, view: View) -> FloatArray:
-        of_parties = reward(
-            self.premises.task,
-            view.distance,
-            -view.approach,
-            view.turn,
-            view.gaps < CONTACT_GAP,
-            self.premises.infrared.reading(view.gaps),
-        )
-        mean: FloatArray = of_parties.mean(axis=1)
-        return mean
+        contact, readings = view.gaps < CONTACT_GAP, self.premises.infrared.reading(view.gaps)
+        of_box = view.distance, -view.approach, view.turn
+        return reward(self.premises.task, *of_box, contact, readings).mean(axis=1)
 
 
 def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:

@@ -113,14 +113,10 @@ class ExactPrediction(BoxPrediction):
     def _after(self, choices: IntArray, seconds: float) -> View:
         periods = round(seconds / CONTROL_PERIOD)
         rows, which = np.unique(choices, axis=0, return_inverse=True)
-        poses, gaps = [], []
-        for row in rows:
-            commands = self.wheel_commands.speeds[np.arange(len(row)), row].ravel()
-            pose, gap = self.future.after(commands, periods)
-            poses.append(pose)
-            gaps.append(gap)
-        pose, gap = np.array(poses)[which], np.array(gaps)[which]
-        return self.premises.seen(self.situation, pose[:, 1:], pose[:, 0], gap, seconds)
+        commands = self.wheel_commands.speeds[np.arange(rows.shape[1]), rows]
+        played = [self.future.after(each.ravel(), periods) for each in commands]
+        poses, gaps = (np.array(part)[which] for part in zip(*played, strict=True))
+        return self.premises.seen(self.situation, poses[:, 1:], poses[:, 0], gaps, seconds)
 
     def after(self, joint_action: IntArray) -> ExactPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""

@@ -22,7 +22,7 @@ import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics import FloatArray, IntArray, njit
-from ...state_variables import StateVariable, filled, find_variable, sensed, space_of
+from ...state_variables import StateVariable, find_variable, sensed, space_of
 from ..world import geometry as rows
 from ..world.geometry import LANES, ON_SURFACE, nearest_points, wrap
 from .relational import ARRIVED, AWAY, CLOSE, KEPT, LEAST, STATE_VARIABLES, STILL, View
@@ -363,9 +363,8 @@ class BoxStateSpace:
 
     def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
-        if self.columns is None:
-            return self.sensed(view, robots)
-        return filled(self.columns.of(view, robots), self.functions, view, robots)
+        compiled = None if self.columns is None else self.columns.of(view, robots)
+        return sensed(self.functions, view, robots, compiled)
 
 
 def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
