@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from ..core.interface.spaces import StateSpace, Variable
 from ..core.numerics import FloatArray
@@ -163,8 +164,12 @@ def find_variable(registry: Registry, name: str) -> StateVariable:
     return replace(thing, trusted=name in registry.built_in)
 
 
-def referred(registry: Registry, names: object) -> object:
-    """Return a list of state variables with the objects in it replaced by their names."""
-    if not isinstance(names, list | tuple):
-        return names
-    return tuple(registry.reference_to(v) if isinstance(v, StateVariable) else v for v in names)
+def referred(registry: Registry) -> BeforeValidator:
+    """Return what replaces state variables of a registry by their names, in a list of both."""
+
+    def named(given: object) -> object:
+        if not isinstance(given, list | tuple):
+            return given
+        return tuple(registry.reference_to(v) if isinstance(v, StateVariable) else v for v in given)
+
+    return BeforeValidator(named)

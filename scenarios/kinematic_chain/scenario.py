@@ -21,7 +21,7 @@ from ...core.interface.spaces import ActionSet, BestResponses, Exploring, first_
 from ...core.numerics import FloatArray, IntArray
 from ...core.rules.rule_base import RuleBase
 from ..faults.settings import Failures
-from .config import PERIOD, REACH, KinematicChainSettings
+from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
 from .responses import Options, respond
 from .variables import ChainStates, ChainView, ends_of, postures_of
 
@@ -33,8 +33,6 @@ LEAST_WAY = 0.25
 """Distance of the tip from the goal at the start, at least [m]."""
 GOAL_RADII = (0.15, 0.95)
 """Least and greatest distance of the goal from the base [m]."""
-SIMPLE = ("bearing", "distance", "approach")
-"""State variables of which `responses` knows how they change."""
 MOST_BEND = 2.5
 """Greatest angle of a joint behind the base at the start [rad]."""
 

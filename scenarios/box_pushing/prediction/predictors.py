@@ -25,10 +25,9 @@ from ..states.relational import View
 from ..world.bodies import BoxSpec, compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
-from .prediction import BoxPrediction
+from .prediction import BoxPrediction, Premises, Situation
 from .push import PushModel
 from .settings import BeliefSettings
-from .situation import Premises, Situation
 
 IMMOBILE = 1e6
 """Ground friction [N] against which nothing moves."""
