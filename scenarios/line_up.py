@@ -130,8 +130,7 @@ class LineUp:
         return self
 
     def _commanded(self, joint_actions: IntArray) -> FloatArray:
-        n = len(self.agents)
-        unit, limit = np.full(n, INCREMENT), np.full(n, MAX_SPEED)
+        unit, limit = np.array([INCREMENT]), np.array([MAX_SPEED])
         return self.action_set.apply(self._commands, joint_actions, unit, limit)
 
     def _states(self) -> FloatArray:

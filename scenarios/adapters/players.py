@@ -7,6 +7,7 @@ observe.
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
+from itertools import compress
 from typing import Any, cast
 
 import numpy as np
@@ -247,11 +248,7 @@ class Perception:
         self._is_pair = np.array([len(rows) == 2 for rows in kept])
         self._is_angle = np.array([variable.periodic for variable in self.variables])
         is_common = (self._first == self._first[0]) & (self._last == self._last[0])
-        self.common = tuple(
-            variable.name
-            for variable, same in zip(self.variables, is_common.all(axis=0), strict=True)
-            if same and len(spaces) == 1
-        )
+        self.common = tuple(compress(names, is_common.all(axis=0) & (len(spaces) == 1)))
 
     def _find(self, name: str, entries: Any) -> Any:
         """Return where a variable is: ``(1, bodies)``, ``(2, bodies)`` of cosine and sine."""

@@ -121,10 +121,6 @@ class ActionScale:
             raise ValueError(f"rest = {rest!r}: no action of {space}")
         self.limits: FloatArray = np.maximum(self._high - self._rest, self._rest - self._low)
 
-    def __len__(self) -> int:
-        """Return the number of actuators."""
-        return len(self.limits)
-
     def place(self, action: Any) -> FloatArray:
         """Return where an action lies from rest, ``(k,)``."""
         return np.ravel(action).astype(float) - self._rest
@@ -208,8 +204,8 @@ class _Faulty:
         names: list[str] = []
         for prefix, space in spaces.items():
             scale = ActionScale(space, rests.get(prefix), f"action space {prefix}".rstrip())
-            self._parts[prefix] = scale, slice(len(names), len(names) + len(scale))
-            names += [f"{prefix}.{i}" if prefix else str(i) for i in range(len(scale))]
+            self._parts[prefix] = scale, slice(len(names), len(names) + len(scale.limits))
+            names += [f"{prefix}.{i}" if prefix else str(i) for i in range(len(scale.limits))]
         self.actuators = tuple(names)
         limits = np.concatenate([scale.limits for scale, _ in self._parts.values()])
         self._failures = Failures(faults, self.actuators, limits, "faults")
@@ -357,13 +353,8 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
         self.carried = self._carry(actions)
         *given, infos = self.env.step(self.carried)
         if self._inform:
-            now = self._now()
-            infos = {
-                agent: {
-                    **info,
-                    "faults": {n: k for n, k in now.items() if n.rpartition(".")[0] == agent},
-                    "carried": self.carried.get(agent),
-                }
-                for agent, info in infos.items()
-            }
+            now, infos = self._now(), dict(infos)
+            for agent, info in infos.items():
+                own = {name: kind for name, kind in now.items() if name.rpartition(".")[0] == agent}
+                infos[agent] = {**info, "faults": own, "carried": self.carried.get(agent)}
         return (*given, infos)

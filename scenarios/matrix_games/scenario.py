@@ -173,7 +173,7 @@ class MatrixGameSettings(ScenarioSettings):
 
 
 class MatrixGame:
-    """A matrix game; a `Scenario`.
+    """A matrix game; a `Scenario`, and its own `Prediction`.
 
     Parameters
     ----------
@@ -228,9 +228,17 @@ class MatrixGame:
         info = {"optimal": float(self.optimal[tuple(joint_action)]), "payoff": payoff}
         return Transition(self.states_after(joint_action), payoff, False, False, info)
 
-    def predict(self) -> MatrixGamePrediction:
-        """Predict what joint actions lead to, which is the same at every play."""
-        return MatrixGamePrediction(self)
+    def predict(self) -> MatrixGame:
+        """Return this game: what joint actions lead to is the same at every play."""
+        return self
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
+        return self.states_after(joint_actions)[:, agent]
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray:
+        """Return the expected payoffs ``(m,)`` of joint actions ``(m, n)``; for planners."""
+        return self.payoffs.mean(axis=0)[tuple(joint_actions.T)]
 
     def with_exact_prediction(self) -> MatrixGame:
         """Return this game: its predictions are exact."""
@@ -264,21 +272,6 @@ class MatrixGame:
         if learn:
             team.end_episode()
         return summary
-
-
-class MatrixGamePrediction:
-    """What joint actions lead to; rewards, too."""
-
-    def __init__(self, game: MatrixGame) -> None:
-        self._game = game
-
-    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        return self._game.states_after(joint_actions)[:, agent]
-
-    def rewards(self, joint_actions: IntArray) -> FloatArray:
-        """Return the expected payoffs ``(m,)`` of joint actions ``(m, n)``; for planners."""
-        return self._game.payoffs.mean(axis=0)[tuple(joint_actions.T)]
 
 
 def _state_space(

@@ -79,10 +79,9 @@ class _BoxScene(Scene):
         room = np.array([SIDES[0] * AXES[2], SIDES[1] * AXES[3]])
         metres_per_pixel = float(((high - low) / room).max()) * (1 + 2 * MARGIN)
         half, middle = 0.5 * metres_per_pixel * room, 0.5 * (low + high)
-        self.axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
-        self.axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
+        across, along = np.stack([middle - half, middle + half], axis=1)
+        self.axes.set(xlim=across, ylim=along, axisbelow=True)
         self.axes.grid(color="#eeeeee")
-        self.axes.set_axisbelow(True)
         # Robots that would be dots are drawn larger than they are.
         self.pixels_of_robot = max(self.robot.radius / metres_per_pixel, LEAST_RADIUS)
         self.radius = self.pixels_of_robot * metres_per_pixel
@@ -152,9 +151,8 @@ class _BoxScene(Scene):
             line = [(0.0, 0.0), (radius, 0.0)]  # no longer, or a row of robots looks like a comb
             self._patch(Polygon(line, closed=False, fill=False, ec=edge, lw=0.8), poses[step])
             return
-        nose = Polygon([(radius, 0), (0.4 * radius, 0.35 * radius), (0.4 * radius, -0.35 * radius)])
-        nose.set(facecolor="white", edgecolor=colour, lw=scale)
-        self._patch(nose, poses[step])
+        nose = [(radius, 0), (0.4 * radius, 0.35 * radius), (0.4 * radius, -0.35 * radius)]
+        self._patch(Polygon(nose, fc="white", ec=colour, lw=scale), poses[step])
         length, width = 0.5 * radius, 0.16 * radius
         for wheel, speed, broken in zip(self.robot.wheels, speeds, failed, strict=True):
             corner = (wheel.x - length / 2, wheel.y - width / 2)

@@ -282,22 +282,9 @@ def _of_others(gaps, robot, first, count, aways, work):  # type: ignore[no-untyp
 
 @njit(cache=True)
 def _relational(  # type: ignore[no-untyped-def]
-    robots,
-    box,
-    gaps,
-    goal,
-    origin,
-    before: float,
-    periods: float,
-    edges: FloatArray,
-    friction_radius: float,
-    wanted: IntArray,
-    columns: IntArray,
-    of_push: bool | None,
-    of_contact: bool | None,
-    of_path: bool | None,
-    of_face: bool | None,
-) -> FloatArray:
+    robots, box, gaps, goal, origin, before, periods, edges, friction_radius, wanted, columns,
+    of_push, of_contact, of_path, of_face,
+):  # fmt: skip
     """Return relational shared blocks ``(robots wanted, m, columns)``.
 
     Parameters
