@@ -82,10 +82,11 @@ class Actuators:
             self.groups += (tuple(range(first, first + len(table))),)
             self.names += tuple(_names(player, len(table)))
         self._spans = [slice(group[0], group[-1] + 1) for group in self.groups]
-        self.roles = tuple(re.sub(r"_?\d+(?=$|[.])", "", name, count=1) for name in self.names)
-        self.players = list(spaces)
+        self.players, self.roles = list(spaces), self.names
         if len(spaces) == 1:
             self._embody(bodies)
+        if len(spaces) > 1 or bodies:  # alike but for their numbers
+            self.roles = tuple(re.sub(r"_?\d+(?=$|[.])", "", name, count=1) for name in self.names)
         self.action_set = self._action_set(neutral)
 
     def _embody(self, bodies: Sequence[Sequence[int]]) -> None:
@@ -100,7 +101,7 @@ class Actuators:
             named = enumerate(bodies, 1)
             self.names = tuple(f"body{b}.{k + 1}" for b, body in named for k in range(len(body)))
         self.groups = tuple(map(tuple, bodies)) or singles
-        self.roles, self.players = self.names, self.players * len(self.groups)
+        self.players = self.players * len(self.groups)
 
     def _action_set(self, neutral: int | None) -> ActionSet:
         is_continuous = isinstance(next(iter(self._spaces.values())), Box)
@@ -110,8 +111,7 @@ class Actuators:
             neutral = int(np.abs(table).sum(axis=0).argmin()) if is_continuous else 0
         if neutral >= n_actions:
             raise ValueError(f"scenario.neutral = {neutral}: allowed 0 to {n_actions - 1}")
-        is_alike = (table == table[0]).all()
-        names = tuple(f"{v:.3g}" for v in table[0]) if is_alike else ()
+        names = tuple(f"{v:.3g}" for v in table[0]) if (table == table[0]).all() else ()
         if len(set(names)) < n_actions:
             names = tuple(map(str, range(n_actions)))
         nothing = (0.0,) * n_actions

@@ -220,7 +220,7 @@ def parts_of(game: Any, team: Team, *, learn: bool) -> Parts | None:
     """Return what a team is made of; None if it has a part that the kernel does not know."""
     if type(team.evaluator) is not ExactEnumeration or not _is_table(team.evaluator):
         return None
-    if team.messages.fail or team.predictor is not None:
+    if team.messages.failures or team.predictor is not None:
         return None
     learning = _learning(team.learner) if learn else STILL
     exploring = _exploring(team.explorer) if learn else NO_EXPLORATION
