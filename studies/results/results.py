@@ -368,9 +368,9 @@ def chosen(results: Results, choice: str, settings: Mapping[str, Any]) -> Result
         raise SpecError(f"where = {choice!r}: {problem}") from None
     keys, trials = ["condition", "seed"], results.trials.loc[keep].reset_index(drop=True)
     kept = pd.MultiIndex.from_frame(trials[keys])
-    episodes = results.episodes[pd.MultiIndex.from_frame(results.episodes[keys]).isin(kept)]
+    is_kept = pd.MultiIndex.from_frame(results.episodes[keys]).isin(kept)
+    episodes = results.episodes[is_kept].reset_index(drop=True)
     columns = {c: results.columns[c] for c in results.columns if c in set(trials["condition"])}
-    episodes = episodes.reset_index(drop=True)
     return replace(results, episodes=episodes, trials=trials, columns=columns)
 
 

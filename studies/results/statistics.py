@@ -108,13 +108,24 @@ def bootstrap(
     if n_runs < FEW:
         reach = special.stdtrit(n_runs - 1, 0.5 + level / 2.0)
         half = reach * np.sqrt(array.var(axis=0, ddof=1) / n_runs)
-        return _bounded(value, value - half, value + half, bounds, level, n_runs)
-    drawn, means = _drawn(n_runs, resamples, seed), []
-    for part in np.array_split(drawn, min(resamples, 1 + resamples * array.size // AT_ONCE)):
-        means.append(np.moveaxis(_taken(array, part), 0, -1).mean(axis=-1))
-    tail = _tail(level, n_runs)
-    low, high = np.quantile(np.concatenate(means), [tail, 1.0 - tail], axis=0)
-    return _bounded(value, low, high, bounds, level, n_runs)
+        low, high = value - half, value + half
+    else:
+        drawn, means = _drawn(n_runs, resamples, seed), []
+        # Memory holds next to each other what the mean runs along fastest: with several points all
+        # resamples of a run, else the runs of a resample.
+        axis = 0 if array.size > n_runs else 1
+        for part in np.array_split(drawn, min(resamples, 1 + resamples * array.size // AT_ONCE)):
+            means.append(array.take(part if axis else part.T, axis=0).mean(axis=axis))
+        tail = _tail(level, n_runs)
+        low, high = np.quantile(np.concatenate(means), [tail, 1.0 - tail], axis=0)
+    least, greatest = bounds
+    low, high = np.clip(low, *bounds), np.clip(high, *bounds)
+    if np.isfinite(greatest - least):  # the interval ends at the bounds, but is no point there
+        z = float(special.ndtri(0.5 + level / 2.0))
+        reach = (greatest - least) * z**2 / (n_runs + z**2)
+        low = np.where(value >= greatest, np.minimum(low, greatest - reach), low)
+        high = np.where(value <= least, np.maximum(high, least + reach), high)
+    return Estimate(value, low, high)
 
 
 @lru_cache(maxsize=1)
@@ -125,31 +136,6 @@ def _drawn(n_runs: int, resamples: int, seed: int) -> NDArray[Any]:
     """
     runs = np.random.default_rng(seed).integers(n_runs, size=(resamples, n_runs))
     return runs.astype(np.min_scalar_type(n_runs - 1))
-
-
-def _taken(array: Array, runs: NDArray[Any]) -> Array:
-    """Return resamples ``(n, resamples)`` or ``(n, resamples, n_points)`` of values ``(n, ...)``.
-
-    Memory holds next to each other what statistics run along fastest: with one point the runs of a
-    resample, with several all resamples of a run.
-    """
-    if array.ndim == 1 or array.shape[1] == 1:
-        return np.moveaxis(array.take(runs, axis=0), 1, 0)
-    return array.take(runs.T, axis=0)
-
-
-def _bounded(
-    value: Array, low: Array, high: Array, bounds: tuple[float, float], level: float, n_runs: int
-) -> Estimate:
-    """Return an estimate whose interval ends at the bounds, but is no point there."""
-    least, greatest = bounds
-    low, high = np.clip(low, *bounds), np.clip(high, *bounds)
-    if np.isfinite(greatest - least):
-        z = float(special.ndtri(0.5 + level / 2.0))
-        reach = (greatest - least) * z**2 / (n_runs + z**2)
-        low = np.where(value >= greatest, np.minimum(low, greatest - reach), low)
-        high = np.where(value <= least, np.maximum(high, least + reach), high)
-    return Estimate(value, low, high)
 
 
 def _tail(level: float, n_runs: int) -> float:

@@ -102,11 +102,8 @@ def check(spec: Spec) -> None:
 def _keeping_weights(session: Session) -> Team:
     """Return a copy of the session's team that explores and models itself but keeps its weights."""
     settings = session.trial.settings
-    common = {
-        name: getattr(settings.learner, name)
-        for name in LearnerSettings.model_fields
-        if name != "kind"
-    }
+    shared = LearnerSettings.model_fields.keys() - {"kind"}
+    common = {name: value for name, value in settings.learner if name in shared}
     frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
     team = of_fuzzy_agents(arrange(frozen, session.trial.seed).team)
     own, arrays = team.arrays(), session.team.arrays()

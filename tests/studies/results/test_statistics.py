@@ -12,7 +12,6 @@ from scipy import stats
 from nested_agents.studies.results.statistics import (
     _drawn,
     _tail,
-    _taken,
     bootstrap,
     friedman,
     holm,
@@ -161,10 +160,10 @@ def test_what_cannot_be_estimated_is_refused(values):
 @pytest.mark.parametrize("shape", [(25,), (24, 1), (30, 7)])
 def test_how_resamples_lie_in_memory_changes_no_bit(shape):
     values = RNG.normal(size=shape)
-    drawn = _drawn(len(values), 50, 0)
-    expected = np.moveaxis(values[drawn], 1, -1).mean(axis=-1)
-    laid = np.moveaxis(_taken(values, drawn), 0, -1).mean(axis=-1)
-    np.testing.assert_array_equal(laid, expected)
+    means = np.moveaxis(values[_drawn(len(values), 50, 0)], 1, -1).mean(axis=-1)
+    tail = _tail(0.95, len(values))
+    expected = np.quantile(means, [tail, 1.0 - tail], axis=0)
+    np.testing.assert_array_equal(bootstrap(values, resamples=50)[1:], expected)
 
 
 def test_friedman_is_scipys_statistic_with_ties_and_without() -> None:
