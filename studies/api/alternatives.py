@@ -286,8 +286,8 @@ def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) 
 
     The score is the mean evaluation success, 0 where it is not measured, then the return.
     """
-    episodes = results.episodes[results.episodes["phase"] == "evaluation"]
-    by_name = episodes[episodes["seed"].isin(seeds)].groupby("condition")
+    episodes = results.episodes.query("phase == 'evaluation' and seed in @seeds")
+    by_name = episodes.groupby("condition")
     means = by_name[["success", "return"]].mean().astype(float).fillna({"success": 0.0})
     means.insert(0, "seeds", by_name["seed"].nunique())
     lines = pd.DataFrame({"name": list(points)}).join(means, on="name").fillna({"seeds": 0})

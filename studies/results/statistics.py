@@ -514,8 +514,7 @@ def deviation_of(samples: Sequence[ArrayLike], *, of_rates: bool) -> float | Non
     0.19
     >>> deviation_of([[2.0] * 5], of_rates=False)
     """
-    arrays = [np.asarray(sample, dtype=float) for sample in samples]
-    arrays = [array for array in arrays if len(array) > 1]
+    arrays = [np.asarray(sample, dtype=float) for sample in samples if np.size(sample) > 1]
     squares = sum(float(((array - array.mean()) ** 2).sum()) for array in arrays)
     freedom = float(sum(len(array) - 1 for array in arrays))
     if of_rates:

@@ -27,14 +27,9 @@ from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated, check_rule_bases
 
-TITLES = {
-    "memory": "memory [kB]",
-    "messages": "messages",
-    "formula": "formula",
-    "counted": "counted",
-}
-"""Titles of the numbers of whole trials."""
-NUMBERS = ("agents", *TITLES)
+COUNTS = ("messages", "formula", "counted")
+"""Numbers of whole trials that the table shows as they are."""
+NUMBERS = ("agents", "memory", *COUNTS)
 """What of whole trials the analysis rests on."""
 NOTES = (
     "decisions, time: of an evaluation episode, failures included; ms: of a decision of all",
@@ -91,7 +86,7 @@ def analyse(results: Results) -> Analysis:
         if "period" in numbers:
             costs["time [s]"] = steps * numbers["period"]
         costs["ms"] = 1e3 * numbers["decision_median"]
-        costs |= {title: numbers[name] for name, title in TITLES.items()}
+        costs |= {"memory [kB]": numbers["memory"]} | {name: numbers[name] for name in COUNTS}
         values = evaluated(results, condition)
         values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
         columns = results.columns.get(condition, {})
