@@ -18,9 +18,9 @@ from ...core.interface.scenario import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.numerics import FloatArray, IntArray, stream_of
 from .config import BoxPushingSettings
-from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
+from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.settings import BeliefSettings
 from .states.relational import View
 from .states.state_spaces import state_space_for

@@ -33,8 +33,14 @@ class Examination:
     """Why something could not be checked, by its name; checks write it."""
 
     def actions(self, scenario: Scenario, seed: int) -> IntArray:
-        """Return the actions that are tried in the world of a seed."""
-        return random_actions(scenario, self.steps, seed)
+        """Return joint actions ``(steps, n)`` drawn by a seed, most of them held for some steps."""
+        rng = np.random.default_rng(seed)
+        shape = self.steps, len(scenario.agents)
+        actions = rng.integers(len(scenario.action_set), size=shape)
+        held = rng.random(shape) < 0.7
+        for step in range(1, self.steps):
+            actions[step, held[step]] = actions[step - 1, held[step]]
+        return actions
 
     def play(
         self,
@@ -66,17 +72,6 @@ class Examination:
             yield frame
             if frame["terminated"] or frame["truncated"]:
                 return
-
-
-def random_actions(scenario: Scenario, steps: int, seed: int) -> IntArray:
-    """Return joint actions ``(steps, n)``, most of them held for some steps."""
-    rng = np.random.default_rng(seed)
-    shape = steps, len(scenario.agents)
-    actions = rng.integers(len(scenario.action_set), size=shape)
-    held = rng.random(shape) < 0.7
-    for step in range(1, steps):
-        actions[step, held[step]] = actions[step - 1, held[step]]
-    return actions
 
 
 def opening(scenario: Scenario, seed: int, episode: int) -> Frame:

@@ -20,8 +20,7 @@ from ..states.relational import View
 from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline
 from ..world.settings import InfraredSettings, Task, reward
-from .belief import PushBelief, outcomes
-from .push import PushModel, push
+from .push import PushBelief, PushModel, outcomes, push
 from .wheel_commands import WheelCommands, choices_of, speeds_of, twist_table, wheel_commands_of
 
 CONTACT_GAP = 0.002
@@ -44,11 +43,6 @@ class Situation:
     """Per robot ``(3, w + 1)``: twist in its frame = effect @ [wheel speeds, 1]."""
     groups: tuple[tuple[int, ...], ...]
     """Agents of each robot."""
-
-    @cached_property
-    def places(self) -> list[tuple[int, int]]:
-        """Robot of every agent, and which of its wheels the agent drives."""
-        return [(r, wheel) for r, group in enumerate(self.groups) for wheel in range(len(group))]
 
 
 @dataclass(frozen=True)
@@ -119,7 +113,7 @@ class BoxPrediction:
         limits = self.premises.limits[:, None]
         commands = actions.apply(
             speeds[:, None], np.arange(len(actions)), self.premises.increment * limits, limits
-        ).reshape(len(self.situation.groups), -1, len(actions))
+        ).reshape(len(self.groups), -1, len(actions))
         return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
 
     def _after(self, choices: IntArray, seconds: float) -> View:
@@ -168,33 +162,31 @@ class BoxPrediction:
     @cached_property
     def _shared(self) -> FloatArray:
         """The shared blocks ``(M, m, d - n_own)`` in the situations of the table."""
-        return self.premises.space.shared_of(self._table[0], range(len(self.situation.groups)))
+        return self.premises.space.shared_of(self._table[0], range(len(self.groups)))
 
     def blocks(self, agent: int) -> Blocks:
-        """Return the next states of `agent` for all joint actions, own block as if alone."""
-        r, wheel = self.situation.places[agent]
-        row = self._table[1]
-        own, which = self._own_block(r, wheel)
-        behind = sum(len(group) for group in self.situation.groups[r + 1 :])
-        divisor = len(self.premises.action_set) ** behind
-        alone = self.premises.space.own_needs_pose
-        return Blocks(own, self._shared[r], divisor, which, row, alone)
+        """Return the next states of `agent` for all joint actions, own block as if alone.
 
-    def _own_block(self, r: int, wheel: int) -> tuple[FloatArray, IntArray]:
-        """Return the own variables that occur, as if alone, and the row of each robot action."""
+        Own variables are those that occur, each with its row for every robot action.
+        """
         commands, space, goal = self.wheel_commands, self.premises.space, self.situation.goal
+        r, wheel = divmod(agent, len(self.groups[0]))
         if space.own_needs_pose:
             speeds = commands.speeds[r, : commands.counts[r], wheel]
-            return space.own(self._alone[r], speeds, goal), commands.which[r]
-        speeds = commands.levels[r, wheel, : commands.n_levels[r, wheel]]
-        own = space.own(np.zeros((len(speeds), 3)), speeds, goal)
-        return own, commands.level[r, wheel]
+            own, which = space.own(self._alone[r], speeds, goal), commands.which[r]
+        else:
+            speeds = commands.levels[r, wheel, : commands.n_levels[r, wheel]]
+            own = space.own(np.zeros((len(speeds), 3)), speeds, goal)
+            which = commands.level[r, wheel]
+        behind = sum(len(group) for group in self.groups[r + 1 :])
+        divisor = len(self.premises.action_set) ** behind
+        return Blocks(own, self._shared[r], divisor, which, self._table[1], space.own_needs_pose)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         choices = self._choices(joint_actions)
         view = self._view_again(choices)
-        (r, wheel), space = self.situation.places[agent], self.premises.space
+        (r, wheel), space = divmod(agent, len(self.groups[0])), self.premises.space
         speeds = self.wheel_commands.speeds[r, choices[:, r], wheel]
         own = space.own(view.robots[:, r], speeds, self.situation.goal)
         return np.concatenate([own, space.shared_of(view, [r])[0]], axis=1)
