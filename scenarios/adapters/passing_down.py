@@ -68,8 +68,7 @@ class PassingDownEnv(parallel_to_aec_wrapper):
 
     def __init__(self, env: ParallelEnv[str, Any, Any], hierarchy: Hierarchy | None = None) -> None:
         names = list(env.possible_agents)
-        if hierarchy is None:
-            hierarchy = Hierarchy(names, pairwise(names))
+        hierarchy = hierarchy or Hierarchy(names, pairwise(names))
         if set(hierarchy.agents) != set(names):
             raise ValueError(
                 f"hierarchy: agents {', '.join(hierarchy.agents)}, those of the environment are "

@@ -151,10 +151,8 @@ class BoxPushing:
         Failures are scheduled by the number of the `episode`.
         """
         self._sensing = stream_of(seed, SENSING)
-        rng = np.random.default_rng(seed)
-        robots, box, self._goal = place(
-            self.settings.start, rng, [self.robot] * self.settings.robots, self.box, self._unit
-        )
+        rng, start = np.random.default_rng(seed), self.settings.start
+        robots, box, self._goal = place(start, rng, self.world.robots, self.box, self._unit)
         self.world.place(robots, box)
         self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
@@ -244,7 +242,7 @@ class BoxPushing:
         from .pictures.policy import policy_of
 
         self.reset(0)
-        robots = [self.robot] * self.settings.robots
+        robots = list(self.world.robots)
         return policy_of(team, team.predict(self), self.box, robots, self.settings.start)
 
     def _save(self) -> None:
@@ -282,8 +280,7 @@ class BoxPushing:
         self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
 
     def _distance(self) -> float:
-        ahead = self._goal[:2] - self.world.box_pose[:2]
-        return float(np.hypot(ahead[0], ahead[1]))
+        return float(np.hypot(*(self._goal - self.world.box_pose)[:2]))
 
     def _orientation(self) -> float:
         return float(wrap(self.world.box_pose[2] - self._goal[2]))

@@ -70,20 +70,6 @@ class Premises:
     seconds: float
     """How far predictions look ahead [s]."""
 
-    def seen(
-        self,
-        situation: Situation,
-        robots: FloatArray,
-        box: FloatArray,
-        gaps: FloatArray,
-        seconds: float,
-    ) -> View:
-        """Return a view of situations that `situation` leads to in `seconds`."""
-        return View(
-            robots, box, gaps, situation.goal, situation.box, seconds / self.hold,
-            self.outline, self.belief.model.friction_radius,
-        )  # fmt: skip
-
 
 class BoxPrediction:
     """Predicts from one situation; see `Prediction`.
@@ -119,7 +105,15 @@ class BoxPrediction:
     def _after(self, choices: IntArray, seconds: float) -> View:
         now, twists = self.situation, self.wheel_commands.twists
         robots, box, gaps = push(now.robots, now.box, twists, choices, seconds, self.model)
-        return self.premises.seen(now, robots, box, gaps, seconds)
+        return self._seen(robots, box, gaps, seconds)
+
+    def _seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
+        """Return a view of situations that the present one leads to in `seconds`."""
+        now, premises = self.situation, self.premises
+        return View(
+            robots, box, gaps, now.goal, now.box, seconds / premises.hold, premises.outline,
+            self.model.friction_radius,
+        )  # fmt: skip
 
     def _view_again(self, choices: IntArray) -> View:
         """Return the view of `choices`: the last one, if they are the same."""
