@@ -232,9 +232,8 @@ class WheelsEnv(Game, ParallelEnv):
         transition, truncated = self.advance(joint)
         observations, infos = self._observe(transition.states, transition.info)
         rewards = {name: self.seats[name].paid(transition.reward) for name in self.agents}
-        ends, breaks = (
-            dict.fromkeys(self.agents, value) for value in (transition.terminated, truncated)
-        )
+        ends = dict.fromkeys(self.agents, transition.terminated)
+        breaks = dict.fromkeys(self.agents, truncated)
         if transition.terminated or truncated:
             self.agents = []
         return observations, rewards, ends, breaks, infos

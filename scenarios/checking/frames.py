@@ -135,8 +135,7 @@ def look_ahead(scenario: Scenario) -> None:
     if not hasattr(scenario, "predict"):
         return
     prediction = scenario.predict()
-    some = np.zeros((2, len(scenario.agents)), dtype=np.int64)
-    some[1] = len(scenario.action_set) - 1
+    some = np.repeat([[0], [len(scenario.action_set) - 1]], len(scenario.agents), axis=1)
     for agent in range(len(scenario.agents)):
         prediction.states(agent, some)
     if hasattr(prediction, "rewards"):

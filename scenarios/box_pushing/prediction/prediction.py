@@ -140,17 +140,13 @@ class BoxPrediction:
     @cached_property
     def _alone(self) -> list[FloatArray]:
         """Per robot ``(K, 3)``: its pose after every wheel command if it pushed alone."""
+        now, model, commands = self.situation, self.model, self.wheel_commands
         poses = []
-        for r, count in enumerate(self.wheel_commands.counts):
-            model = self.model._replace(
-                radii=self.model.radii[r : r + 1], compliance=self.model.compliance[r : r + 1]
-            )
-            robots, _, _ = push(
-                self.situation.robots[r : r + 1], self.situation.box,
-                self.wheel_commands.twists[r : r + 1], np.arange(count)[:, None],
-                self.premises.seconds, model,
-            )  # fmt: skip
-            poses.append(robots[:, 0])
+        for r, count in enumerate(commands.counts):
+            only, every = slice(r, r + 1), np.arange(count)[:, None]
+            alone = model._replace(radii=model.radii[only], compliance=model.compliance[only])
+            twists, seconds = commands.twists[only], self.premises.seconds
+            poses.append(push(now.robots[only], now.box, twists, every, seconds, alone)[0][:, 0])
         return poses
 
     @cached_property
@@ -206,11 +202,8 @@ class BoxPrediction:
 
     def after(self, joint_action: IntArray) -> BoxPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
-        view = self.poses(joint_action[None])
-        reached = replace(
-            self.situation,
-            robots=view.robots[0], box=view.box[0], speeds=self.commands(joint_action),
-        )  # fmt: skip
+        view, speeds = self.poses(joint_action[None]), self.commands(joint_action)
+        reached = replace(self.situation, robots=view.robots[0], box=view.box[0], speeds=speeds)
         return BoxPrediction(reached, self.model, self.premises)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
@@ -224,10 +217,9 @@ class BoxPrediction:
         Over the decision period, to be held against what is measured in it.
         """
         choices = self._choices(joint_action[None])
-        hold = self.premises.hold
-        after = self._after(choices, hold).robots[0]
+        after = self._after(choices, self.premises.hold).robots[0]
         free = self.wheel_commands.twists[np.arange(len(after)), choices[0]]
-        return mean_twists(self.situation.robots, after, hold) - free
+        return mean_twists(self.situation.robots, after, self.premises.hold) - free
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return mean twists ``(k, M + 1, 3)``, the box's first, under constants ``(k, 3)``.
@@ -264,8 +256,6 @@ def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatA
     heading = before[:, 2] + 0.5 * turn
     # The chord of an arc is shorter than the arc by the sinc of half its angle.
     shorter = np.maximum(np.sinc(0.5 * turn / pi), 2.0 / pi)
-    chord = (after[:, :2] - before[:, :2]) / shorter[:, None]
+    x, y = ((after - before)[:, :2] / shorter[:, None]).T
     cos, sin = np.cos(heading), np.sin(heading)
-    ahead = cos * chord[:, 0] + sin * chord[:, 1]
-    left = cos * chord[:, 1] - sin * chord[:, 0]
-    return np.stack([ahead, left, turn], axis=1) / seconds
+    return np.stack([cos * x + sin * y, cos * y - sin * x, turn], axis=1) / seconds
