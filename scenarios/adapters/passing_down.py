@@ -76,11 +76,9 @@ class PassingDownEnv(parallel_to_aec_wrapper):
             )
         super().__init__(env)
         self.hierarchy = hierarchy
-        self._order = [hierarchy.agents[i] for i in hierarchy.order]
-        self._above = {
-            name: {hierarchy.agents[j] for j in hierarchy.above(i)}
-            for i, name in enumerate(hierarchy.agents)
-        }
+        team = hierarchy.agents
+        self._order = [team[i] for i in hierarchy.order]
+        self._above = {name: {team[j] for j in hierarchy.above(i)} for i, name in enumerate(team)}
         self._choices = {name: _choices(name, env.action_space(name)) for name in names}
         self._spaces = {name: self._space(name) for name in names}
 

@@ -90,16 +90,12 @@ class BoxPushing:
         similar = settings.scaling == "similar"
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
         robots = [self.robot] * settings.robots
-        wheels = len(self.robot.wheels)
-        every = np.arange(settings.robots * wheels).reshape(-1, wheels)
+        names, numbers = self.robot.wheel_names, range(settings.robots)
+        self.agents = tuple(f"robot{r + 1}.{name}" for r in numbers for name in names)
+        self.roles = names * settings.robots
+        every = np.arange(len(self.agents)).reshape(-1, len(names))
         self.groups = tuple(map(tuple, every.tolist()))
-        self._body = np.repeat(np.arange(settings.robots), wheels)
-        self.agents = tuple(
-            f"robot{r + 1}.{name}"
-            for r in range(settings.robots)
-            for name in self.robot.wheel_names
-        )
-        self.roles = self.robot.wheel_names * settings.robots
+        self._body = np.repeat(numbers, len(names))
         self.action_set = ActionSet()
         self.world = World(robots, self.box, infrared=settings.infrared)
         self._space = state_space_for(settings.state_space, self.robot.max_speed)
