@@ -105,7 +105,7 @@ class BatchTD:
                 f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
                 f"allowed up to {MOST_RULES}; lower learner.rule_base.order"
             )
-        self.settings, self.rules = settings, rules
+        self.settings, self.rules, self._n_agents = settings, rules, len(rows)
         self.members = [np.flatnonzero(rows == row) for row in range(int(rows.max()) + 1)]
         """The agents ``(k,)`` of every row."""
         self.theta: FloatArray = np.zeros((len(self.members), rules.n_rules), rules.dtype)
@@ -217,10 +217,6 @@ class BatchTD:
         new = np.array(self._states[since:]).reshape(-1, self._n_agents, d)
         own = new[:, self.members[row]].reshape(-1, d)
         return own if since else np.concatenate([self._earlier[row].states, own])
-
-    @property
-    def _n_agents(self) -> int:
-        return sum(map(len, self.members))
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""

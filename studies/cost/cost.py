@@ -44,7 +44,7 @@ from ...core.rules.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ...topologies.view import aligned, readable
-from ..presentation.tables import ends, in_csv, in_latex
+from ..presentation.tables import in_csv, in_latex
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 
 SINGLE_AGENT = "single-agent"
@@ -326,7 +326,7 @@ def _record(row: CostRow) -> dict[str, Any]:
     if (cost := row.measured) is not None:
         record |= {"deciding_s": cost.deciding, "learning_s": cost.learning}
         record |= {"memory_bytes": cost.memory, "repeats": len(cost.repeats)}
-        record["step_s"], low, high = ends(cost.step)
+        record["step_s"], low, high = map(float, cost.step)
         if len(cost.repeats) > 1:
             record |= {"step_s_low": low, "step_s_high": high}
     return record
