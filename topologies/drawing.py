@@ -88,9 +88,8 @@ def draw(
     notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
     middle: dict[str, Any] = {"ha": "center", "va": "center"}
     axes.text(centre, top + 0.27, title, fontsize=10, **middle)
-    axes.text(
-        centre, top + height - 0.17, "; ".join(notes), fontsize=7.5, color="#555555", **middle
-    )
+    bottom, noted = top + height - 0.17, "; ".join(notes)
+    axes.text(centre, bottom, noted, fontsize=7.5, color="#555555", **middle)
     # Without date and random identifiers, equal hierarchies give equal files.
     metadata = {"Date": None} if Path(path).suffix == ".svg" else None
     with matplotlib.rc_context({"svg.hashsalt": "nested-agents", "svg.fonttype": "none"}):
@@ -175,9 +174,8 @@ def _agents(
         corner = x - WIDTH / 2 + 0.05, y - HEIGHT / 2 + 0.05
         fill = COLOURS[body_of.get(i, 0) % len(COLOURS)]
         frame = BOX | {"edgecolor": "#B00020", "linestyle": "--"} if i in failing else BOX
-        axes.add_patch(
-            FancyBboxPatch(corner, WIDTH - 0.1, HEIGHT - 0.1, facecolor=fill, zorder=3, **frame)
-        )
+        box = FancyBboxPatch(corner, WIDTH - 0.1, HEIGHT - 0.1, facecolor=fill, zorder=3, **frame)
+        axes.add_patch(box)
         size = min(8.5, 8.5 * 15 / len(name))
         left = x - WIDTH / 2 + 0.07
         axes.text(left, y, str(rank), fontsize=6.5, va="center", color="#777777", zorder=4)
