@@ -357,7 +357,10 @@ def _arguments(kind: str, text: str) -> dict[str, Any]:
     if kind not in ARGUMENTS:
         raise ValueError(f"takes no argument, received {text!r}")
     read_as = ARGUMENTS[kind][1]
-    return read_as(text) if callable(read_as) else {read_as: text}
+    if callable(read_as):
+        return read_as(text)
+    is_number = TOPOLOGIES.model(kind).model_fields[read_as].annotation is int
+    return {read_as: int(text) if is_number and text.removeprefix("-").isdecimal() else text}
 
 
 def read_file(path: str) -> nx.DiGraph | dict[str, Any]:

@@ -26,7 +26,6 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..interface.hierarchy import Hierarchy
 from ..interface.spaces import BestResponses, Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
@@ -99,8 +98,7 @@ class BestResponse(Aggregation):
     def __init__(self, problem: DecisionProblem, sweeps: int = 1) -> None:
         super().__init__(problem)
         self._sweeps = sweeps
-        why = "best-response plans for 'best-response' only"
-        self.require("teammates", "best-response", why)
+        self.require("teammates", "best-response", "best-response plans for 'best-response' only")
         hierarchy, groups = problem.hierarchy, problem.groups
         n = len(hierarchy)
         nobody = problem.unseen != "plan" and not any(map(hierarchy.below, range(n)))
@@ -118,7 +116,8 @@ class BestResponse(Aggregation):
         self._numbers = np.arange(len(self._actions[sizes[0]]))
         # Per agent, whom it considers, itself included, in the order of decision; those of its
         # body; the others.
-        self._free = [_in_order(hierarchy, {i, *hierarchy.below(i)}) for i in range(n)]
+        considered = [{i, *hierarchy.below(i)} for i in range(n)]
+        self._free = [tuple(j for j in hierarchy.order if j in who) for who in considered]
         body = self._body_of
         self._own = [tuple(j for j in self._free[i] if body[j] == body[i]) for i in range(n)]
         self._others = [np.setdiff1d(np.arange(n), free) for free in self._free]
@@ -259,8 +258,8 @@ class BestResponse(Aggregation):
         agent, rng = deliberation.agent, deliberation.rng
         free = self._free[agent]
         if self.problem.unseen == "plan":
-            every = set(range(len(self.hierarchy)))
-            free = _in_order(self.hierarchy, every - set(deliberation.told.tolist()))
+            told = set(deliberation.told.tolist())
+            free = tuple(i for i in self.hierarchy.order if i not in told)
         bodies: dict[int, list[int]] = {}
         for i in free:
             bodies.setdefault(int(self._body_of[i]), []).append(i)
@@ -328,11 +327,6 @@ def _kept_up(problem: DecisionProblem, planners: list[int]) -> list[bool]:
         told_all = all({*users[:k]} <= {*hierarchy.above(i)} for k, i in enumerate(users))
         kept[planner] = problem.handed_down and told_all
     return [kept[planner] for planner in planners]
-
-
-def _in_order(hierarchy: Hierarchy, agents: set[int]) -> tuple[int, ...]:
-    """Return agents in the order of decision."""
-    return tuple(i for i in hierarchy.order if i in agents)
 
 
 def _with(joint_action: IntArray, changes: list[tuple[tuple[int, ...], IntArray]]) -> IntArray:
