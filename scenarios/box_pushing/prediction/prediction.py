@@ -115,12 +115,13 @@ class BoxPrediction:
             self.model.friction_radius,
         )  # fmt: skip
 
-    def _view_again(self, choices: IntArray) -> View:
-        """Return the view of `choices`: the last one, if they are the same."""
+    def _view_again(self, joint_actions: IntArray) -> tuple[IntArray, View]:
+        """Return wheel commands ``(m, M)``, and their view: the last one, if they are the same."""
+        choices = self._choices(joint_actions)
         key = choices.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, self._after(choices, self.premises.seconds)
-        return self._last[1]
+        return choices, self._last[1]
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
         """Return the wheel command ``(m, M)`` of each robot in joint actions ``(m, n)``."""
@@ -174,8 +175,7 @@ class BoxPrediction:
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        choices = self._choices(joint_actions)
-        view = self._view_again(choices)
+        choices, view = self._view_again(joint_actions)
         (r, wheel), space = divmod(agent, len(self.groups[0])), self.premises.space
         speeds = self.wheel_commands.speeds[r, choices[:, r], wheel]
         own = space.own(view.robots[:, r], speeds, self.situation.goal)
@@ -186,8 +186,7 @@ class BoxPrediction:
 
         ``(n, m, n_own)`` and ``(M, m, d - n_own)``, for joint actions ``(m, n)``.
         """
-        choices = self._choices(joint_actions)
-        view = self._view_again(choices)
+        choices, view = self._view_again(joint_actions)
         space, speeds = self.premises.space, speeds_of(choices, self.wheel_commands.speeds)
         poses: FloatArray = np.zeros((0, 3))
         if space.own_needs_pose:
@@ -233,7 +232,7 @@ class BoxPrediction:
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""
-        return self._rewards(self._view_again(self._choices(joint_actions)))
+        return self._rewards(self._view_again(joint_actions)[1])
 
     def reward_table(self) -> FloatArray:
         """Return the predicted rewards ``(A ** n,)`` of all joint actions."""
