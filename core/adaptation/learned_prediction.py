@@ -18,6 +18,8 @@ class LearnedPrediction:
         What has been learned, a `LearnedPredictor`.
     present
         ``(n, d)`` the states of all agents.
+    horizon
+        Decisions ahead.
 
     Attributes
     ----------
@@ -25,8 +27,8 @@ class LearnedPrediction:
         ``(G, L)`` the first robot-action index that comes to the same, of groups of equal size.
     """
 
-    def __init__(self, predictor: Any, present: FloatArray) -> None:
-        self._predictor, self.present = predictor, present
+    def __init__(self, predictor: Any, present: FloatArray, horizon: int) -> None:
+        self._predictor, self.present, self._horizon = predictor, present, horizon
         self._reached = predictor.reached(present)
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
         n, a, _ = self._reached.shape
@@ -44,7 +46,7 @@ class LearnedPrediction:
         if self._last is None or self._last[0] != key:
             own = self._reached[np.arange(joint_actions.shape[1]), joint_actions]
             drivers = self._predictor.drivers(own, joint_actions)
-            shared = self._predictor.after(self.present, drivers)
+            shared = self._predictor.after(self.present, drivers, self._horizon)
             self._last = key, (np.ascontiguousarray(own.swapaxes(0, 1)), shared)
         return self._last[1]
 

@@ -121,9 +121,10 @@ class LearnedPredictor:
                 self.divisors = a ** np.arange(n - w, -1, -w)
                 self.local = np.arange(a**n)[:, None] // self.divisors % a**w
 
-    def predict(self, states: FloatArray) -> LearnedPrediction:
-        """Predict from states ``(n, d)``."""
-        return (TabulatedPrediction if len(self.joint) else LearnedPrediction)(self, states)
+    def predict(self, states: FloatArray, horizon: int | None = None) -> LearnedPrediction:
+        """Predict from states ``(n, d)`` so many decisions ahead; none: as the settings say."""
+        kind = TabulatedPrediction if len(self.joint) else LearnedPrediction
+        return kind(self, states, horizon or self.horizon)
 
     def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
         """Note what a joint action led to from the states of a prediction, as `observe`."""
@@ -239,8 +240,8 @@ class LearnedPredictor:
         change = np.einsum("nr,narx->nax", phi, self.memory["own_weights"][self.kinds])
         return np.round((own + change) / self.grains) * self.grains
 
-    def after(self, states: FloatArray, drivers: FloatArray) -> FloatArray:
-        """Return the shared variables ``(G, m, s)`` that drivers ``(m, b, k)`` lead to."""
+    def after(self, states: FloatArray, drivers: FloatArray, horizon: int) -> FloatArray:
+        """Return the shared variables ``(G, m, s)`` that held drivers ``(m, b, k)`` lead to."""
         bodies, m = self.bodies, self.memory
         columns = bodies.columns[0]
         present, ranges = states[bodies.agents, bodies.columns], m["seen"][:, columns]
@@ -250,7 +251,7 @@ class LearnedPredictor:
         passes = PASSES if self.settings.midpoint else 1
         moved = driven_states(
             present, drivers, m["weights"], m["keep"],
-            ranges, self.periods[columns], self.horizon, passes, bodies.rules.layout,
+            ranges, self.periods[columns], horizon, passes, bodies.rules.layout,
         )  # fmt: skip
         body, place = bodies.places
         return np.moveaxis(moved[:, body, place], 0, 1)

@@ -77,8 +77,8 @@ class Persistence:
     def __init__(self, settings: StaticPredictor, scenario: Scenario) -> None:
         pass
 
-    def predict(self, states: FloatArray) -> StaticPrediction:
-        """Predict from states ``(n, d)``."""
+    def predict(self, states: FloatArray, horizon: int | None = None) -> StaticPrediction:
+        """Predict from states ``(n, d)``, however far ahead."""
         return StaticPrediction(states)
 
 

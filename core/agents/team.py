@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from inspect import signature
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..adaptation.self_model import Calibration, SelfModel
 from ..decision.exploration import Explorer
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from ..interface.hierarchy import Hierarchy
-from ..interface.scenario import Actors, EmbodiedScenario, Scenario, Transition, groups_of, rows_of
+from ..interface.scenario import Actors, Scenario, Transition, groups_of, rows_of
 from ..interface.spaces import NOT_EXPLORING, Prediction
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
@@ -109,9 +109,20 @@ class Team:
             scenario.state_space, scenario.action_set, self._n_told
         )
         self.learner: Learner = settings.build(self.rules, rows)
-        self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
+        self._asked = signature(self.learner.observe).parameters.keys() & {
+            "left",
+            "joint_action",
+            "ahead",
+        }
+        horizon = getattr(scenario, "horizon", 1)
+        if "ahead" in self._asked and self.predictor is None and horizon != 1:
+            raise ValueError(
+                f"learner.kind = {settings.kind!r}: learns from what one decision leads to, and "
+                f"the scenario predicts {horizon} at once; use learner.predictor.kind = 'learned'"
+            )
         self._states: FloatArray = np.zeros((len(hierarchy), scenario.state_space.n_variables))
         self._left: FloatArray = self._states
+        self._entered: Any = None  # the scenario's prediction from the states entered last
         self.evaluator: Evaluator | None = None
         decision = settings.decision
         if decision.rule != "random":
@@ -181,13 +192,19 @@ class Team:
             return self.predictor.predict(self._states)
         if self._values_actions or not hasattr(scenario, "predict"):
             return None
+        prediction = self._given_prediction(scenario)
+        if "ahead" in self._asked:
+            self._entered = prediction
+        return prediction
+
+    def _given_prediction(self, scenario: Any) -> Any:
+        """Return what the scenario predicts, believing what has been learned of it."""
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
-        embodied = cast(EmbodiedScenario, scenario)
-        effects = self.self_model.effects if self.self_model else embodied.nominal_effects
+        effects = self.self_model.effects if self.self_model else scenario.nominal_effects
         if self.calibration is None:
-            return embodied.predict_with(effects)
-        return embodied.predict_with(effects, self.calibration.constants)
+            return scenario.predict_with(effects)
+        return scenario.predict_with(effects, self.calibration.constants)
 
     def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
         """Decide a joint action ``(n,)``, from the top of the hierarchy down.
@@ -295,8 +312,24 @@ class Team:
             states, reward = self.mirror.states(states), self.mirror.reward(reward)
             left, taken = self.mirror.states(left), np.tile(taken, 2)
         offered = {"left": left, "joint_action": taken}
+        if "ahead" in self._asked:
+            ahead = self._ahead()
+            offered["ahead"] = ahead if self.mirror is None else self.mirror.states(ahead)
         asked: Any = {name: offered[name] for name in self._asked}
         self._count(self.learner.observe(states, reward, transition.terminated, **asked))
+
+    def _ahead(self) -> FloatArray:
+        """Return the states ``(n, A, d)`` that each own action leads to from those entered."""
+        n, n_actions = len(self.hierarchy), len(self.action_set)
+        prediction = self._entered
+        if self.predictor is not None:
+            prediction = self.predictor.predict(self._states, horizon=1)
+        ahead = np.empty((n, n_actions, self._states.shape[1]))
+        for i in range(n):
+            joint_actions = np.tile(self._last, (n_actions, 1))
+            joint_actions[:, i] = np.arange(n_actions)
+            ahead[i] = prediction.states(i, joint_actions)
+        return ahead
 
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""

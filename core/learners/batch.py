@@ -20,6 +20,13 @@ knew at a decision, u what it did then, r what all this paid, and (x', u') the n
 
 The maximum is the agent's own: what it was told is part of x', and is not maximised over. There is
 one reward and one target for each *joint* step, so that no agent learns from another's turn.
+
+Fitted value iteration (Gordon 1995) regresses values of after-states as batch TD does, and needs a
+predictor as well. It does not aim at what followed, which is what an earlier policy did, but at the
+best that is predicted to follow. With s_v the after-state that an agent's action v is predicted to
+lead to from s, the others doing what they did last::
+
+    f(s) = R(s) + gamma max_v f(s_v)
 """
 
 from __future__ import annotations
@@ -30,6 +37,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from ..adaptation.predictors import GivenPredictor
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..evaluators.evaluator import Counts, Deliberation
 from ..interface.spaces import ActionSet, StateSpace, choice
@@ -49,11 +57,9 @@ MOST_RULES = 4096
 Function = Callable[[FloatArray], FloatArray]
 
 
-class BatchTDSettings(LearnerSettings):
-    """Batch TD(lambda): towards what followed, regressing on all experience."""
+class AfterStateSettings(LearnerSettings):
+    """What the batch learners of values of after-states share."""
 
-    kind: Literal["batch-td"] = "batch-td"
-    factory: ClassVar[str] = f"{__name__}:BatchTD"
     ridge: Positive = 10.0
     """Weight of the squared consequents against squared errors of rewards scaled by 100: larger, if
     values are jagged; smaller, if they are flat."""
@@ -66,6 +72,13 @@ class BatchTDSettings(LearnerSettings):
     """Decisions of an episode after which is regressed without waiting for its end."""
     mirrored: bool = False
     """Whether what the mirror image of the team would have met is experience as well."""
+
+
+class BatchTDSettings(AfterStateSettings):
+    """Batch TD(lambda): towards what followed, regressing on all experience."""
+
+    kind: Literal["batch-td"] = "batch-td"
+    factory: ClassVar[str] = f"{__name__}:BatchTD"
     trace_decay: Fraction = 0.0
     """Trace decay lambda: 0 bootstraps from the next state, 1 sums the rewards of an episode."""
 
@@ -146,21 +159,29 @@ class BatchTD:
         """Return how many weights have changed: all of them."""
         self._extend()
         s = self.settings
-        for row, (taken, strengths) in enumerate(self._active):
+        for row in range(len(self._active)):
+            taken, strengths = self._taken(row)
             rewards, follower = self._outcomes(row)
             rewards = REWARD_SCALE * rewards
             weights, values_of, solve = self._equations(row, (follower != CUT_OFF).astype(float))
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
             theta = self.theta[row].astype(float) * REWARD_SCALE
             for _ in range(s.regression_iterations):
-                returns = lambda_returns(
-                    values_of(theta), rewards, follower, s.discount, s.trace_decay
-                )
+                returns = self._returns(values_of(theta), rewards, follower)
                 targets = weights * np.clip(returns, low, high)
                 theta = solve(moment(taken, strengths, targets, theta.size))
             change = theta / REWARD_SCALE - self.theta[row]
             self.theta[row] += s.target_averaging_rate * change
         return self.theta.size
+
+    def _taken(self, row: int) -> tuple[IntArray, FloatArray]:
+        """Return the active rules and strengths ``(N, k)`` of what is regressed on."""
+        return self._active[row]
+
+    def _returns(self, values: FloatArray, rewards: FloatArray, follower: IntArray) -> FloatArray:
+        """Return what every after-state was worth ``(N,)``."""
+        s = self.settings
+        return lambda_returns(values, rewards, follower, s.discount, s.trace_decay)
 
     def _equations(self, row: int, known: FloatArray) -> tuple[FloatArray, Function, Function]:
         """Return the weights ``(N,)`` of after-states, and how their values and theta follow.
@@ -172,7 +193,7 @@ class BatchTD:
         known
             ``(N,)`` 1 for after-states of which it is known what followed, 0 for others.
         """
-        active, strengths = self._active[row]
+        active, strengths = self._taken(row)
         gram = self.settings.ridge * np.eye(self.rules.n_rules)
         add_gram(gram, active, strengths, known)
         return known, lambda theta: row_values(theta, active, strengths), solver(gram)
@@ -213,10 +234,14 @@ class BatchTD:
 
     def states_of(self, row: int, since: int = 0) -> FloatArray:
         """Return the after-states ``(m, d)`` of a row, those since a step of this team alone."""
-        d = len(self.rules.partitions)
-        new = np.array(self._states[since:]).reshape(-1, self._n_agents, d)
-        own = new[:, self.members[row]].reshape(-1, d)
-        return own if since else np.concatenate([self._earlier[row].states, own])
+        new = np.array(self._states[since:]).reshape(-1, self._n_agents, self._width)
+        own, earlier = new[:, self.members[row]].reshape(-1, self._width), self._earlier[row].states
+        return own if since or not len(earlier) else np.concatenate([earlier, own])
+
+    @property
+    def _width(self) -> int:
+        """Columns of what is remembered of an after-state."""
+        return int((self._states or [self._earlier[0].states])[0].shape[1])
 
     @property
     def _n_agents(self) -> int:
@@ -224,10 +249,10 @@ class BatchTD:
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""
-        n, d = self._n_agents, len(self.rules.partitions)
+        n = self._n_agents
         return {
             "theta": self.theta,
-            "states": np.array(self._states).reshape(-1, n, d),
+            "states": np.array(self._states).reshape(-1, n, self._width),
             "rewards": np.array(self._rewards).reshape(-1, n),
             "follower": np.array(self._follower, dtype=np.int64),
             "earlier_rows": np.repeat(
@@ -314,6 +339,59 @@ def lambda_returns(
             ahead = (1.0 - decay) * values[after] + decay * returns[after]
             returns[s] = rewards[s] + discount * ahead
     return returns
+
+
+class FittedValueSettings(AfterStateSettings):
+    """Fitted value iteration: towards the best that is predicted to follow."""
+
+    kind: Literal["fitted-value"] = "fitted-value"
+    factory: ClassVar[str] = f"{__name__}:FittedValue"
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict: targets are predicted, too."""
+        return isinstance(self.predictor, GivenPredictor)
+
+
+class FittedValue(BatchTD):
+    """Fitted value iteration: aims at the best of the after-states that are predicted to follow.
+
+    Predictions are those of the predictor as it was when they were made.
+    """
+
+    def observe(  # type: ignore[override]  # what is asked for by name is given
+        self, states: FloatArray, reward: float | FloatArray, terminated: bool, *, ahead: FloatArray
+    ) -> int:
+        """Remember an after-state, and what each own action ``(n, A, d)`` leads to from there."""
+        remembered = np.concatenate([states[:, None], ahead], axis=1).reshape(len(states), -1)
+        return super().observe(remembered, reward, terminated)
+
+    def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return active rules and strengths ``(m, 1 + A, k)``, of after-states themselves first."""
+        active, strengths = self.rules.active(states.reshape(-1, len(self.rules.partitions)))
+        shape = len(states), -1, active.shape[1]
+        return active.reshape(shape), strengths.reshape(shape)
+
+    def _taken(self, row: int) -> tuple[IntArray, FloatArray]:
+        active, strengths = self._active[row]
+        return np.ascontiguousarray(active[:, 0]), np.ascontiguousarray(strengths[:, 0])
+
+    def _returns(self, values: FloatArray, rewards: FloatArray, follower: IntArray) -> FloatArray:
+        discount = self.settings.discount
+        lasting = rewards / (1.0 - discount)
+        return np.where(follower == TERMINAL, lasting, rewards + discount * values)
+
+    def _equations(self, row: int, known: FloatArray) -> tuple[FloatArray, Function, Function]:
+        """As in batch TD, but with the values ``(N,)`` of the best that is predicted to follow."""
+        weights, _, solve = super()._equations(row, np.ones_like(known))
+        k = self._active[row][0].shape[2]
+        active = self._active[row][0][:, 1:].reshape(-1, k)
+        strengths = self._active[row][1][:, 1:].reshape(-1, k)
+
+        def values_of(theta: FloatArray) -> FloatArray:
+            return row_values(theta, active, strengths).reshape(len(weights), -1).max(axis=1)
+
+        return weights, values_of, solve
 
 
 NOBODY = "nobody"
