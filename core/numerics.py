@@ -186,11 +186,10 @@ class Kernel:
         import numba
 
         function = self.py_func
-        names = set(_names(function.__code__)) & function.__globals__.keys()
         kernels = {
             name: thing.inner
-            for name in names
-            if isinstance(thing := function.__globals__[name], Kernel)
+            for name in set(_names(function.__code__))
+            if isinstance(thing := function.__globals__.get(name), Kernel)
         }
         seen = FunctionType(
             function.__code__, function.__globals__ | kernels, function.__name__,
@@ -224,16 +223,14 @@ class Kernel:
         key = compiled._cache._index_key(types, compiled.targetctx.codegen())
         if key not in compiled._cache._cache_file._load_index():
             with contextlib.suppress(OSError, pickle.PicklingError, AttributeError, TypeError):
-                child = _child(os.getpid())
-                assert child.stdin is not None
-                assert child.stdout is not None
+                child: Any = _child(os.getpid())
                 place = self.py_func.__module__, self.py_func.__name__
                 pickle.dump((sys.path, *place, pickle.dumps(types)), child.stdin)
                 child.stdin.flush()
                 child.stdout.read(1)
 
     def __getattr__(self, name: str) -> Any:
-        """Return what the compiled function has, as its statistics."""
+        """Return what the compiled function has: its statistics, its type in other kernels."""
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self.compiled, name)

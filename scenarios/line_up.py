@@ -15,6 +15,7 @@ u, ``m dv/dt = k (u - v)``. With ``tau = m / k`` and u held for a period T this 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property, reduce
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -129,8 +130,7 @@ class LineUp:
         return self
 
     def _commanded(self, joint_actions: IntArray) -> FloatArray:
-        n = len(self.agents)
-        unit, limit = np.full(n, INCREMENT), np.full(n, MAX_SPEED)
+        unit, limit = np.array([INCREMENT]), np.array([MAX_SPEED])
         return self.action_set.apply(self._commands, joint_actions, unit, limit)
 
     def _states(self) -> FloatArray:
@@ -149,7 +149,11 @@ class LineUpPrediction:
 
     def __init__(self, places: FloatArray) -> None:
         self._places = places
-        self._sums: FloatArray | None = None
+
+    @cached_property
+    def _sums(self) -> FloatArray:
+        """The sums ``(A ** n,)`` of the places after all joint actions."""
+        return reduce(lambda sums, places: np.add.outer(sums, places).ravel(), self._places)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, 2)`` of `agent` for joint actions ``(m, n)``."""
@@ -170,10 +174,6 @@ class LineUpPrediction:
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions."""
         n, n_actions = self._places.shape
-        if self._sums is None:
-            self._sums = self._places[0]
-            for places in self._places[1:]:
-                self._sums = np.add.outer(self._sums, places).ravel()
         divisor = n_actions ** (n - 1 - agent)
         own = self._places[agent][:, None]
         lead = own - self._sums.reshape(-1, n_actions, divisor) / n

@@ -33,9 +33,7 @@ class Scene:
         self.figure = Figure(figsize=(sides[0] / DPI, sides[1] / DPI), dpi=DPI)
         self.canvas = FigureCanvasAgg(self.figure)
         self.axes = self.figure.add_axes(place)
-        self.axes.set_aspect("equal")
-        self.axes.set_xlabel("x [m]")
-        self.axes.set_ylabel("y [m]")
+        self.axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
         self._moving: list[Artist] = []
 
     def draw(self, step: int) -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from ..core.interface.spaces import StateSpace, Variable
 from ..core.numerics import FloatArray
@@ -88,32 +89,26 @@ def guarded(view: Any) -> Any:
     return replace(view, **arrays)
 
 
-def sensed(things: Sequence[StateVariable], view: Any, bodies: Sequence[int]) -> FloatArray:
-    """Return state variables ``(len(bodies), m, variables)`` of bodies, by the functions alone.
-
-    Those that are the same for all bodies are computed once.
-    """
-    values = np.empty((len(bodies), view.n_situations, len(things)))
-    safe = view if all(thing.trusted for thing in things) else guarded(view)
-    for column, thing in enumerate(things):
-        for k, body in enumerate(bodies):
-            known = k > 0 and thing.common
-            values[k, :, column] = values[0, :, column] if known else thing(safe, body)
-    return values
-
-
-def filled(
-    values: FloatArray, things: Sequence[StateVariable], view: Any, bodies: Sequence[int]
+def sensed(
+    things: Sequence[StateVariable],
+    view: Any,
+    bodies: Sequence[int],
+    given: FloatArray | None = None,
 ) -> FloatArray:
-    """Return compiled variables ``(len(bodies), m, variables)`` with those of users filled in.
+    """Return state variables ``(len(bodies), m, variables)`` of bodies.
 
-    Every body is asked, so that a check of the scenario finds what is wrongly called common.
+    By the functions alone, and those that are the same for all bodies are computed once. Or, if
+    compiled ones are `given`, with those of users filled in: then every body is asked, so that a
+    check of the scenario finds what is wrongly called common.
     """
-    own = [(column, thing) for column, thing in enumerate(things) if not thing.trusted]
-    safe = guarded(view) if own else view
-    for column, thing in own:
+    once, shape = given is None, (len(bodies), view.n_situations, len(things))
+    values = np.empty(shape) if given is None else given
+    wanted = [(c, thing) for c, thing in enumerate(things) if once or not thing.trusted]
+    safe = view if all(thing.trusted for _, thing in wanted) else guarded(view)
+    for column, thing in wanted:
         for k, body in enumerate(bodies):
-            values[k, :, column] = thing(safe, body)
+            known = once and k > 0 and thing.common
+            values[k, :, column] = values[0, :, column] if known else thing(safe, body)
     return values
 
 
@@ -169,8 +164,12 @@ def find_variable(registry: Registry, name: str) -> StateVariable:
     return replace(thing, trusted=name in registry.built_in)
 
 
-def referred(registry: Registry, names: object) -> object:
-    """Return a list of state variables with the objects in it replaced by their names."""
-    if not isinstance(names, list | tuple):
-        return names
-    return tuple(registry.reference_to(v) if isinstance(v, StateVariable) else v for v in names)
+def referred(registry: Registry) -> BeforeValidator:
+    """Return what replaces state variables of a registry by their names, in a list of both."""
+
+    def named(given: object) -> object:
+        if not isinstance(given, list | tuple):
+            return given
+        return tuple(registry.reference_to(v) if isinstance(v, StateVariable) else v for v in given)
+
+    return BeforeValidator(named)

@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from itertools import chain as concatenated
-from itertools import zip_longest
+from itertools import combinations, compress, zip_longest
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -340,11 +339,8 @@ def random_hierarchy(
     """
     rng = np.random.default_rng(seed)
     ranked = [agents[i] for i in rng.permutation(len(agents))]
-    graph = independent(agents)
-    for i, superior in enumerate(ranked):
-        below = ranked[i + 1 :]
-        chosen = rng.random(len(below)) < density
-        graph.add_edges_from((superior, b) for b, c in zip(below, chosen, strict=True) if c)
+    graph, pairs = independent(agents), list(combinations(ranked, 2))
+    graph.add_edges_from(compress(pairs, rng.random(len(pairs)) < density))
     return graph
 
 
@@ -356,8 +352,7 @@ def names_of(members: Iterable[Any]) -> list[str]:
     >>> names_of([["a", ["b"]], "c"])
     ['a', 'b', 'c']
     """
-    parts = ([m] if isinstance(m, str) else names_of(m) for m in members)
-    return list(concatenated.from_iterable(parts))
+    return [name for m in members for name in ([m] if isinstance(m, str) else names_of(m))]
 
 
 def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbours: bool = False) -> nx.Graph:

@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from inspect import iscoroutine
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, cast, get_args
 
 from pydantic import model_validator
 
@@ -172,9 +172,7 @@ def _of_table(table: Mapping[str, Any]) -> TopologySettings:
 
 
 def _made(kind: str, table: Mapping[str, Any]) -> TopologySettings:
-    settings = TOPOLOGIES.model(kind)(**table)
-    assert isinstance(settings, TopologySettings)
-    return settings
+    return cast(TopologySettings, TOPOLOGIES.model(kind)(**table))
 
 
 Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]

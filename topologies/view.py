@@ -175,10 +175,9 @@ def printed(shown: HierarchyView, form: Form) -> str:
         }
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items())
         return "{" + ",\n ".join(lines) + "}"
-    under = {i: [names[b] for a, b in hierarchy.edges if a == i] for i in range(n)}
-    for a, b in hierarchy.neighbours:
-        under[a].append(names[b])
-        under[b].append(names[a])
+    beside = hierarchy.neighbours
+    pairs = sorted([*hierarchy.edges, *beside, *((b, a) for a, b in beside)])
+    under = {i: [names[b] for a, b in pairs if a == i] for i in range(n)}
     rows = [
         ("", "agent", "below", "tries", "neighbours" if hierarchy.neighbours else "subordinates")
     ]

@@ -20,7 +20,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..interface.scenario import Scenario, Transition, groups_of, roles_of
+from ..interface.scenario import Scenario, Transition, groups_of, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
@@ -62,7 +62,7 @@ class LearnedPredictor:
     def __init__(self, settings: LearnedPredictorSettings, scenario: Scenario) -> None:
         self.settings, self.space = settings, scenario.state_space
         self.groups, self.n_actions = groups_of(scenario), len(scenario.action_set)
-        space, roles = self.space, roles_of(scenario)
+        space = self.space
         if not space.shared:
             raise ValueError("learner.predictor: all state variables are an agent's own")
         self.horizon = settings.horizon or cast(Any, getattr(scenario, "horizon", 1))
@@ -73,8 +73,7 @@ class LearnedPredictor:
         mirrored = known if settings.mirrored is None else settings.mirrored
         self.mirror = Mirror.of(scenario) if mirrored else None
         self.bodies = Bodies(scenario, products=settings.products, memberships=settings.memberships)
-        kinds = list(dict.fromkeys(roles))
-        self.kinds = np.array([kinds.index(role) for role in roles])
+        self.kinds = rows_of(scenario, shared=True)
         """``(n,)`` agents of one kind have own variables that change alike."""
         own = [Partition.of(variable) for variable in space.own]
         self.own_rules = RuleBase(own, [(j,) for j in range(len(own))]) if own else None
@@ -92,7 +91,7 @@ class LearnedPredictor:
                 f"{MOST_FEATURES}; take fewer products or memberships"
             )
         r = self.own_rules.n_rules if self.own_rules else 0
-        of_own, f = (len(kinds), self.n_actions, r), k * rules
+        of_own, f = (self.kinds.max() + 1, self.n_actions, r), k * rules
         self.memory: dict[str, FloatArray] = {
             "own_gram": np.zeros((*of_own, r)),
             "own_moment": np.zeros((*of_own, space.n_own)),

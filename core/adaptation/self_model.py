@@ -44,8 +44,6 @@ from ..plugins.settings import NonNegative, Positive, Settings
 
 MEMORY = 100
 """Decisions over which the size of innovations is averaged."""
-KEPT = ("effect", "covariance", "ratio")
-"""What is saved of the filters of a robot."""
 
 
 class SelfModelSettings(Settings):
@@ -63,42 +61,6 @@ class SelfModelSettings(Settings):
     """Squared innovation, in units of its expected square, from which on a change is assumed."""
     inflation: Positive = 1.0
     """Share of the prior covariance that is added then."""
-
-
-class _Filters:
-    """The filters of one robot, of the ``(3, w + 1)`` nominal effect of its wheels."""
-
-    def __init__(self, settings: SelfModelSettings, nominal: FloatArray) -> None:
-        self.settings, self.nominal = settings, np.array(nominal, dtype=float)
-        self.effect = self.nominal.copy()
-        # A turning rate is measured in units of the nominal robot's own turning per wheel speed.
-        self.units = np.array([1.0, 1.0, max(1.0, float(np.abs(nominal[2]).max()))])
-        of_effect, of_constant = settings.prior_effect**2, settings.prior_constant**2
-        self.prior = np.diag([of_effect] * (nominal.shape[1] - 1) + [of_constant])
-        self.covariance = np.stack([self.prior] * 3)
-        # Mean squared innovation of each component in units of the expected square.
-        self.ratio: FloatArray = np.ones(3)
-
-    @property
-    def deviations(self) -> FloatArray:
-        larger = self.units[:, None] * np.sqrt(np.maximum(1.0, self.ratio))[:, None]
-        return larger * np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
-
-    def observe(self, speeds: FloatArray, twist: FloatArray) -> None:
-        settings, regressor = self.settings, np.append(speeds, 1.0)
-        noise, effect, covariance = settings.noise**2, self.effect, self.covariance
-        for row, unit in enumerate(self.units):
-            innovation = float(twist[row] - effect[row] @ regressor) / unit
-            carried = covariance[row] @ regressor
-            expected = float(regressor @ carried) + noise
-            self.ratio[row] += (innovation**2 / expected - self.ratio[row]) / MEMORY
-            if innovation**2 > settings.surprise * expected:
-                covariance[row] += settings.inflation * self.prior
-                carried = covariance[row] @ regressor
-                expected = float(regressor @ carried) + noise
-            gain = carried / expected
-            effect[row] += gain * innovation * unit
-            covariance[row] -= np.outer(gain, carried)
 
 
 class SelfModel:
@@ -125,12 +87,19 @@ class SelfModel:
     """
 
     def __init__(self, settings: SelfModelSettings, nominal: Sequence[FloatArray]) -> None:
-        self._robots = [_Filters(settings, effect) for effect in nominal]
-
-    @property
-    def effects(self) -> tuple[FloatArray, ...]:
+        self._settings = settings
+        self._nominal = [np.array(effect, dtype=float) for effect in nominal]
+        self.effects = tuple(effect.copy() for effect in self._nominal)
         """Per robot the ``(3, w + 1)`` effect of its wheels, as learned so far."""
-        return tuple(robot.effect for robot in self._robots)
+        # A turning rate is measured in units of the nominal robot's own turning per wheel speed.
+        turning = [max(1.0, float(np.abs(effect[2]).max())) for effect in nominal]
+        self._units = [np.array([1.0, 1.0, unit]) for unit in turning]
+        of_effect, of_constant = settings.prior_effect**2, settings.prior_constant**2
+        wheels = [effect.shape[1] - 1 for effect in nominal]
+        self._priors = [np.diag([of_effect] * w + [of_constant]) for w in wheels]
+        self._covariances = [np.stack([prior] * 3) for prior in self._priors]
+        # Mean squared innovation of each component in units of the expected square.
+        self._ratios: list[FloatArray] = [np.ones(3) for _ in nominal]
 
     @property
     def deviations(self) -> tuple[FloatArray, ...]:
@@ -138,7 +107,12 @@ class SelfModel:
 
         Those of its filters, times how much larger their innovations are than they expect.
         """
-        return tuple(robot.deviations for robot in self._robots)
+        larger = (
+            (unit * np.sqrt(np.maximum(1.0, ratio)))[:, None]
+            for unit, ratio in zip(self._units, self._ratios, strict=True)
+        )
+        own = (np.sqrt(np.diagonal(c, axis1=1, axis2=2)) for c in self._covariances)
+        return tuple(map(np.multiply, larger, own))
 
     @classmethod
     def of(cls, settings: SelfModelSettings, scenario: Scenario) -> SelfModel | None:
@@ -170,12 +144,25 @@ class SelfModel:
 
     def observe(self, robot: int, speeds: FloatArray, twist: FloatArray) -> None:
         """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
-        self._robots[robot].observe(speeds, twist)
+        settings, regressor, ratio = self._settings, np.append(speeds, 1.0), self._ratios[robot]
+        noise, effect, covariance = settings.noise**2, self.effects[robot], self._covariances[robot]
+        for row, unit in enumerate(self._units[robot]):
+            innovation = float(twist[row] - effect[row] @ regressor) / unit
+            carried = covariance[row] @ regressor
+            expected = float(regressor @ carried) + noise
+            ratio[row] += (innovation**2 / expected - ratio[row]) / MEMORY
+            if innovation**2 > settings.surprise * expected:
+                covariance[row] += settings.inflation * self._priors[robot]
+                carried = covariance[row] @ regressor
+                expected = float(regressor @ carried) + noise
+            gain = carried / expected
+            effect[row] += gain * innovation * unit
+            covariance[row] -= np.outer(gain, carried)
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return effects, covariances and ratios of innovations by robot."""
-        robots = range(len(self._robots))
-        return {f"{name}{r}": getattr(self._robots[r], name) for name in KEPT for r in robots}
+        kept = {"effect": self.effects, "covariance": self._covariances, "ratio": self._ratios}
+        return {f"{name}{r}": array for name in kept for r, array in enumerate(kept[name])}
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
@@ -184,7 +171,7 @@ class SelfModel:
 
     def continue_from(self, former: SelfModel) -> None:
         """Go on from what another one has learned, if its bodies are built alike; else anew."""
-        mine, theirs = ([r.nominal for r in model._robots] for model in (self, former))
+        mine, theirs = self._nominal, former._nominal
         if len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs)):
             self.restore(former.arrays())
 

@@ -230,7 +230,8 @@ class Messages:
         self, hierarchy: Hierarchy, failures: Sequence[MessageFailure], n_actions: int
     ) -> None:
         n = len(hierarchy)
-        self._failures, self._n_actions = tuple(failures), n_actions
+        self.failures, self._n_actions = tuple(failures), n_actions
+        """What is ever to fail."""
         places = [f"topology.failures[{k}]" for k in range(len(failures))]
         self._masks = [
             f.mask(hierarchy.agents, place) for f, place in zip(failures, places, strict=True)
@@ -244,11 +245,6 @@ class Messages:
         }
         self._memory = max([getattr(f, "decisions", 0) for f in failures], default=0)
         self.begin(0, 0)
-
-    @property
-    def fail(self) -> bool:
-        """Whether anything is ever to fail."""
-        return bool(self._failures)
 
     def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:
         """Start an episode; what is random in it follows from `seed`."""
@@ -266,20 +262,20 @@ class Messages:
 
     def _strike(self) -> None:
         now = self._episode, self._step
-        self._active = [k for k, f in enumerate(self._failures) if f.lasts(*now)]
+        self._active = [k for k, f in enumerate(self.failures) if f.lasts(*now)]
 
     def failing(self, episode: int, moments: int) -> BoolArray:
         """Return whose messages fail before each of the first decisions of an episode.
 
         The array is ``(moments, n)``; of agents with another superior, those to them fail.
         """
-        when = [[f.lasts(episode, step) for f in self._failures] for step in range(moments)]
+        when = [[f.lasts(episode, step) for f in self.failures] for step in range(moments)]
         return np.array(when) @ np.array(self._masks)
 
     def is_absent(self, agent: int) -> bool:
         """Return whether an agent takes no part in the present decision."""
         return any(
-            isinstance(self._failures[k], AbsentAgents) and self._masks[k][agent]
+            isinstance(self.failures[k], AbsentAgents) and self._masks[k][agent]
             for k in self._active
         )
 
@@ -293,7 +289,7 @@ class Messages:
             concerned = np.flatnonzero(self._masks[k][senders])
             past = [joint[senders[concerned]] for joint in self._past]
             sent = Sent(actions[concerned], past, self._n_actions, self._rng)
-            actions[concerned] = self._failures[k].passed(sent)
+            actions[concerned] = self.failures[k].passed(sent)
             arrive = actions != LOST
             senders, actions = senders[arrive], actions[arrive]
         return senders, actions

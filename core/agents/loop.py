@@ -23,7 +23,7 @@ Everything else of this package, hierarchies too, works on it unchanged.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
@@ -340,46 +340,36 @@ class JointPrediction:
     """
 
     def __init__(self, prediction: Prediction, joint: JointAgents) -> None:
-        self._prediction, self._joint = prediction, joint
-        for name in OF_JOINT_ACTIONS:
-            if hasattr(prediction, name):
-                setattr(self, name, partial(_ask, getattr(prediction, name), joint))
-        if hasattr(prediction, "groups"):
-            self.groups = prediction.groups
-        if joint.whole:
-            self.blocks = partial(_whole_blocks, prediction, joint)
-            if hasattr(prediction, "rewards"):
-                self.reward_table = partial(_ask, prediction.rewards, joint, joint.every())
-        elif hasattr(prediction, "reward_table"):  # which the tables of next states are used with
-            self.blocks = partial(_body_blocks, prediction, joint)
-            self.reward_table = prediction.reward_table
+        self._prediction: Any = prediction
+        self._joint = joint
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the scenario's own prediction can do, for the actions of those who act."""
+        own, joint = self._prediction, self._joint
+        if name in OF_JOINT_ACTIONS:
+            asked = getattr(own, name)
+            return lambda joint_actions, *rest: asked(joint.actions(joint_actions), *rest)
+        if name == "reward_table" and joint.whole:
+            return partial(self.rewards, joint.every())
+        # The tables of next states are used with those of rewards.
+        if name == "blocks" and (joint.whole or hasattr(own, "reward_table")):
+            return self._whole if joint.whole else self._by_body
+        if name in ("groups", "reward_table"):
+            return getattr(own, name)
+        raise AttributeError(name)
+
+    def _whole(self, agent: int) -> Blocks:
+        """Return the next states of one who acts for all, of which no variable is its own alone."""
+        return Blocks(np.zeros((1, 0)), self.states(agent, self._joint.every()), 1)
+
+    def _by_body(self, agent: int) -> Blocks:
+        """Return the next states of who acts for a body, for all joint actions."""
+        blocks = [self._prediction.blocks(i) for i in self._joint.blocks[agent]]
+        own = np.concatenate([b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks], 1)
+        return replace(blocks[0], own=own, own_rows=np.zeros(0, dtype=np.int64))
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of who acts for a block, for actions ``(m, M)``."""
         actions = self._joint.actions(joint_actions)
         block = self._joint.blocks[agent]
         return self._joint.joined([self._prediction.states(i, actions) for i in block])
-
-
-# Without references to the prediction that they serve, which would keep it until collected.
-
-
-def _ask(
-    question: Callable[..., FloatArray], joint: JointAgents, joint_actions: IntArray, *rest: Any
-) -> FloatArray:
-    """Return what a scenario's own prediction says of the actions of those who act."""
-    return question(joint.actions(joint_actions), *rest)
-
-
-def _whole_blocks(prediction: Prediction, joint: JointAgents, agent: int) -> Blocks:
-    """Return the next states of one who acts for all, of which no variable is its own alone."""
-    actions = joint.actions(joint.every())
-    states = joint.joined([prediction.states(i, actions) for i in joint.blocks[agent]])
-    return Blocks(np.zeros((1, 0)), states, 1)
-
-
-def _body_blocks(prediction: Any, joint: JointAgents, agent: int) -> Blocks:
-    """Return the next states of who acts for a body, for all joint actions."""
-    blocks = [prediction.blocks(i) for i in joint.blocks[agent]]
-    own = [b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks]
-    return replace(blocks[0], own=np.concatenate(own, axis=1), own_rows=np.zeros(0, dtype=np.int64))

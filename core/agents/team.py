@@ -428,8 +428,7 @@ class Team:
         if self.given.size:
             self.given = arrays["given"].copy()
         for name, part in {"learner": self.learner, **self._adapting}.items():
-            its = {k: array for k, array in arrays.items() if k.startswith(f"{name}.")}
-            part.restore({k.removeprefix(f"{name}."): array for k, array in its.items()})
+            part.restore({k: arrays[f"{name}.{k}"] for k in part.arrays()})
 
 
 def _senders(

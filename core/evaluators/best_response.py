@@ -30,13 +30,7 @@ from ..interface.hierarchy import Hierarchy
 from ..interface.spaces import BestResponses, Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
-from .evaluator import (
-    Aggregation,
-    DecisionProblem,
-    Deliberation,
-    EvaluatorSettings,
-    combinations,
-)
+from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
 
 MOST_AHEAD = 4
 """Bodies that are valued at a time, if most keep to the plan: more would be valued in vain."""
@@ -68,9 +62,8 @@ class _Known(NamedTuple):
 
     def holds(self, concerned: IntArray, plan: IntArray) -> bool:
         """Return whether it is of the same interest, and of the plan but for the body's agents."""
-        if self.concerned is not concerned:
-            return False
-        return all(i in self.free for i in np.flatnonzero(self.plan != plan).tolist())
+        changed = np.flatnonzero(self.plan != plan).tolist()
+        return self.concerned is concerned and {*changed} <= {*self.free}
 
 
 class _Ahead(NamedTuple):
@@ -116,22 +109,18 @@ class BestResponse(Aggregation):
                 "learner.decision.plan = 'common': nobody considers another, so that there is "
                 "nothing to plan, use private, or unseen = 'plan'"
             )
-        self._group_of = {i: g for g, group in enumerate(groups) for i in group}
         self._planner = _planners(problem)
         self._kept_up = _kept_up(problem, self._planner)
-        self._place = np.zeros(n, dtype=np.int64)
-        for group in groups:
-            self._place[list(group)] = np.arange(len(group))
-        sizes = {2, *(k for group in groups for k in range(1, len(group) + 1))}
-        largest_first = sorted(sizes, reverse=True)  # which is refused before others are made
-        self._actions = {k: combinations(tuple(range(k)), self.n_actions) for k in largest_first}
-        self._numbers = np.arange(max(map(len, self._actions.values())))
+        self._place = np.concatenate([np.arange(len(group)) for group in groups])
         self._widest = max(map(len, groups))
+        sizes = range(max(2, self._widest), 0, -1)  # the largest is refused before others are made
+        self._actions = {k: combinations(tuple(range(k)), self.n_actions) for k in sizes}
+        self._numbers = np.arange(len(self._actions[sizes[0]]))
         # Per agent, whom it considers, itself included, in the order of decision; those of its
         # body; the others.
         self._free = [_in_order(hierarchy, {i, *hierarchy.below(i)}) for i in range(n)]
         self._own = [
-            tuple(j for j in free if self._group_of[j] == self._group_of[i])
+            tuple(j for j in free if self._body_of[j] == self._body_of[i])
             for i, free in enumerate(self._free)
         ]
         self._others = [np.setdiff1d(np.arange(n), free) for free in self._free]
@@ -206,11 +195,7 @@ class BestResponse(Aggregation):
         return plan
 
     def _valued(
-        self,
-        deliberation: Deliberation,
-        plan: IntArray,
-        free: tuple[int, ...],
-        value: float | None,
+        self, deliberation: Deliberation, plan: IntArray, free: tuple[int, ...], value: float | None
     ) -> FloatArray:
         """Return what all actions of the k free agents of a body are worth ``(A,) * k``.
 
@@ -232,7 +217,7 @@ class BestResponse(Aggregation):
         """Return whether it has what a body is worth to those, by a plan that comes to the same."""
         if free not in ahead.worths or ahead.concerned is not concerned:
             return False
-        changed = {self._group_of[i] for i in np.flatnonzero(plan != ahead.plan).tolist()}
+        changed = set(self._body_of[plan != ahead.plan].tolist())
         groups = [(self._alike[body][0], self.problem.groups[body]) for body in changed]
         return all(
             alike[self._index(plan, group)] == alike[self._index(ahead.plan, group)]
@@ -271,7 +256,7 @@ class BestResponse(Aggregation):
 
         Told apart in agent order, even where the agents of a body decide in another.
         """
-        body, every = self._group_of[agents[0]], self._numbers[: len(self._actions[len(agents)])]
+        body, every = self._body_of[agents[0]], self._numbers[: len(self._actions[len(agents)])]
         return self._alike[body] if agents == self.problem.groups[body] else (every, every)
 
     def _planned(self, deliberation: Deliberation) -> IntArray:
@@ -283,7 +268,7 @@ class BestResponse(Aggregation):
             free = _in_order(self.hierarchy, every - set(deliberation.told.tolist()))
         bodies: dict[int, list[int]] = {}
         for i in free:
-            bodies.setdefault(self._group_of[i], []).append(i)
+            bodies.setdefault(int(self._body_of[i]), []).append(i)
         plan, value = self._started(deliberation, free), None
         for members in self._sweeps * list(bodies.values()):
             worths = self._valued(deliberation, plan, tuple(members), value).ravel()
@@ -296,15 +281,14 @@ class BestResponse(Aggregation):
     def _started(self, deliberation: Deliberation, free: tuple[int, ...]) -> IntArray:
         """Return the plan ``(n,)`` that the sweep of best responses starts from."""
         if free not in self._starts:
-            bodies = list(dict.fromkeys(self._group_of[i] for i in free))
-            self._starts[free] = self._starting(free, bodies)
+            self._starts[free] = self._starting(free)
         tried = _with(deliberation.joint_action, [(free, self._starts[free])])
-        plan: IntArray = tried[greatest(self.worth(deliberation, tried), deliberation.rng)]
-        return plan
+        return tried[greatest(self.worth(deliberation, tried), deliberation.rng)]
 
-    def _starting(self, free: tuple[int, ...], bodies: list[int]) -> IntArray:
-        """Return actions ``(m, k)`` of the k free agents, of `bodies` in the order of decision."""
-        rank = np.array([bodies.index(self._group_of[i]) for i in free])
+    def _starting(self, free: tuple[int, ...]) -> IntArray:
+        """Return actions ``(m, k)`` of the k free agents, in the order of decision."""
+        bodies = list(dict.fromkeys(self._body_of[list(free)].tolist()))
+        rank = np.array([bodies.index(self._body_of[i]) for i in free])
         starts = [self._actions[self._widest][:, self._place[list(free)]]]
         for cut in sorted({round(share * len(bodies)) for share in CUTS} - {0, len(bodies)}):
             starts.append(self._actions[2][:, (rank >= cut).astype(np.int64)])

@@ -40,45 +40,6 @@ class Pooled(NamedTuple):
     """``(b + 1,)`` the first agent of every body among them, and k."""
 
 
-class Pooling:
-    """Means of the values of agents.
-
-    Parameters
-    ----------
-    rules
-        The agents' rule base.
-    groups
-        Agents by body: their shared variables are the same.
-    """
-
-    def __init__(self, rules: RuleBase, groups: tuple[tuple[int, ...], ...]) -> None:
-        self._rules, self._groups = rules, groups
-        self._body_of = np.array([g for g, group in enumerate(groups) for _ in group])
-        sharing = [rules.shared_by(term) for term in rules.terms]
-        own, body, common = (
-            np.array([t for t, by in enumerate(sharing) if by == kind], dtype=np.int64)
-            for kind in ("agent", "body", "all")
-        )
-        self._kinds = own, body, common
-
-    def pooled(self, weights: Sequence[FloatArray], agents: IntArray) -> Pooled:
-        """Return the weights of some agents in agent order; `weights` are those of all agents."""
-        theta = np.array([weights[i] for i in agents], dtype=float)
-        bodies, firsts = np.unique(self._body_of[agents], return_index=True)
-        summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
-        return Pooled((theta, *summed), agents, bodies, np.append(firsts, len(agents)))
-
-    def mean(self, pooled: Pooled, prediction: Prediction, joint_actions: IntArray) -> FloatArray:
-        """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""
-        own, shared = states_by_group(prediction, joint_actions, self._groups, self._rules.n_own)
-        if len(pooled.bodies) < len(shared):
-            shared = shared[pooled.bodies]
-        total = self._rules.total(
-            pooled.weights, pooled.agents, pooled.firsts, self._kinds, own, shared
-        )
-        return total / len(pooled.agents)
-
-
 Rule = Literal["value", "reward", "reward-and-value"]
 """By what a joint action is valued."""
 Teammates = Literal["best-response", "uniform", "empirical", "conditional"]
@@ -218,9 +179,8 @@ def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
             f"learner.decision.evaluator: {n_actions} ** {len(agents)} joint actions of "
             f"{len(agents)} agents would be tried, allowed {MOST_JOINT_ACTIONS}; use sampling"
         )
-    if not agents:
-        return np.zeros((1, 0), dtype=np.int64)
-    grid = np.indices((n_actions,) * len(agents)).reshape(len(agents), -1)
+    k = len(agents)
+    grid = np.indices((n_actions,) * k).reshape(k, n_actions**k)
     return np.ascontiguousarray(grid.T, dtype=np.int64)
 
 
@@ -263,7 +223,10 @@ class Aggregation:
         self.counts = Counts()
         self.concerned = concerned(self.hierarchy, problem.value_of)
         """Per agent ``(k,)`` the agents whose values decide."""
-        self._pooling = Pooling(problem.rules, problem.groups)
+        self._body_of = np.array([g for g, group in enumerate(problem.groups) for _ in group])
+        sharing = np.array([self.rules.shared_by(term) for term in self.rules.terms])
+        own, body, common = (np.flatnonzero(sharing == by) for by in ("agent", "body", "all"))
+        self._kinds = own, body, common
         self._last: tuple[Sequence[FloatArray], IntArray, Pooled] | None = None
 
     def require(self, key: str, allowed: str, why: str) -> None:
@@ -300,7 +263,7 @@ class Aggregation:
 
         def values() -> FloatArray:
             if len(concerned) > 1:
-                return self._pooling.mean(self._pooled(deliberation), prediction, joint_actions)
+                return self.mean(self._pooled(deliberation), prediction, joint_actions)
             states = prediction.states(deliberation.agent, joint_actions)
             return self.rules.values(deliberation.own_weights, states)
 
@@ -310,8 +273,23 @@ class Aggregation:
         """Return the pooled weights of those concerned, once for agents of one decision."""
         weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
         if self._last is None or self._last[0] is not weights or self._last[1] is not concerned:
-            self._last = weights, concerned, self._pooling.pooled(weights, concerned)
+            self._last = weights, concerned, self.pooled(weights, concerned)
         return self._last[2]
+
+    def pooled(self, weights: Sequence[FloatArray], agents: IntArray) -> Pooled:
+        """Return the weights of some agents in agent order; `weights` are those of all agents."""
+        theta = np.array([weights[i] for i in agents], dtype=float)
+        bodies, firsts = np.unique(self._body_of[agents], return_index=True)
+        summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
+        return Pooled((theta, *summed), agents, bodies, np.append(firsts, len(agents)))
+
+    def mean(self, pooled: Pooled, prediction: Prediction, joint_actions: IntArray) -> FloatArray:
+        """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""
+        rules, (weights, agents, bodies, firsts) = self.rules, pooled
+        own, shared = states_by_group(prediction, joint_actions, self.problem.groups, rules.n_own)
+        if len(bodies) < len(shared):
+            shared = shared[bodies]
+        return rules.total(weights, agents, firsts, self._kinds, own, shared) / len(agents)
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
@@ -407,16 +385,12 @@ class ExactEnumeration(Aggregation):
         conditional = problem.teammates == "conditional"
         own_value = problem.rule == "value" and len(self.concerned[agent]) == 1
         if own_value and not conditional and self._tried and hasattr(prediction, "blocks"):
-            tried = self._tried[agent]
+            tried, blocks = self._tried[agent], prediction.blocks(agent)
             self.count(agent, tried[0].size)
             empirical = problem.teammates == "empirical"
-            return self.rules.enumerate(
-                deliberation.own_weights,
-                prediction.blocks(agent),
-                tried,
-                deliberation.joint_action,
-                deliberation.frequencies if empirical else self._expected,
-            )
+            expected = deliberation.frequencies if empirical else self._expected
+            weights, joint = deliberation.own_weights, deliberation.joint_action
+            return self.rules.enumerate(weights, blocks, tried, joint, expected)
         below, probabilities = self.hierarchy.below(agent), None
         if problem.teammates == "empirical":
             probabilities = probabilities_of(deliberation.frequencies, below)
@@ -426,34 +400,26 @@ class ExactEnumeration(Aggregation):
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value each own action with each of the joint actions below, from tables if there are."""
-        if self._tried and all(hasattr(deliberation.prediction, name) for name in TABLES):
-            return self._by_tables(deliberation)
-        return super().worths(deliberation, tried)
-
-    def _by_tables(self, deliberation: Deliberation) -> FloatArray:
-        """Value ``(A, m)`` each own action with each joint action below, by anything."""
         prediction: Any = deliberation.prediction
-        tried, places, _ = self._tried[deliberation.agent]
-        concerned = self.concerned[deliberation.agent]
-        indices = (tried + int(deliberation.joint_action @ places)).ravel()
+        if not (self._tried and all(hasattr(prediction, name) for name in TABLES)):
+            return super().worths(deliberation, tried)
+        known, places, _ = self._tried[deliberation.agent]
+        indices = (known + int(deliberation.joint_action @ places)).ravel()
         self.count(deliberation.agent, len(indices))
         worth = self.combine(
-            lambda: prediction.reward_table()[indices],
-            lambda: self._mean(deliberation, concerned)[indices],
+            lambda: prediction.reward_table()[indices], lambda: self._mean(deliberation)[indices]
         )
         return worth.reshape(self.n_actions, -1)
 
-    def _mean(self, deliberation: Deliberation, concerned: IntArray) -> FloatArray:
+    def _mean(self, deliberation: Deliberation) -> FloatArray:
         """Return the mean value ``(A ** n,)`` of all joint actions, once for a whole decision."""
-        prediction, weights = deliberation.prediction, deliberation.weights
+        prediction: Any = deliberation.prediction
+        weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
         of = prediction, weights, concerned
         if self._means is None or any(a is not b for a, b in zip(self._means[0], of, strict=True)):
-            tables: Any = prediction
-            indices = np.arange(self.n_actions ** len(weights))
-            values = [
-                self.rules.block_values(weights[i], tables.blocks(i), indices) for i in concerned
-            ]
-            self._means = of, np.mean(values, axis=0)
+            indices, value = np.arange(self.n_actions ** len(weights)), self.rules.block_values
+            each = [value(weights[i], prediction.blocks(i), indices) for i in concerned]
+            self._means = of, np.mean(each, axis=0)
         return self._means[1]
 
 

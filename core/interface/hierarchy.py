@@ -118,13 +118,11 @@ class Hierarchy:
             raise ValueError(f"hierarchy: cycle {' -> '.join([*cycle, cycle[0]])}")
         self.agents = agents
         self.edges = tuple(sorted(graph.edges))
-        self.neighbours = tuple(
-            sorted((min(p), max(p)) for p in ((index[a], index[b]) for a, b in sides))
-        )
+        beside = nx.empty_graph(len(agents))
+        beside.add_edges_from((index[a], index[b]) for a, b in sides)
+        self.neighbours = tuple(sorted(beside.edges))
         """Pairs of neighbours, by index, each once."""
         self.order: tuple[int, ...] = tuple(nx.lexicographical_topological_sort(graph))
-        beside = nx.empty_graph(len(agents))
-        beside.add_edges_from(self.neighbours)
         for a, b in self.neighbours:
             if nx.has_path(graph, a, b) or nx.has_path(graph, b, a):
                 pair = LINE.format(agents[a], agents[b])
@@ -140,8 +138,7 @@ class Hierarchy:
 
         below = [{*related(i, considers, "descendants"), *beside[i]} for i in beside]
         self._below = tuple(tuple(sorted(agents)) for agents in below)
-        above = (related(i, told, "ancestors") for i in range(len(agents)))
-        self._above = tuple(tuple(sorted(agents)) for agents in above)
+        self._above = tuple(tuple(sorted(related(i, told, "ancestors"))) for i in beside)
         self.told, self.considers = told, considers
         self.depth: int = nx.dag_longest_path_length(graph) + 1
         """Number of agents on the longest path."""

@@ -6,8 +6,6 @@ and is not learned from. A terminal state counts as entered again for ever: its 
 R(s) / (1 - discount). Siblings differ where their mathematics differs.
 """
 
-from typing import cast
-
 from ..interface.scenario import Scenario
 from ..plugins.registry import SettingsRegistry
 from .learner import LearnerSettings, TeamSettings
@@ -49,8 +47,7 @@ def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
     """
     if not settings.needs_prediction or hasattr(scenario, "predict"):
         return
-    every = {kind: cast(TeamSettings, LEARNERS.model(kind)()) for kind in LEARNERS.built_in}
-    others = [kind for kind, other in every.items() if not other.needs_prediction]
+    others = [k for k in LEARNERS.built_in if not LEARNERS.parsed(k).needs_prediction]
     raise ValueError(
         f"learner.kind = {settings.kind!r}: decides by predicted states, and the scenario "
         f"{type(scenario).__name__} has no method predict; without it do {', '.join(others)}, and "

@@ -118,7 +118,7 @@ class BatchTD:
                 f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
                 f"allowed up to {MOST_RULES}; lower learner.rule_base.order"
             )
-        self.settings, self.rules = settings, rules
+        self.settings, self.rules, self._n_agents = settings, rules, len(rows)
         self.members = [np.flatnonzero(rows == row) for row in range(int(rows.max()) + 1)]
         """The agents ``(k,)`` of every row."""
         self.theta: FloatArray = np.zeros((len(self.members), rules.n_rules), rules.dtype)
@@ -242,10 +242,6 @@ class BatchTD:
     def _width(self) -> int:
         """Columns of what is remembered of an after-state."""
         return int((self._states or [self._earlier[0].states])[0].shape[1])
-
-    @property
-    def _n_agents(self) -> int:
-        return sum(map(len, self.members))
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""

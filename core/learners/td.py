@@ -113,9 +113,7 @@ class Online(ABC):
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
         for name in self.kept:
-            setattr(self, name, arrays[name].copy())
-        if "weights" not in self.kept:
-            self.weights = self.theta
+            getattr(self, name)[...] = arrays[name]
         self._previous = arrays["previous"].copy() if arrays["previous"].size else None
         self._rewards = arrays["rewards"].copy()
 
@@ -123,9 +121,7 @@ class Online(ABC):
         """Begin with all weights of another team; traces are of an episode, and begin anew."""
         for name in (name for name in self.kept if name not in self.traces):
             array = getattr(former, name)
-            setattr(self, name, array[rows] if array.ndim else array.copy())
-        if "weights" not in self.kept:
-            self.weights = self.theta
+            getattr(self, name)[...] = array[rows] if array.ndim else array
 
 
 class FrozenSettings(LearnerSettings):

@@ -24,7 +24,6 @@ import os
 import sys
 import traceback
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from types import ModuleType
@@ -172,7 +171,7 @@ class Sources:
             raise ValueError(f"{path} has no {name!r}, it has: {', '.join(own) or 'nothing'}")
         return thing
 
-    @contextmanager
+    @contextlib.contextmanager
     def active(self) -> Iterator[None]:
         """Resolve names by these files for as long as the context lasts."""
         token = _ACTIVE.set(self)

@@ -105,12 +105,8 @@ class SplitExtractor(MlpExtractor):
         self.actor, self.critic = actor, critic
         self.policy_net = MlpExtractor(actor, hidden, activation).policy_net
 
-    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return what actor and critic make of features ``(m, features)``."""
-        return self.forward_actor(features), self.forward_critic(features)
-
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
-        """Return what the actor makes of them."""
+        """Return what the actor makes of features ``(m, features)``."""
         return self.policy_net(features[:, : self.actor])
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:

@@ -193,8 +193,7 @@ class RuleBase:
         self._check_states(states)
         self._check_theta(theta)
         if self.compact:
-            values: FloatArray = each_compact(theta[None], states[None], self.layout)[0]
-            return values
+            return each_compact(theta[None], states[None], self.layout)[0]
         return values_dense(theta, states, self.layout)
 
     def each(self, theta: FloatArray, states: FloatArray) -> FloatArray:
@@ -231,8 +230,7 @@ class RuleBase:
             return total_compact(weights, agents, firsts, kinds, own, shared, self.layout)
         body = np.repeat(np.arange(len(shared)), np.diff(firsts))
         states = np.concatenate([own[agents], shared[body]], axis=2)
-        total: FloatArray = each_dense(weights[0], states, self.layout).sum(axis=0)
-        return total
+        return each_dense(weights[0], states, self.layout).sum(axis=0)
 
     def squared_lengths(self, states: FloatArray) -> FloatArray:
         """Return the squared length ``(m,)`` of phi of states ``(m, d)``.

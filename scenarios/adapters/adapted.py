@@ -22,8 +22,7 @@ from ...core.interface.spaces import StateSpace
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.sources import format_error
 from ..movies import film
-from .actuators import Actuators
-from .observations import Perception
+from .players import Actuators, Perception
 from .settings import AdaptedSettings, GymnasiumSettings, PettingZooSettings
 from .simulators import (
     Make,

@@ -114,7 +114,8 @@ class GymnasiumSettings(AdaptedSettings):
     id: str
     """As ``gymnasium.make`` takes it: ``Pendulum-v1``, or ``module:name``."""
     groups: tuple[tuple[Index, ...], ...] = ()
-    """Numbers of the agents of every body, from 0 on, in order; none: each is its own body."""
+    """Numbers of the agents of every body, from 0 on, in order: those who have the same place in
+    their bodies are of one role. None: each is its own body and role."""
 
 
 class PettingZooSettings(AdaptedSettings):

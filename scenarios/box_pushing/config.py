@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from math import pi
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from ...core.plugins.settings import Positive, ScenarioSettings, team_size
 from ..state_variables import referred
@@ -93,9 +93,10 @@ class BoxPushingSettings(BoxTaskSettings):
 
     kind: Literal["box-pushing"] = "box-pushing"
     factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
-    state_space: Literal["paper", "relational", "pose", "crowd", "wide"] | tuple[str, ...] = (
-        "relational"
-    )
+    state_space: Annotated[
+        Literal["paper", "relational", "pose", "crowd", "wide"] | tuple[str, ...],
+        referred(STATE_VARIABLES),
+    ] = "relational"
     """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
     name, one's own included."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"
@@ -108,11 +109,6 @@ class BoxPushingSettings(BoxTaskSettings):
     prediction_horizon: Periods = 24
     """Control periods that predictions look ahead, the decision being held for all of them: so far
     that what agents do shows."""
-
-    @field_validator("state_space", mode="before")
-    @classmethod
-    def _by_name(cls, value: object) -> object:
-        return referred(STATE_VARIABLES, value)
 
     @model_validator(mode="after")
     def _believes(self) -> Self:

@@ -31,8 +31,6 @@ from .scenario import BoxPushing
 ENV_ID = "NestedAgents/BoxPushing-v0"
 RENDER_MODES = ["rgb_array"]
 
-SettingsLike = BoxPushingSettings | Mapping[str, Any] | None
-
 
 class Seat:
     """The wheels that one outside agent drives, and what it observes.
@@ -53,14 +51,11 @@ class Seat:
         self.wheels = list(wheels)
         space = scenario.state_space
         d, own = space.n_variables, space.n_own
-        places: list[int] = []
+        every, parts = np.arange(len(scenario.agents) * d).reshape(-1, d), []
         for group in scenario.groups:
             mine = [wheel for wheel in group if wheel in self.wheels]
-            places += [wheel * d + i for wheel in mine for i in range(own)]
-            places += [wheel * d + i for wheel in mine[:1] for i in range(own, d)]
-        if by_wheel:
-            places = [wheel * d + i for wheel in self.wheels for i in range(d)]
-        self.places: IntArray = np.reshape(places, (len(self.wheels), d) if by_wheel else -1)
+            parts += [every[mine, :own].ravel(), every[mine[:1], own:].ravel()]
+        self.places: IntArray = every[self.wheels] if by_wheel else np.concatenate(parts)
         low, high = np.moveaxis(space.bounds[self.places % d].astype(np.float32), -1, 0)
         self.observation_space = Box(low, high, dtype=np.float32)
         actions = len(scenario.action_set)
@@ -101,7 +96,7 @@ class Game(ABC):
 
     def __init__(
         self,
-        settings: SettingsLike = None,
+        settings: BoxPushingSettings | Mapping[str, Any] | None = None,
         *,
         steps: int = 450,
         render_mode: str | None = None,

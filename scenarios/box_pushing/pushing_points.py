@@ -131,10 +131,10 @@ class Drivers:
                     self.robot.radius + CLEARANCE, self.box.reach,
                 )  # fmt: skip
                 turn = np.abs(wrap(poses[:, 2] - target[2]))
-                cost = cost + 0.1 * (path + 0.06 * turn * np.exp(-path / 0.05))
-            arrived = path + 0.06 * turn * np.exp(-path / 0.05)
+                left = path + 0.06 * turn * np.exp(-path / 0.05)
+                cost = cost + 0.1 * left
         assert first is not None
-        return int(first[(cost + arrived).argmin()])
+        return int(first[(cost + left).argmin()])
 
 
 def _distinct(speeds: FloatArray) -> Any:
@@ -316,7 +316,7 @@ MOST_VALUES = 10**6
 class PushingPoints:
     """A box, a goal, and robots as agents that choose where to push.
 
-    Fulfils `Scenario`; its episodes can be recorded and drawn.
+    Fulfils `Scenario` and `Prediction`; its episodes can be recorded and drawn.
 
     Parameters
     ----------
@@ -386,9 +386,13 @@ class PushingPoints:
             info={**there.info, "contact_fraction": float(np.mean(contact))},
         )
 
-    def predict(self) -> PushingPointsPrediction:
-        """Return what can be predicted before robots choose: what they choose."""
-        return PushingPointsPrediction(self)
+    def predict(self) -> PushingPoints:
+        """Return this scenario: before robots choose, only what they choose can be predicted."""
+        return self
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the states ``(m, d)`` of a robot after joint choices ``(m, M)``."""
+        return self.states_after(joint_actions)[agent]
 
     def with_exact_prediction(self) -> PushingPoints:
         """Return this scenario: what an agent chooses is what comes."""
@@ -421,23 +425,6 @@ class PushingPoints:
         box, goal = seen["box_pose"], seen["goal_pose"]
         course = atan2(goal[1] - box[1], goal[0] - box[0])
         self._bearing = float(wrap(course - box[2]))
-
-
-class PushingPointsPrediction:
-    """The situation as it is, with what would be chosen; `Prediction`.
-
-    Parameters
-    ----------
-    scenario
-        Valid until its next step.
-    """
-
-    def __init__(self, scenario: PushingPoints) -> None:
-        self._scenario = scenario
-
-    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the states ``(m, d)`` of a robot after joint choices ``(m, M)``."""
-        return self._scenario.states_after(joint_actions)[agent]
 
 
 def _state_space(

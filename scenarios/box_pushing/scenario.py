@@ -19,10 +19,9 @@ from ...core.interface.spaces import ActionSet
 from ...core.numerics import FloatArray, IntArray, stream_of
 from .config import BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
-from .prediction.prediction import BoxPrediction, mean_twists
+from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
-from .prediction.situation import Premises, Situation
 from .states.relational import View
 from .states.state_spaces import state_space_for
 from .world.bodies import box_for, growth, nominal_effect, robot_for
@@ -181,18 +180,11 @@ class BoxPushing:
             twists = np.concatenate([of_box, twists])
         measured = self.measure()
         readings = self.settings.infrared.noisy(self.world.infrared()[0], self._sensing)
-        terminated = self._reached()
-        gained = reward(
-            self._task,
-            np.array([measured["distance_m"]]),
-            np.array([measured["distance_m"] - before]),
-            np.array([measured["orientation_rad"]]),
-            self.world.contact[None],
-            readings.max(axis=1)[None],
-        )[0]
-        paid: float | FloatArray = float(gained[0])
-        if self.settings.reward.of == "robot":
-            paid = gained[self._body]
+        terminated, away = self._reached(), measured["distance_m"]
+        distance, way, turn = np.array([[away], [away - before], [measured["orientation_rad"]]])
+        contact, strongest = self.world.contact[None], readings.max(axis=1)[None]
+        gained = reward(self._task, distance, way, turn, contact, strongest)[0]
+        paid = gained[self._body] if self.settings.reward.of == "robot" else float(gained[0])
         sensed = perf_counter()
         if terminated:
             # Does the box come to rest within the tolerance when all wheels stop?
@@ -202,7 +194,7 @@ class BoxPushing:
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
         farthest = self._unit * self.settings.termination_radius
-        truncated = not terminated and measured["distance_m"] > farthest
+        truncated = not terminated and away > farthest
         return Transition(states, paid, terminated, truncated, measured, twists)
 
     def predict(self) -> BoxPrediction:
@@ -228,8 +220,8 @@ class BoxPushing:
     def with_exact_prediction(self) -> BoxPushing:
         """Return a scenario alike that predicts one decision period by playing it."""
         exactly = {"predictor": "exact", "prediction_horizon": self.settings.action_repeat}
-        settings = self.settings.model_copy(update={**exactly, "belief": BeliefSettings()})
-        return type(self)(settings)
+        exactly |= {"belief": BeliefSettings()}
+        return type(self)(self.settings.model_copy(update=exactly))
 
     def constants_of_episode(self) -> dict[str, Any]:
         """Return the goal pose of the episode, and what is drawn."""

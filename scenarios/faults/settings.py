@@ -195,8 +195,7 @@ class Failures:
         )
         self._limits = limits
         self._masks = [failure.mask(agents, f"{key}[{i}]") for i, failure in enumerate(settings)]
-        delays = [f.periods for f in settings if isinstance(f, Delayed)]
-        self._memory = max(delays, default=0)
+        self._memory = max((f.periods for f in settings if isinstance(f, Delayed)), default=0)
         self.begin(0, 0)
 
     def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:

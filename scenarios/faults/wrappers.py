@@ -121,10 +121,6 @@ class ActionScale:
             raise ValueError(f"rest = {rest!r}: no action of {space}")
         self.limits: FloatArray = np.maximum(self._high - self._rest, self._rest - self._low)
 
-    def __len__(self) -> int:
-        """Return the number of actuators."""
-        return len(self.limits)
-
     def place(self, action: Any) -> FloatArray:
         """Return where an action lies from rest, ``(k,)``."""
         return np.ravel(action).astype(float) - self._rest
@@ -204,34 +200,30 @@ class _Faulty:
                     f"mechanism that does, or say what else actions command"
                 )
         spaces, rests = self._by_prefix(env, rest)
-        self._scales: dict[str, ActionScale] = {}
-        self._spans: dict[str, slice] = {}
+        self._parts: dict[str, tuple[ActionScale, slice]] = {}
         names: list[str] = []
         for prefix, space in spaces.items():
             scale = ActionScale(space, rests.get(prefix), f"action space {prefix}".rstrip())
-            self._scales[prefix] = scale
-            self._spans[prefix] = slice(len(names), len(names) + len(scale))
-            names += [f"{prefix}.{i}" if prefix else str(i) for i in range(len(scale))]
+            self._parts[prefix] = scale, slice(len(names), len(names) + len(scale.limits))
+            names += [f"{prefix}.{i}" if prefix else str(i) for i in range(len(scale.limits))]
         self.actuators = tuple(names)
-        limits = np.concatenate([scale.limits for scale in self._scales.values()])
+        limits = np.concatenate([scale.limits for scale, _ in self._parts.values()])
         self._failures = Failures(faults, self.actuators, limits, "faults")
         self._commands, self._mechanism, self._seed = commands, mechanism, seed
         self._inform, self._hooked = inform, False
         self.carried: Any = None
         self._begin(0, 0)
 
-    def _schedule(
-        self, seed: int | None, options: Mapping[str, Any] | None
-    ) -> dict[str, Any] | None:
-        """Start the next episode; a seed starts their count afresh. Return the options left.
+    def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> Any:
+        """Start an episode of the environment beneath; a seed starts their count afresh.
 
         The option ``fault_episode`` sets the number of the episode, by which faults are scheduled.
         """
-        rest = dict(options or {})
+        left = dict(options or {})
         if seed is not None:
             self._world, self._episode = seed, -1
-        self._begin(self._world, int(rest.pop("fault_episode", self._episode + 1)))
-        return rest if rest else None
+        self._begin(self._world, int(left.pop("fault_episode", self._episode + 1)))
+        return self.env.reset(seed=seed, options=left or None)
 
     def _begin(self, world: int, episode: int) -> None:
         self._world, self._episode, self._step = world, episode, 0
@@ -249,7 +241,8 @@ class _Faulty:
         self._step += 1
         places = np.zeros(len(self.actuators))
         for prefix, action in actions.items():
-            places[self._spans[prefix]] = self._scales[prefix].place(action)
+            scale, span = self._parts[prefix]
+            places[span] = scale.place(action)
         drawn = self._rng.random(len(places))  # as many whatever fails: runs stay paired
         driven = self._failures.driven(places, 1)[0]
         changed = self._failures.failed
@@ -259,21 +252,16 @@ class _Faulty:
             elif fault.kind == "seized" and self._commands == "position":
                 driven[mask] = self._held[mask]
         self._held = np.where(changed, driven, places)
-        unexpressed = {
-            name: kind
-            for name, kind in self._now().items()
-            if kind == INEXPRESSIBLE[self._commands]
-        }
+        beyond = INEXPRESSIBLE[self._commands]
+        unexpressed = {name: kind for name, kind in self._now().items() if kind == beyond}
         if self._mechanism is not None and (unexpressed or self._hooked):
             self._mechanism(self.env, unexpressed)
         self._hooked = bool(unexpressed)
-        return {
-            prefix: self._scales[prefix].action(
-                driven[span], action, changed[span], drawn[span]
-            )
-            for prefix, action in actions.items()
-            for span in [self._spans[prefix]]
-        }  # fmt: skip
+        carried = {}
+        for prefix, action in actions.items():
+            scale, span = self._parts[prefix]
+            carried[prefix] = scale.action(driven[span], action, changed[span], drawn[span])
+        return carried
 
     def _now(self) -> dict[str, str]:
         """Return the kind of the fault of every actuator that has one; of several, the last."""
@@ -327,13 +315,6 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
     def _by_prefix(env: Any, rest: Any) -> Any:
         return {"": env.action_space}, {"": rest}
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
-        """Start an episode of the environment beneath."""
-        left = self._schedule(seed, options)
-        return self.env.reset(seed=seed, options=left)
-
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Do what faulty actuators make of an action."""
         self.carried = self._carry({"": action})[""]
@@ -367,26 +348,13 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
     def _by_prefix(env: Any, rest: Any) -> Any:
         return {agent: env.action_space(agent) for agent in env.possible_agents}, rest or {}
 
-    def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Start an episode of the environment beneath."""
-        left = self._schedule(seed, options)
-        seen, infos = self.env.reset(seed=seed, options=left)
-        return seen, infos
-
     def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
         """Do what faulty actuators make of the agents' actions."""
         self.carried = self._carry(actions)
         *given, infos = self.env.step(self.carried)
         if self._inform:
-            now = self._now()
-            infos = {
-                agent: {
-                    **info,
-                    "faults": {n: k for n, k in now.items() if n.rpartition(".")[0] == agent},
-                    "carried": self.carried.get(agent),
-                }
-                for agent, info in infos.items()
-            }
+            now, infos = self._now(), dict(infos)
+            for agent, info in infos.items():
+                own = {name: kind for name, kind in now.items() if name.rpartition(".")[0] == agent}
+                infos[agent] = {**info, "faults": own, "carried": self.carried.get(agent)}
         return (*given, infos)

@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from ...core.agents.failures import Names
 from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings, team_size
 from ..faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
 from ..state_variables import referred
+from .variables import CHAIN_VARIABLES
 
 PERIOD = 0.1
 """Time between two decisions [s]."""
@@ -16,6 +17,8 @@ REACH = 1.0
 """Length of the whole arm [m]."""
 RIDGE = 0.1
 """Ridge of a joint's regression that learns best, for every joint that shares its weights."""
+SIMPLE = ("bearing", "distance", "approach")
+"""State variables of which `kinematic_chain.responses` knows how they change."""
 DISCOUNT = 0.8
 """Discount that learns best: a goal is some twenty decisions away."""
 
@@ -70,7 +73,7 @@ class KinematicChainSettings(ScenarioSettings):
     """Failures of joints, as ``[[scenario.failures]]`` tables."""
     predictor: Literal["nominal", "informed"] = "nominal"
     """Whether predictions take every joint for what it was built as, or know of failures."""
-    state_space: tuple[str, ...] = ("bearing", "distance", "approach")
+    state_space: Annotated[tuple[str, ...], referred(CHAIN_VARIABLES)] = SIMPLE
     """State variables beside the speed of the own joint, by name, one's own included; see
     `kinematic_chain.variables`."""
     reward: ReachingRewardSettings = ReachingRewardSettings()
@@ -86,13 +89,6 @@ class KinematicChainSettings(ScenarioSettings):
     """Distance of the tip from the goal that counts as reached [m]."""
     most_decisions: Annotated[int, Field(ge=1, le=1_000_000)] = 150
     """Decisions after which an episode is broken off."""
-
-    @field_validator("state_space", mode="before")
-    @classmethod
-    def _by_name(cls, value: object) -> object:
-        from .variables import CHAIN_VARIABLES
-
-        return referred(CHAIN_VARIABLES, value)
 
     def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
         """Return what learns best here: little regularisation, and little foresight.

@@ -35,8 +35,8 @@ class _ChainScene(Scene):
         self.recording = recording
         angles, reach = recording["angles"], float(recording["reach"])
         self.places = postures_of(angles, reach / angles.shape[1])
-        self.axes.set_xlim(-1.05 * reach, 1.05 * reach)
-        self.axes.set_ylim(-1.05 * reach, 1.05 * reach)
+        ends = -1.05 * reach, 1.05 * reach
+        self.axes.set(xlim=ends, ylim=ends)
         self.axes.add_patch(Circle((0, 0), reach, fill=False, ec="#dddddd", lw=1))
         goal, ring = recording["goal"], max(float(recording["tolerance"]), 0.02 * reach)
         self.axes.add_patch(Circle(tuple(goal), ring, fill=False, ec=GOAL, ls="--", lw=1.5))

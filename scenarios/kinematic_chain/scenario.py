@@ -21,7 +21,7 @@ from ...core.interface.spaces import ActionSet, BestResponses, Exploring, first_
 from ...core.numerics import FloatArray, IntArray
 from ...core.rules.rule_base import RuleBase
 from ..faults.settings import Failures
-from .config import PERIOD, REACH, KinematicChainSettings
+from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
 from .responses import Options, respond
 from .variables import ChainStates, ChainView, ends_of, postures_of
 
@@ -33,8 +33,6 @@ LEAST_WAY = 0.25
 """Distance of the tip from the goal at the start, at least [m]."""
 GOAL_RADII = (0.15, 0.95)
 """Least and greatest distance of the goal from the base [m]."""
-SIMPLE = ("bearing", "distance", "approach")
-"""State variables of which `responses` knows how they change."""
 MOST_BEND = 2.5
 """Greatest angle of a joint behind the base at the start [rad]."""
 
@@ -133,9 +131,8 @@ class KinematicChain:
 
     def predict(self) -> ChainPrediction:
         """Predict from the present state, by joints as built or, failures known, as they are."""
-        if self.settings.predictor == "nominal":
-            return self.predict_with(self.nominal_effects)
-        return self.predict_with(self._actual_effects())
+        nominal = self.settings.predictor == "nominal"
+        return self.predict_with(self.nominal_effects if nominal else self._actual_effects())
 
     def predict_with(self, effects: Sequence[FloatArray]) -> ChainPrediction:
         """Predict from the present state, believing in these effects ``(3, 2)`` of the joints."""
@@ -145,11 +142,10 @@ class KinematicChain:
         """Return the effects of the joints in the coming step: all failures are linear."""
         self._known.strike(self._step)
         offsets = self._known.driven(np.zeros(len(self.agents)), periods=1)[0]
-        gains = (self._known.driven(self._limits, periods=1)[0] - offsets) / self._limits
-        return tuple(
-            np.array([[0.0, 0.0], [0.0, 0.0], [gain, offset]])
-            for gain, offset in zip(gains, offsets, strict=True)
-        )
+        effects = np.zeros((len(offsets), 3, 2))
+        effects[:, 2, 0] = (self._known.driven(self._limits, periods=1)[0] - offsets) / self._limits
+        effects[:, 2, 1] = offsets
+        return tuple(effects)
 
     def with_exact_prediction(self) -> KinematicChain:
         """Return an arm alike whose predictions know of failures: all else is exact."""

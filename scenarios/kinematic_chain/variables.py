@@ -29,7 +29,7 @@ import numpy as np
 from ...core.interface.spaces import Variable
 from ...core.numerics import FloatArray, njit
 from ...core.plugins.registry import Registry
-from ..state_variables import filled, find_variable, fixed, space_of, state_variable
+from ..state_variables import find_variable, fixed, sensed, space_of, state_variable
 
 
 @dataclass(frozen=True)
@@ -217,5 +217,5 @@ class ChainStates:
         states: FloatArray = columns(
             view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
         )
-        filled(states[:, :, 1:], self._things, view, range(first, first + count))
+        sensed(self._things, view, range(first, first + count), states[:, :, 1:])
         return states

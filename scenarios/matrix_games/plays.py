@@ -220,9 +220,7 @@ def parts_of(game: Any, team: Team, *, learn: bool) -> Parts | None:
     """Return what a team is made of; None if it has a part that the kernel does not know."""
     if type(team.evaluator) is not ExactEnumeration or not _is_table(team.evaluator):
         return None
-    if team.messages.fail or team.evaluator.problem.unseen != "maintain":
-        return None
-    if team.predictor is not None:
+    if team.messages.failures or team.predictor is not None:
         return None
     learning = _learning(team.learner) if learn else STILL
     exploring = _exploring(team.explorer) if learn else NO_EXPLORATION
@@ -267,7 +265,8 @@ def _is_table(evaluator: ExactEnumeration) -> bool:
     whole = tuple(range(len(rules.partitions)))
     actions = tuple(float(a) for a in range(evaluator.n_actions))
     at_actions = all(partition.centres == actions for partition in rules.partitions)
-    own = problem.rule == "value" and problem.value_of == "own"
+    asked = problem.rule, problem.value_of, problem.unseen
+    own = asked == ("value", "own", "maintain")
     return own and rules.compact and at_actions and rules.terms == (whole,)
 
 
@@ -289,28 +288,27 @@ def _deciding(game: Any, team: Team, evaluator: ExactEnumeration) -> Deciding:
 def _learning(learner: Any) -> Learning | None:
     """Return how a learner learns; None if it is not known."""
     known = STILL._replace(learns=True)
+    s: Any = getattr(learner, "settings", None)
     if type(learner) is Frozen:
         return known
     if getattr(learner, "discount", 1.0) > 0.0:
         return None
-    if type(learner) is TDLambda and learner.settings.averaging == 1:
-        return known._replace(step_size=learner.settings.step_size)
+    if type(learner) is TDLambda and s.averaging == 1:
+        return known._replace(step_size=s.step_size)
     if type(learner) is OptimisticTD:
-        s = learner.settings
         return known._replace(step_size=s.step_size, falling=s.falling)
     if type(learner) is FMQ:
         tables = learner.weights, learner.greatest, learner.hits, learner.visits
-        return Learning(True, learner.settings.step_size, 1.0, learner.settings.weight, *tables)
+        return Learning(True, s.step_size, 1.0, s.weight, *tables)
     return None
 
 
 def _exploring(explorer: Any) -> Exploring | None:
     """Return how an explorer explores; None if it is not known."""
+    s: Any = getattr(explorer, "settings", None)
     if type(explorer) is Boltzmann:
-        s = explorer.settings
         return Exploring(SAMPLED, s.max_temperature, s.decay, 0.0)
-    if type(explorer) is EpsilonDecreasingBoltzmann:
-        p = explorer.settings
-        if (p.explore, p.exploit) == ("uniform", "greatest"):
-            return Exploring(DECREASING, p.max_temperature, p.decay, p.epsilon)
+    is_known = type(explorer) is EpsilonDecreasingBoltzmann
+    if is_known and (s.explore, s.exploit) == ("uniform", "greatest"):
+        return Exploring(DECREASING, s.max_temperature, s.decay, s.epsilon)
     return None

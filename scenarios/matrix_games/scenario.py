@@ -54,7 +54,7 @@ from ...core.agents.team import Team
 from ...core.coordination.graphs import Elimination, Shape, shaped
 from ...core.interface.scenario import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ...core.numerics import FloatArray, IntArray, nx
+from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings, closest
 
 OF_OPTIMA = (
@@ -173,7 +173,7 @@ class MatrixGameSettings(ScenarioSettings):
 
 
 class MatrixGame:
-    """A matrix game; a `Scenario`.
+    """A matrix game; a `Scenario`, and its own `Prediction`.
 
     Parameters
     ----------
@@ -228,9 +228,17 @@ class MatrixGame:
         info = {"optimal": float(self.optimal[tuple(joint_action)]), "payoff": payoff}
         return Transition(self.states_after(joint_action), payoff, False, False, info)
 
-    def predict(self) -> MatrixGamePrediction:
-        """Predict what joint actions lead to, which is the same at every play."""
-        return MatrixGamePrediction(self)
+    def predict(self) -> MatrixGame:
+        """Return this game: what joint actions lead to is the same at every play."""
+        return self
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
+        return self.states_after(joint_actions)[:, agent]
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray:
+        """Return the expected payoffs ``(m,)`` of joint actions ``(m, n)``; for planners."""
+        return self.payoffs.mean(axis=0)[tuple(joint_actions.T)]
 
     def with_exact_prediction(self) -> MatrixGame:
         """Return this game: its predictions are exact."""
@@ -264,21 +272,6 @@ class MatrixGame:
         if learn:
             team.end_episode()
         return summary
-
-
-class MatrixGamePrediction:
-    """What joint actions lead to; rewards, too."""
-
-    def __init__(self, game: MatrixGame) -> None:
-        self._game = game
-
-    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        return self._game.states_after(joint_actions)[:, agent]
-
-    def rewards(self, joint_actions: IntArray) -> FloatArray:
-        """Return the expected payoffs ``(m,)`` of joint actions ``(m, n)``; for planners."""
-        return self._game.payoffs.mean(axis=0)[tuple(joint_actions.T)]
 
 
 def _state_space(
@@ -402,11 +395,9 @@ class Landmarks(Game):
 
     def advance(self, rng: np.random.Generator) -> None:
         """Draw other places, and find the assignment of least distance."""
-        from scipy.optimize import linear_sum_assignment
-
         agents, landmarks = rng.random((2, len(self.seen), 2))
         self.seen = np.linalg.norm(agents[:, None] - landmarks, axis=2)
-        assigned = linear_sum_assignment(self.seen)[1]
+        assigned = optimize.linear_sum_assignment(self.seen)[1]
         self.best = float(self.payoffs(assigned[None])[0])
 
 
@@ -453,9 +444,8 @@ class TeamGame:
         self.interactions = sorted(tuple(sorted(edge)) for edge in edges.edges)
         """Pairs of agents whose actions matter to each other."""
         self._numbers = np.arange(float(n))[:, None][:, : len(number)]
-        self._drawn: Any = 0
-        self.game = self._of_seed(0)
-        self._rng = np.random.default_rng(0)
+        self._drawn: Any = None
+        TeamGame.reset(self, 0)
 
     def _of_seed(self, seed: Any) -> Game:
         s = self.settings

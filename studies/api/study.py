@@ -311,7 +311,6 @@ class StudyResults:
         """
         from ..trials.keeping import finished_trial
 
-        where = None if path is None else Path(path)
         with Store.open(self.directory) as store:
             trial = finished_trial(store, condition, seed)
             recorded = list(trial.recorded.values())
@@ -322,12 +321,11 @@ class StudyResults:
             scenario: Any = trial.world()
             if not can_draw(scenario):
                 raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
-            is_drawn = False
-            if where is None:
-                where = self.directory / "replay" / f"{trial.identity[:8]}-{episode}.gif"
-                where.parent.mkdir(exist_ok=True)
-                is_drawn = where.exists()
-            if not is_drawn:
+            kept = self.directory / "replay" / f"{trial.identity[:8]}-{episode}.gif"
+            where = kept if path is None else Path(path)
+            if path is None:
+                kept.parent.mkdir(exist_ok=True)
+            if path is not None or not kept.exists():
                 scenario.animate(store.recording(trial.identity, episode), where)
         return Replay(where, f"{trial.condition}, seed {trial.seed}, {episode} episode")
 

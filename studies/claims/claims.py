@@ -25,7 +25,6 @@ from ...core.numerics import pd
 from ..catalogue.chain_order import order_tests
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..presentation.tables import ends
 from ..results.analysis import EVALUATED, BySeed, difference, paired_difference, ratio, shared
 from ..results.results import NOTHING, Results, Sizes
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
@@ -395,7 +394,7 @@ class Finding:
         """The value with its interval and number of seeds, as text."""
         if self.measured is None:
             return "no results"
-        value, low, high = ends(self.measured.estimate)
+        value, low, high = map(float, self.measured.estimate)
         text = f"{value:.2f}" if self.measured.seeds else f"{value:.2g}"
         if self.measured.seeds:
             text += f" ({low:.2f} to {high:.2f}), {self.measured.seeds} seeds"
@@ -478,7 +477,7 @@ def _record(finding: Finding) -> dict[str, Any]:
         "verdict": finding.verdict,
     }
     if measured is not None:
-        value, low, high = (v if np.isfinite(v) else None for v in ends(measured.estimate))
+        value, low, high = (v if np.isfinite(v) else None for v in map(float, measured.estimate))
         record |= {"value": value, "low": low, "high": high, "seeds": measured.seeds}
         record |= {"p": measured.p, "note": measured.note}
     return record

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import ArrayLike
 
-from ..results.analysis import Difference
+from ..results.analysis import Difference, Figures
 from ..results.contrasts import Aggregates
 from ..results.statistics import LEVEL, Estimate, stacked
 from ..store.durable import replacing
@@ -227,15 +227,17 @@ def name_lines(figure: Figure, labels: Sequence[str], title: str) -> None:
 
 
 def draw_forest(
-    compared: Mapping[str, Sequence[Difference]], unit: str, null: float = 0.0
-) -> Figure | None:
-    """Return a figure of panels side by side, sorted by the last one; None if there are none.
+    name: str, compared: Mapping[str, Sequence[Difference]], unit: str, null: float = 0.0
+) -> Figures:
+    """Return by its name a figure of panels side by side, sorted by the last; or no figure.
 
     Points are means over seeds, bars their 95 % intervals. Full points differ significantly from
     the null (p < .05, adjusted), hollow ones do not.
 
     Parameters
     ----------
+    name
+        That of the figure.
     compared
         By title the lines of a panel, one per condition; all panels hold the same conditions.
     unit
@@ -245,7 +247,7 @@ def draw_forest(
     """
     compared = {title: lines for title, lines in compared.items() if lines}
     if not compared:
-        return None
+        return {}
     *_, last = compared.values()
     ranked = sorted(last, key=lambda line: float(line.estimate.value))
     names = [line.condition for line in ranked]
@@ -254,38 +256,27 @@ def draw_forest(
     size = (max(width, 6.6), 1.5 + 0.25 * len(names))
     figure, all_axes = panels(1, len(compared), size, sharey=True)
     for axes, (title, lines) in zip(all_axes[0], compared.items(), strict=True):
-        _forest_panel(axes, lines, names, null)
+        axes.axvline(null, color="#888888", linewidth=0.8)
+        for line in lines:
+            colour = COLOURS[0] if line.estimate.value >= null else COLOURS[1]
+            face = colour if line.p < LEVEL else "white"
+            row = names.index(line.condition)
+            draw_row(axes, row, line.estimate, colour, markerfacecolor=face, markersize=5)
+        axes.grid(axis="x", alpha=0.25)
         axes.set_title(title, loc="left")
         axes.set_xlabel(unit)
     name_rows(all_axes[0, 0], names)
     _forest_legend(figure, [line for lines in compared.values() for line in lines])
-    return figure
-
-
-def _forest_panel(
-    axes: Axes, lines: Sequence[Difference], names: Sequence[str], null: float
-) -> None:
-    axes.axvline(null, color="#888888", linewidth=0.8)
-    for line in lines:
-        colour = COLOURS[0] if line.estimate.value >= null else COLOURS[1]
-        face = colour if line.p < LEVEL else "white"
-        row = names.index(line.condition)
-        draw_row(axes, row, line.estimate, colour, markerfacecolor=face, markersize=5)
-    axes.grid(axis="x", alpha=0.25)
+    return {name: figure}
 
 
 def _forest_legend(figure: Figure, lines: Sequence[Difference]) -> None:
-    filled = {
-        "significantly different (adjusted p < .05)": "#444444",
-        "no significant difference": "white",
-    }
+    point = {"marker": "o", "ls": "", "color": "#444444"}
     handles = [
-        handle(text, marker="o", ls="", color="#444444", markerfacecolor=face)
-        for text, face in filled.items()
-    ]
-    handles += [
-        handle(f"{word} than the reference", color=colour, linewidth=1.5)
-        for colour, word in zip(COLOURS, ("higher", "lower"), strict=False)
+        handle("significantly different (adjusted p < .05)", **point),
+        handle("no significant difference", **point, markerfacecolor="white"),
+        handle("higher than the reference", color=COLOURS[0], linewidth=1.5),
+        handle("lower than the reference", color=COLOURS[1], linewidth=1.5),
     ]
     seeds = sorted({line.seeds for line in lines})
     counted = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"

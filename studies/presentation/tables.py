@@ -26,7 +26,7 @@ from ...core.numerics import pd
 from ...core.plugins.settings import near
 from ..errors import SpecError
 from ..results.analysis import Summary
-from ..results.statistics import FEW, Estimate, between, exactly, two_figures
+from ..results.statistics import FEW, Estimate, between, exactly, stacked, two_figures
 from .progress import count
 
 Format = Literal["table", "csv", "json"]
@@ -204,8 +204,7 @@ class SummaryTable:
         columns: dict[str, Any] = {"condition": [line.condition for line in self.lines]}
         columns["seeds"] = [line.seeds for line in self.lines]
         for title in self.titles:
-            estimates = (line.estimates.get(title, UNKNOWN) for line in self.lines)
-            parts = zip(*map(ends, estimates), strict=True)
+            parts = stacked([line.estimates.get(title, UNKNOWN) for line in self.lines])
             columns |= zip((title, f"{title} low", f"{title} high"), parts, strict=True)
         return in_csv(pd.DataFrame(columns))
 
@@ -304,7 +303,7 @@ class Cell(NamedTuple):
     @classmethod
     def of(cls, estimate: Estimate) -> Cell:
         """Return the cell of an estimate."""
-        value, low, high = map(two_figures, ends(estimate))
+        value, low, high = map(two_figures, map(float, estimate))
         return cls(value, None if np.isnan(estimate.low) else (low, high))
 
     @property
@@ -319,11 +318,6 @@ class Cell(NamedTuple):
 
 Row = tuple[str, int, tuple[Cell | None, ...]]
 """Condition, number of seeds, and a cell per title; none where there is no estimate."""
-
-
-def ends(estimate: Estimate) -> tuple[float, float, float]:
-    """Return value and ends of the interval of an estimate of no dimension."""
-    return float(estimate.value), float(estimate.low), float(estimate.high)
 
 
 LABEL = 24

@@ -145,11 +145,9 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
             films.append(Film(trial.condition, trial.seed, gif))
             size += len(gif)
     filmed = {film.condition for film in films}
-    missing["Not shown, as the scenario cannot draw it, or there is no room"] += Counter(
-        trial.condition for trial in others if trial.condition not in filmed
-    )
-    kept_back = {reason: trials for reason, trials in missing.items() if trials}
-    return Replays(scenes, episodes, "".join(scripts), films, kept_back)
+    if not_drawn := Counter(t.condition for t in others if t.condition not in filmed):
+        missing["Not shown, as the scenario cannot draw it, or there is no room"] = not_drawn
+    return Replays(scenes, episodes, "".join(scripts), films, missing)
 
 
 def _trials(store: Store) -> Mapping[str, Trial]:
@@ -191,7 +189,7 @@ def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode reached the goal, by condition, seed and number."""
     training = read(store).episodes.query("phase == 'training'")
     success: Any = training.set_index(["condition", "seed", "episode"])["success"]
-    return {key: bool(reached) for key, reached in success.items()}
+    return success.astype(bool).to_dict()
 
 
 FOLDER = Path(__file__).parent

@@ -16,7 +16,7 @@ from ...core.interface.scenario import SUCCESS
 from ...core.numerics import pd
 from ..errors import WIDTH
 from .results import Results
-from .statistics import LEVEL, Array, Estimate, bootstrap, paired_tests, power_lines, rate
+from .statistics import LEVEL, Array, Estimate, bootstrap, exactly, paired_tests, power_lines, rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,8 +25,7 @@ EVALUATED = "evaluation success"
 """Title of the success of a trained team in the scenario of its condition."""
 
 
-@dataclass(frozen=True)
-class Summary:
+class Summary(NamedTuple):
     """A line of the table."""
 
     condition: str
@@ -195,18 +194,13 @@ def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> 
     """
     a, b = rate(numerator, level), rate(denominator, level)
     if not b.value > 0.0:
-        return Estimate(*(np.asarray(np.nan) for _ in range(3)))
-    product = a.value * b.value
-    low_scale = b.high * (2.0 * b.value - b.high)
-    high_scale = b.low * (2.0 * b.value - b.low)
-    low, high = np.asarray(0.0), np.asarray(np.inf)
-    if low_scale > 0.0:
-        root = product**2 - a.low * (2.0 * a.value - a.low) * low_scale
-        low = np.asarray((product - np.sqrt(np.maximum(root, 0.0))) / low_scale)
-    if high_scale > 0.0:
-        root = product**2 - a.high * (2.0 * a.value - a.high) * high_scale
-        high = np.asarray((product + np.sqrt(np.maximum(root, 0.0))) / high_scale)
-    return Estimate(a.value / b.value, low, high)
+        return exactly(np.nan)
+    product, ends = a.value * b.value, []
+    for own, other, sign, unknown in ((a.low, b.high, -1.0, 0.0), (a.high, b.low, 1.0, np.inf)):
+        scale = other * (2.0 * b.value - other)
+        root = np.sqrt(np.maximum(product**2 - own * (2.0 * a.value - own) * scale, 0.0))
+        ends.append(np.asarray((product + sign * root) / scale if scale > 0.0 else unknown))
+    return Estimate(a.value / b.value, *ends)
 
 
 def phases_of(results: Results) -> dict[str, str]:

@@ -126,14 +126,18 @@ def contrasts(
     compared, made = differences(pairs, of_rates=shown_as.is_rate), []
     for setting, members in groups:
         less = {d.condition: {"difference": d.estimate} for d in compared[setting]}
+        means = {name: values[c].to_numpy() for name, c in members}
         lines, trained = [], {}
         for name, c in members:
-            own = {shown_as.heading: _estimate(results, shown_as, phase, c, values[c].to_numpy())}
+            if phase and shown_as.is_rate:
+                estimate = rate(results.values(c, shown_as.name, phase))
+            else:
+                estimate = bootstrap(means[name].astype(float), bounds=shown_as.bounds)
+            own = {shown_as.heading: estimate}
             whose = ", ".join(filter(None, (setting, name)))
             lines.append(Summary(whose, len(values[c]), own | less.get(name, {})))
             if phase and results.has(c, "training", shown_as.name):
                 trained[name] = results.values(c, shown_as.name)
-        means = {name: values[c].to_numpy() for name, c in members}
         made.append(Group(setting, members[0][0], compared[setting], tuple(lines), means, trained))
     return Contrasts(shown_as, phase, tuple(made), results.identical)
 
@@ -206,15 +210,6 @@ def _led(members: _Pairs, reference: str | None, known: Mapping[str, Collection[
         raise SpecError(f"reference = {reference!r}: {closest(reference, names)}")
     first = matches[0]
     return [members[first], *members[:first], *members[first + 1 :]]
-
-
-def _estimate(
-    results: Results, measure: Measure, phase: str, condition: str, means: Array
-) -> Estimate:
-    """Return a rate over all episodes, or the mean of means of seeds ``(n_seeds,)``."""
-    if phase and measure.is_rate:
-        return rate(results.values(condition, measure.name, phase))
-    return bootstrap(np.asarray(means, dtype=float), bounds=measure.bounds)
 
 
 RESAMPLES = 2000
@@ -308,7 +303,7 @@ def aggregate(contrasts: Contrasts) -> Aggregates:
         If no task has all conditions, each with two runs.
     """
     names = list(dict.fromkeys(name for group in contrasts.groups for name in group.values))
-    groups = [group for group in contrasts.groups if _is_whole(group, names)]
+    groups = [g for g in contrasts.groups if all(len(g.values.get(n, ())) > 1 for n in names)]
     if len(names) < 2 or not groups:
         raise SpecError("statistics: no two conditions have two seeds each in a task of all")
     scores = {name: [group.values[name] for group in groups] for name in names}
@@ -334,10 +329,6 @@ def aggregate(contrasts: Contrasts) -> Aggregates:
             f"P(improvement): that a seed does better than one of {names[0]}, ties half.",
         ),
     )  # fmt: skip
-
-
-def _is_whole(group: Group, names: Sequence[str]) -> bool:
-    return all(name in group.values and len(group.values[name]) > 1 for name in names)
 
 
 def _profile(tasks: Tasks, thresholds: Array) -> Estimate:

@@ -24,7 +24,7 @@ from ...core.plugins import sources
 from ..errors import SpecError
 from ..spec.tables import flat, label
 from ..store.database import EVALUATION
-from ..store.store import NamesAndRows, Store
+from ..store.store import Store
 from ..trials.trial import joined as joined_measures
 
 Array = NDArray[Any]
@@ -66,8 +66,9 @@ class Results:
 
     def numbers(self, condition: str) -> dict[str, Array]:
         """Return the numbers of whole trials that a condition has, ``(n_seeds,)`` by name."""
-        numbers = self._finished[condition][list(self._numbers)]
-        return {name: column.to_numpy() for name, column in numbers.items() if column.notna().all()}
+        own = self._finished[condition].dropna(axis="columns")
+        others = {*TRIAL_COLUMNS, *self.columns.get(condition, ())}
+        return {name: own[name].to_numpy() for name in own if name not in others}
 
     def has(self, condition: str, phase: str = "", measure: str = "") -> bool:
         """Tell whether a condition has finished trials, episodes of a phase, a measure of them."""
@@ -99,7 +100,7 @@ class Results:
         """
         rows = self._rows[phase, condition]
         values = self._measured[measure][rows]
-        if measure in self._whole:
+        if measure in ("steps", *(m.name for m in self.measures if m.is_rate)):
             values = values.astype(int)
         return values.reshape(len(np.unique(self.episodes["seed"].to_numpy()[rows])), -1)
 
@@ -145,15 +146,6 @@ class Results:
     def _finished(self) -> dict[str, pd.DataFrame]:
         done = self.trials[self.trials["state"] == DONE]
         return dict(iter(done.groupby("condition", sort=False)))
-
-    @cached_property
-    def _numbers(self) -> tuple[str, ...]:
-        swept = {key for row in self.columns.values() for key in row}
-        return tuple(n for n in self.trials.columns if n not in TRIAL_COLUMNS and n not in swept)
-
-    @cached_property
-    def _whole(self) -> frozenset[str]:
-        return frozenset(("steps", *(m.name for m in self.measures if m.is_rate)))
 
     @cached_property
     def _measured(self) -> dict[str, Array]:
@@ -208,17 +200,15 @@ class Sizes:
 
 def read(store: Store) -> Results:
     """Read all that has been run; what has failed is in the frame of trials alone."""
-    episodes, trials = _frame(store.episodes()), _frame(store.trials())
+    episodes, trials = (
+        pd.DataFrame(list(rows), columns=names)
+        for names, rows in (store.episodes(), store.trials())
+    )
     seconds = [name for name in trials.columns if name.startswith(SECONDS)]
     usage = [row[2] for row in store.numbers() if not row[4]]
     return assemble(
         [episodes], [trials], store.phases(), store.columns(), store.measures(), seconds + usage
     )
-
-
-def _frame(table: NamesAndRows) -> pd.DataFrame:
-    names, rows = table
-    return pd.DataFrame(list(rows), columns=names)
 
 
 def assemble(
@@ -312,28 +302,6 @@ NOTHING = partial(from_arrays, {}, {}, {}, {}, {}, (SUCCESS,))
 """Returns results of no trials."""
 
 
-def _joined_results(
-    parts: Sequence[Results],
-    labels: Sequence[Mapping[str, str]],
-    columns: Mapping[str, Mapping[str, Any]],
-) -> Results:
-    """Return results below each other, by what each one's conditions are called in the whole."""
-    frames: dict[str, list[pd.DataFrame]] = {"episodes": [], "trials": []}
-    for part, new in zip(parts, labels, strict=True):
-        for name, kept in frames.items():
-            frame = getattr(part, name)
-            label = frame["condition"].map(new)
-            swept = {
-                key: label.map(lambda c, k=key: columns[c][k])
-                for key in dict.fromkeys(key for row in columns.values() for key in row)
-            }
-            kept.append(frame.assign(condition=label, **swept))
-    phases = dict.fromkeys(phase for part in parts for phase in part.phases)
-    usage = (name for part in parts for name in part.usage)
-    measures = joined_measures(part.measures for part in parts)
-    return assemble(frames["episodes"], frames["trials"], phases, columns, measures, usage)
-
-
 _TABLES = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
 EPISODE_COLUMNS, TRIAL_COLUMNS, NUMBERS = (
     {name: (unit, meaning) for name, (unit, meaning) in table.items()} for table in _TABLES.values()
@@ -387,8 +355,9 @@ def chosen(results: Results, choice: str, settings: Mapping[str, Any]) -> Result
     trials = results.trials[["condition", "seed"]]
     set_ = [dict(flat(settings.get(c, {}))) for c in trials["condition"]]
     swept = results.columns.get
+    truths = {"true": True, "false": False}  # as they stand in a column
     known = [
-        own | {k: _plain(v) for k, v in swept(c, {}).items() if v != ""}
+        own | {k: truths.get(v, v) for k, v in swept(c, {}).items() if v != ""}
         for own, c in zip(set_, trials["condition"], strict=True)
     ]
     frame = pd.DataFrame(known, index=trials.index).assign(**trials)
@@ -437,27 +406,33 @@ def together(
     SpecError
         If two studies mean different things by the name of a measure.
     """
-    times = Counter(condition for _, results in studies for condition in results.columns)
+    names, parts = zip(*studies, strict=True)
+    times = Counter(condition for part in parts for condition in part.columns)
     several = [condition for condition, count in times.items() if count > 1]
     labels = [
-        {c: f"{c} ({name})" if c in several else c for c in results.columns}
-        for name, results in studies
+        {c: f"{c} ({name})" if c in several else c for c in part.columns} for name, part in studies
     ]
     for condition in several if settings else ():
-        at = [i for i, (_, results) in enumerate(studies) if condition in results.columns]
+        at = [i for i, part in enumerate(parts) if condition in part.columns]
         apart = _apart(condition, [settings[i].get(condition, {}) for i in at])
         if not times.keys() & set(apart):
             for i, text in zip(at, apart, strict=False):
                 labels[i][condition] = text
-    keys = dict.fromkeys(k for _, r in studies for row in r.columns.values() for k in row)
+    keys = dict.fromkeys(k for part in parts for row in part.columns.values() for k in row)
     columns = {
         new[condition]: {**{key: row.get(key, "") for key in keys}, DIRECTORY: name}
-        for (name, results), new in zip(studies, labels, strict=True)
-        for condition, row in results.columns.items()
+        for name, part, new in zip(names, parts, labels, strict=True)
+        for condition, row in part.columns.items()
     }
-    return _joined_results([results for _, results in studies], labels, columns), labels
-
-
-def _plain(value: Any) -> Any:
-    """Return a value of a column as what it stands for: ``true`` is a truth value there."""
-    return value == "true" if value in ("true", "false") else value
+    frames: dict[str, list[pd.DataFrame]] = {"episodes": [], "trials": []}
+    for part, new in zip(parts, labels, strict=True):
+        for name, kept in frames.items():
+            frame = getattr(part, name)
+            label = frame["condition"].map(new)
+            swept = {k: label.map(lambda c, k=k: columns[c][k]) for k in (*keys, DIRECTORY)}
+            kept.append(frame.assign(condition=label, **swept))
+    phases = dict.fromkeys(phase for part in parts for phase in part.phases)
+    usage = (name for part in parts for name in part.usage)
+    measures = joined_measures(part.measures for part in parts)
+    episodes, trials = frames["episodes"], frames["trials"]
+    return assemble(episodes, trials, phases, columns, measures, usage), labels

@@ -15,12 +15,11 @@ normal.
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations
 from textwrap import wrap
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,8 +45,7 @@ and .99 succeed of the others' episodes, intervals of 10 to 30 seeds and 10 epis
 truth in 94 to 97 % of simulations, without it in 69 to 75 %."""
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(NamedTuple):
     """A value with the ends of its interval; arrays of equal shape, or of no dimension."""
 
     value: Array
@@ -55,9 +53,9 @@ class Estimate:
     high: Array
 
 
-def exactly(value: float) -> Estimate:
-    """Return a number without an interval, as a count is."""
-    unknown = np.asarray(np.nan)
+def exactly(value: ArrayLike) -> Estimate:
+    """Return numbers without an interval, as counts are."""
+    unknown = np.full(np.shape(value), np.nan)
     return Estimate(np.asarray(value), unknown, unknown)
 
 
@@ -106,23 +104,17 @@ def bootstrap(
         )
     n_runs, value = len(array), array.copy().T.mean(axis=-1)
     if n_runs < 2:
-        return Estimate(value, np.full_like(value, np.nan), np.full_like(value, np.nan))
+        return exactly(value)
     if n_runs < FEW:
         reach = special.stdtrit(n_runs - 1, 0.5 + level / 2.0)
         half = reach * np.sqrt(array.var(axis=0, ddof=1) / n_runs)
         return _bounded(value, value - half, value + half, bounds, level, n_runs)
     drawn, means = _drawn(n_runs, resamples, seed), []
-    for part in _parts(resamples, array.size):
-        means.append(np.moveaxis(_taken(array, drawn[part]), 0, -1).mean(axis=-1))
+    for part in np.array_split(drawn, min(resamples, 1 + resamples * array.size // AT_ONCE)):
+        means.append(np.moveaxis(_taken(array, part), 0, -1).mean(axis=-1))
     tail = _tail(level, n_runs)
     low, high = np.quantile(np.concatenate(means), [tail, 1.0 - tail], axis=0)
     return _bounded(value, low, high, bounds, level, n_runs)
-
-
-def _parts(resamples: int, size: int) -> Iterator[slice]:
-    """Yield slices of resamples that hold `AT_ONCE` values if each has `size`."""
-    number = max(1, AT_ONCE // size)
-    return (slice(first, first + number) for first in range(0, resamples, number))
 
 
 @lru_cache(maxsize=1)
@@ -131,12 +123,8 @@ def _drawn(n_runs: int, resamples: int, seed: int) -> NDArray[Any]:
 
     In few bytes. They are kept, as the conditions of a study mostly have equally many seeds.
     """
-    rng = np.random.default_rng(seed)
-    runs = np.empty((resamples, n_runs), np.min_scalar_type(n_runs - 1))
-    for part in _parts(resamples, n_runs):
-        runs[part] = rng.integers(n_runs, size=runs[part].shape)
-    runs.flags.writeable = False
-    return runs
+    runs = np.random.default_rng(seed).integers(n_runs, size=(resamples, n_runs))
+    return runs.astype(np.min_scalar_type(n_runs - 1))
 
 
 def _taken(array: Array, runs: NDArray[Any]) -> Array:
@@ -197,7 +185,7 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     n_runs, n_episodes = array.shape
     p = array.mean()
     if n_runs < 2:
-        return Estimate(p, np.full_like(p, np.nan), np.full_like(p, np.nan))
+        return exactly(p)
     rarer = min(array.sum(), array.size - array.sum())
     alike = 1.0
     if rarer > 0.0 and n_episodes > 1:
@@ -220,8 +208,7 @@ def rates(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
 
 def stacked(estimates: Sequence[Estimate]) -> Estimate:
     """Return estimates of no dimension as one ``(n,)``."""
-    value, low, high = np.array([(e.value, e.low, e.high) for e in estimates], dtype=float).T
-    return Estimate(value, low, high)
+    return Estimate(*np.array(estimates, dtype=float).T)
 
 
 LEVEL = 0.05
@@ -230,8 +217,7 @@ EXACT = 99_999
 """Up to so many patterns of signs are all tried; beyond, as many are drawn."""
 
 
-@dataclass(frozen=True)
-class Friedman:
+class Friedman(NamedTuple):
     """Whether conditions differ at all (Friedman 1937)."""
 
     statistic: float
@@ -452,7 +438,16 @@ def detectable(deviation: float, seeds: int, comparisons: int = 1, wanted: float
     >>> round(detectable(0.25, 15), 2), detectable(0.25, 5)
     (0.19, inf)
     """
-    return deviation * _detectable(seeds, comparisons, wanted)
+    if seeds < seeds_needed(comparisons):
+        return math.inf
+    low, high = 0.0, 1.0
+    while _power(high, seeds, comparisons) < wanted:
+        low, high = high, 2.0 * high
+    while high - low > 0.002 * high:
+        middle = (low + high) / 2.0
+        is_found = _power(middle, seeds, comparisons) >= wanted
+        low, high = (low, middle) if is_found else (middle, high)
+    return deviation * high
 
 
 def seeds_for(
@@ -552,22 +547,6 @@ def _power(effect: float, seeds: int, comparisons: int) -> float:
         level = extreme * 2.0 ** (1 - seeds)
     shift, freedom = effect * math.sqrt(seeds), seeds - 1
     return power_of_t(freedom, shift, float(special.stdtrit(freedom, 1.0 - level / 2.0)))
-
-
-@lru_cache(maxsize=256)
-def _detectable(seeds: int, comparisons: int, wanted: float) -> float:
-    if seeds < seeds_needed(comparisons):
-        return math.inf
-    low, high = 0.0, 1.0
-    while _power(high, seeds, comparisons) < wanted:
-        low, high = high, 2.0 * high
-    while high - low > 0.002 * high:
-        middle = (low + high) / 2.0
-        if _power(middle, seeds, comparisons) < wanted:
-            low = middle
-        else:
-            high = middle
-    return high
 
 
 def _simulated(effect: float, seeds: int, extreme: int) -> float:

@@ -329,9 +329,7 @@ def _validated(table: TomlTable, where: str) -> ConditionSettings:
 
 
 def section(name: str, value: object) -> TomlTable:
-    """Return the table of a section: from a table, a settings model, or for a topology a string.
-
-    What is None in a model leaves what lies below as it is, as TOML has no word for it.
+    """Return the table of a section: from a table, or for a topology a string.
 
     Examples
     --------
@@ -340,8 +338,6 @@ def section(name: str, value: object) -> TomlTable:
     """
     if isinstance(value, Mapping):
         return dict(value)
-    if isinstance(value, Settings):
-        return value.model_dump(exclude_none=True)
     is_topology = name.rpartition(".")[2] == "topology"
     if not is_topology or not isinstance(value, str):
         allowed = "a name or a table" if is_topology else "a table"

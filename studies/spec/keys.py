@@ -7,13 +7,14 @@ walked as well, so a new scenario or learner has its keys here from the first da
 
 import inspect
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from annotated_types import Ge, Gt, Le, Lt, MinLen
+from annotated_types import MinLen
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
@@ -28,7 +29,8 @@ UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 TYPES = {bool: "true or false", int: "whole number", float: "number", str: "text", Any: "any"}
 MOST_TOLD = 10**9
 """A bound beyond it is that of a machine's integers, and no help to anybody."""
-COMPARISONS = ((Ge, "ge", ">="), (Gt, "gt", ">"), (Le, "le", "<="), (Lt, "lt", "<"))
+SIGNS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
+"""By the attribute of a field's metadata that holds the bound."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Key:
     """Empty where there is none."""
     meaning: str
     """The docstring of the field, in one line; empty if it has none."""
-    preset: str = ""
+    preset: str
     """What the preset `default`, which a spec begins from, has in place of the default; empty if
     the same."""
 
@@ -161,7 +163,7 @@ def _table(
 ) -> Table:
     laid = _laid_by_preset(name, kinds[0])
     keys = tuple(
-        _laid_over(_key(field, info), laid)
+        _key(field, info, laid.get(field))
         for field, info in model.model_fields.items()
         if field != "kind" and not (field in base and base[field].default == info.default)
     )
@@ -177,15 +179,6 @@ def _laid_by_preset(name: str, kind: str) -> Mapping[str, Any]:
     if not isinstance(table, Mapping) or (kind and table.get("kind") != kind):
         return {}
     return table
-
-
-def _laid_over(key: Key, table: Mapping[str, Any]) -> Key:
-    """Return a key with what a preset's table has in place of its default."""
-    value = table.get(key.name)
-    if isinstance(value, Mapping):
-        value = value.get("kind")  # its other keys stand in a table of their own
-    text = "" if value is None else json.dumps(value)
-    return replace(key, preset="" if text == key.default else text)
 
 
 def nearest(prefix: str) -> str:
@@ -206,17 +199,20 @@ def nearest(prefix: str) -> str:
     return near(prefix, names) or f"known: {', '.join(tops)}"
 
 
-def _key(name: str, info: FieldInfo) -> Key:
+def _key(name: str, info: FieldInfo, laid: Any) -> Key:
+    """Return a key; `laid` is what the preset has in place of its default, if anything."""
     meaning = " ".join((info.description or "").split())
-    plugged = registry_of(info)
+    plugged, default, unit = registry_of(info), _shown(info), UNIT.search(meaning)
     if plugged is not None:
-        kinds = f"kind: {', '.join(plugged.built_in)}"
-        return Key(name, "table", _shown(info), kinds, "", meaning)
-    allowed = ", ".join(dict.fromkeys([*_bounds(info.metadata), *_allowed(info.annotation)]))
-    unit = UNIT.search(meaning)
-    return Key(
-        name, _type(info.annotation), _shown(info), allowed, unit[1] if unit else "", meaning
-    )
+        type_, allowed = "table", f"kind: {', '.join(plugged.built_in)}"
+    else:
+        type_ = _type(info.annotation)
+        allowed = ", ".join(dict.fromkeys([*_bounds(info.metadata), *_allowed(info.annotation)]))
+    if isinstance(laid, Mapping):
+        laid = laid.get("kind")  # its other keys stand in a table of their own
+    preset = "" if laid is None else json.dumps(laid)
+    preset = "" if preset == default else preset
+    return Key(name, type_, default, allowed, unit[1] if unit else "", meaning, preset)
 
 
 def _shown(info: FieldInfo) -> str:
@@ -264,8 +260,9 @@ def _allowed(annotation: Any) -> Iterator[str]:
 
 def _bounds(metadata: Any) -> Iterator[str]:
     for item in metadata:
-        for cls, attribute, sign in COMPARISONS:
-            if isinstance(item, cls) and getattr(item, attribute) <= MOST_TOLD:
-                yield f"{sign} {getattr(item, attribute):,}"
+        for attribute, sign in SIGNS.items():
+            bound = getattr(item, attribute, math.inf)
+            if bound <= MOST_TOLD:
+                yield f"{sign} {bound:,}"
         if isinstance(item, MinLen):
             yield f"at least {item.min_length} of them"

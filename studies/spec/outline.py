@@ -103,16 +103,9 @@ class StudyOutline:
             If it is no such table.
         """
         seeds = table["seeds"]
-        seeds = range(seeds) if isinstance(seeds, int) else seeds
-        return cls(
-            study=str(table["study"]),
-            seeds=tuple(map(int, seeds)),
-            episodes=int(table["episodes"]),
-            steps=int(table["steps"]),
-            evaluation=int(table["evaluation"]),
-            columns=columns,
-            table=table,
-        )
+        seeds = tuple(range(seeds) if isinstance(seeds, int) else map(int, seeds))
+        episodes, steps, evaluation = (int(table[k]) for k in ("episodes", "steps", "evaluation"))
+        return cls(str(table["study"]), seeds, episodes, steps, evaluation, columns, table)
 
 
 def sources_of(store: Store) -> Sources:

@@ -73,12 +73,11 @@ def plain(value: Any, key: str = "") -> Any:
     if isinstance(value, list | tuple):
         return type(value)(plain(v, key) for v in value)
     registry = REGISTRIES.get(key.rpartition(".")[2])
-    if isinstance(value, Settings):
-        return _of_settings(value, registry)
     if isinstance(value, Hierarchy | nx.Graph):
         return _edges(value)
-    if isinstance(getattr(value, "settings", None), Settings):  # of something that was built
-        return _of_settings(value.settings, registry)
+    settings = getattr(value, "settings", value)  # of something that was built
+    if isinstance(settings, Settings):
+        return _of_settings(settings, registry)
     if isinstance(value, type) or callable(value) or hasattr(value, "function"):
         name = _name(value, registry or Registry("state variable", {}))
         return {"kind": name} if key in ("scenario", "learner", "topology") else name
@@ -340,22 +339,19 @@ class Spec(Settings):
         Also which keys are left out: of its learner for controls, see `conditions`, and of its
         topology for learners that pass nothing down.
         """
-        lines: dict[str, None] = {}
+        lines = []
         controls = [c for c in self.conditions() if c.settings.learner.kind == "frozen"]
         tuned = self.learner.keys() - LearnerSettings.model_fields.keys() - {"kind"}
         if tuned and controls:
             keys = ", ".join(f"learner.{key}" for key in sorted(tuned))
             labels = listed((condition.label for condition in controls), 3)
-            lines[f"{keys}: left out for {labels}, which learn nothing"] = None
+            lines.append(f"{keys}: left out for {labels}, which learn nothing")
         for condition in self.conditions():
-            lines |= dict.fromkeys(condition.settings.warnings())
-            scenarios = [
-                condition.settings.scenario,
-                *(s.scenario for _, s in condition.evaluations),
-            ]
-            for scenario in (*scenarios, *(stage.scenario for stage in condition.curriculum)):
-                lines |= dict.fromkeys(scenario.warnings())
-        return tuple(lines)
+            lines += condition.settings.warnings()
+            others: list[Any] = [*dict(condition.evaluations).values(), *condition.curriculum]
+            for there in (condition.settings, *others):
+                lines += there.scenario.warnings()
+        return tuple(dict.fromkeys(lines))
 
     @property
     def sources(self) -> Sources:

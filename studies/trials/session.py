@@ -351,7 +351,7 @@ class Session:
         self._recorder.add(record.transition)
         if record.last:
             recording = self._recorder.recording()
-            if isinstance(self.team, Team) and self.team.messages.fail:
+            if isinstance(self.team, Team) and self.team.messages.failures:
                 failing = self.team.messages.failing(record.episode, record.step + 2)
                 recording["messages_fail"] = failing
             self._recordings[name] = recording

@@ -1,11 +1,16 @@
 """Every example runs; those that need what is not installed are at least read."""
 
+import json
 import runpy
+from functools import partial
 from pathlib import Path
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
+
+from nested_agents import faults
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -31,6 +36,28 @@ def test_ppo(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 def test_fault_recovery_is_read() -> None:
     path = EXAMPLES / "fault_recovery.py"
     compile(path.read_text(encoding="utf-8"), str(path), "exec")
+
+
+@pytest.mark.slow
+def test_broken_joint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = EXAMPLES / "broken_joint.py"
+    compile(path.read_text(encoding="utf-8"), str(path), "exec")
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    pytest.importorskip("mujoco", reason="extra [mujoco]")
+    monkeypatch.chdir(tmp_path)  # MuJoCo leaves a log
+    monkeypatch.setattr(faults, "recovery_table", partial(faults.recovery_table, steps=5))
+    monkeypatch.setattr(
+        "sys.argv", ["broken_joint.py", str(tmp_path / "c.json"), "512", "512", "1"]
+    )
+    runpy.run_path(str(path), run_name="__main__")
+    assert "PPO, relearned: fore thigh" in capsys.readouterr().out
+    rows = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
+    assert len(rows) == 16
+    before, after = np.array(rows[0]["faulty"])[0, :5], np.array(rows[0]["faulty"])[0, 5:]
+    assert before.tolist() == rows[0]["healthy"][0][:5]
+    assert after.tolist() != rows[0]["healthy"][0][5:]
 
 
 def test_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,6 +35,7 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
     [
         ("swimmer", ("mujoco", "stable_baselines3"), 2),
         ("swimmer_4", ("mujoco", "stable_baselines3"), 4),
+        ("swimmer_transfer", ("mujoco",), 4),
         ("spread", ("mpe2",), 3),
         ("spread_ppo", ("mpe2", "stable_baselines3"), 3),
     ],
@@ -44,7 +45,7 @@ def test_specs_of_worlds_of_others_run(
 ) -> None:
     for extra in extras:
         pytest.importorskip(extra, reason="extras mpe, mujoco, peers")
-    monkeypatch.chdir(ROOT)  # the swimmer of four joints is a file of examples
+    monkeypatch.chdir(ROOT)  # swimmers of more joints are files of examples
     path = ROOT / "studies" / "catalogue" / "learning_curve" / f"{spec}.toml"
     few = ["seeds=1", "episodes=2", "steps=3", "evaluation=1"]
     for trial in trials_of(Spec.load(path, few)):
@@ -52,4 +53,7 @@ def test_specs_of_worlds_of_others_run(
         session.train(2)
         session.evaluate()
         assert len(session.scenario.agents) == agents
-        assert [row.phase for row in session.result().rows] == ["training"] * 2 + ["evaluation"]
+        others = [f"evaluation:{name}" for name in trial.evaluations]
+        assert [row.phase for row in session.result().rows] == [
+            *["training"] * 2, "evaluation", *others
+        ]  # fmt: skip

@@ -230,12 +230,6 @@ _FAST = {"reassoc", "contract"}
 
 
 @njit(cache=True)
-def total_width(lay: Layout) -> int:
-    """Return how many weights of shared rules all terms leave."""
-    return lay.shared_sizes.sum()
-
-
-@njit(cache=True)
 def _own_strengths(t: int, own, lay: Layout, heads, levels, level) -> int:  # type: ignore[no-untyped-def]
     """Write the strengths of own variables of a term, the last of them by level.
 
@@ -273,9 +267,9 @@ def _own_strengths(t: int, own, lay: Layout, heads, levels, level) -> int:  # ty
 def contract(theta, own, peaks, lay: Layout, partial) -> None:  # type: ignore[no-untyped-def]
     """Contract theta with the strengths of every own block ``(K, n_own)``.
 
-    Writes the weights ``(K, total_width)`` that remain for the shared rules, term by term. Each row
-    of theta is read once, however many own blocks there are. `peaks` ``(d, most memberships)`` are
-    the greatest strengths that shared variables will have: what cannot matter stays zero.
+    Writes the weights ``(K, shared rules)`` that remain, term by term. Each row of theta is read
+    once, however many own blocks there are. `peaks` ``(d, most memberships)`` are the greatest
+    strengths that shared variables will have: what cannot matter stays zero.
     """
     count, start = len(own), 0
     level = np.empty(count, np.int64)

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ...numerics import FloatArray, IntArray, njit
-from .contraction import LANES, contract, many_strengths, total_width
+from .contraction import LANES, contract, many_strengths
 from .fuzzy import Layout, Packed, unpack
 from .states import looked_up
 
@@ -60,7 +60,7 @@ def fold(partial, strengths, lay: Layout, one, two, out, wanted) -> None:  # typ
     Parameters
     ----------
     partial
-        ``(total_width,)`` weights of the shared rules.
+        ``(shared rules,)`` weights.
     strengths
         ``(d - n_own, most memberships, lanes)`` of the shared variables.
     lay
@@ -96,42 +96,6 @@ def fold(partial, strengths, lay: Layout, one, two, out, wanted) -> None:  # typ
 
 CHUNK = 64
 """States whose own blocks are compared with each other."""
-
-
-@njit(cache=True)
-def _shared_strengths(shared, lay: Layout):  # type: ignore[no-untyped-def]
-    """Return the strengths ``(d - n_own, most memberships, R)`` of shared blocks."""
-    out = np.zeros((shared.shape[1], lay.counts.max(), len(shared)))
-    for j in range(shared.shape[1]):
-        many_strengths(lay.n_own + j, shared[:, j], lay, out[j])
-    return out
-
-
-@njit(cache=True)
-def _peaks(strengths, lay: Layout):  # type: ignore[no-untyped-def]
-    """Return the greatest strengths ``(d, most memberships)`` of shared variables, own ones 0."""
-    out = np.zeros((len(lay.counts), strengths.shape[1]))
-    for j in range(len(strengths)):
-        for s in range(lay.counts[lay.n_own + j]):
-            out[lay.n_own + j, s] = strengths[j, s].max()
-    return out
-
-
-@njit(cache=True)
-def _scratch(theta, lay: Layout):  # type: ignore[no-untyped-def]
-    """Return room for lanes of strengths, two folds, and values."""
-    n_shared, most = len(lay.counts) - lay.n_own, lay.counts.max()
-    room = np.zeros((n_shared, most, LANES), theta.dtype)
-    one = np.empty((lay.shared_sizes.max(), LANES), theta.dtype)
-    return room, one, np.empty_like(one), np.empty(LANES, theta.dtype)
-
-
-@njit(cache=True)
-def _fill(strengths, row, lane, lay: Layout, room) -> None:  # type: ignore[no-untyped-def]
-    """Put the strengths of one shared block into a lane."""
-    for j in range(len(room)):
-        for s in range(lay.counts[lay.n_own + j]):
-            room[j, s, lane] = strengths[j, s, row]
 
 
 @njit(cache=True)
@@ -207,18 +171,26 @@ def folded(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # type
         if wanted[:, row].any():
             met[n_met] = row
             n_met += 1
-    strengths = _shared_strengths(shared[met[:n_met]], lay)
-    partial = np.empty((count, total_width(lay)), theta.dtype)
-    contract(theta, own[used], _peaks(strengths, lay), lay, partial)
-    room, one, two, sums = _scratch(theta, lay)
-    rows = np.empty(LANES, np.int64)
+    n_shared, most, at = shared.shape[1], lay.counts.max(), shared[met[:n_met]]
+    strengths, peaks = np.zeros((n_shared, most, n_met)), np.zeros((len(lay.counts), most))
+    for j in range(n_shared):
+        many_strengths(lay.n_own + j, at[:, j], lay, strengths[j])
+        for s in range(most):
+            peaks[lay.n_own + j, s] = strengths[j, s].max()
+    partial = np.empty((count, lay.shared_sizes.sum()), theta.dtype)
+    contract(theta, own[used], peaks, lay, partial)
+    room = np.zeros((n_shared, most, LANES), theta.dtype)
+    one = np.empty((lay.shared_sizes.max(), LANES), theta.dtype)
+    two, sums, rows = np.empty_like(one), np.empty(LANES, theta.dtype), np.empty(LANES, np.int64)
     values = np.empty((count, n_rows))
     for b in range(count):
         lane = 0
         for k in range(n_met):
             if wanted[b, met[k]]:
                 rows[lane] = met[k]
-                _fill(strengths, k, lane, lay, room)
+                for j in range(n_shared):
+                    for s in range(most):
+                        room[j, s, lane] = strengths[j, s, k]
                 lane += 1
             if lane and (lane == LANES or k == n_met - 1):
                 fold(partial[b], room, lay, one, two, sums, lane)

@@ -445,16 +445,12 @@ def values_of_two(theta, one, two, lay: Layout) -> tuple[float, float]:  # type:
         m = lay.counts[lay.terms[t, split - 1]] if split else 1
         columns = (end - begin) // rows
         heads, tails = np.empty((2, rows), theta.dtype), np.empty((2, columns), theta.dtype)
-        product_of(t, 0, split, lay, one, heads[0])
-        product_of(t, 0, split, lay, two, heads[1])
-        product_of(t, split, last, lay, one, tails[0])
-        product_of(t, split, last, lay, two, tails[1])
-        parts = np.empty((2, lay.part_sizes[t]))
-        product_of(t, split, lay.part_lengths[t], lay, one, parts[0])
-        product_of(t, split, lay.part_lengths[t], lay, two, parts[1])
-        tops = np.empty((2, rows // m))
-        product_of(t, 0, max(0, split - 1), lay, one, tops[0])
-        product_of(t, 0, max(0, split - 1), lay, two, tops[1])
+        parts, tops = np.empty((2, lay.part_sizes[t])), np.empty((2, rows // m))
+        for s, strengths in enumerate((one, two)):
+            product_of(t, 0, split, lay, strengths, heads[s])
+            product_of(t, split, last, lay, strengths, tails[s])
+            product_of(t, split, lay.part_lengths[t], lay, strengths, parts[s])
+            product_of(t, 0, max(0, split - 1), lay, strengths, tops[s])
         slab = theta[begin:end].reshape(rows // m, m, columns)
         more = _sums(slab, heads[0], heads[1], tails[0], tails[1], tops, parts, negligible(theta))
         f, g = f + more[0], g + more[1]

@@ -225,8 +225,7 @@ def _draw(axes: Axes, field: Field, box: BoxSpec, radius: float) -> None:
         axes.plot(*places.T, marker=marker, ms=size, color=COLOURS[move], ls="")
     axes.arrow(0, 0, 0.6 * box.reach, 0, width=0.004, head_width=0.02, color="black")
     axes.text(0.25 * box.reach, 0.03, "to the goal", ha="center", fontsize=7)
-    axes.set_xlim(-reach - spacing, reach + spacing)
-    axes.set_ylim(-reach - spacing, reach + spacing)
-    axes.set_box_aspect(1.0)  # a square of equal lengths; `set_aspect` would cut the title off
+    ends = -reach - spacing, reach + spacing
+    # A box aspect of 1 gives equal lengths; an aspect would cut the title off.
+    axes.set(xlim=ends, ylim=ends, box_aspect=1.0, xlabel="along the course to the goal [m]")
     axes.set_title(f"robot {field.robot + 1}; longest arrow {1000 * longest:.0f} mm", loc="left")
-    axes.set_xlabel("along the course to the goal [m]")

@@ -72,19 +72,16 @@ class _BoxScene(Scene):
         self.robot: RobotSettings = robot_for(str(recording["robot"]))
         robots = recording["robot_poses"].shape[1]
         self.box = box_for(str(recording["box"]), robots)
-        self.infrared: InfraredSettings | None = None
-        if sensors:
-            described = str(recording.get("infrared", "{}"))
-            self.infrared = InfraredSettings.model_validate_json(described)
+        described = str(recording.get("infrared", "{}"))
+        self.infrared = InfraredSettings.model_validate_json(described) if sensors else None
         low, high = self._extent()
         # One metre is as long both ways: widen what is too narrow for the picture.
         room = np.array([SIDES[0] * AXES[2], SIDES[1] * AXES[3]])
         metres_per_pixel = float(((high - low) / room).max()) * (1 + 2 * MARGIN)
         half, middle = 0.5 * metres_per_pixel * room, 0.5 * (low + high)
-        self.axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
-        self.axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
+        across, along = np.stack([middle - half, middle + half], axis=1)
+        self.axes.set(xlim=across, ylim=along, axisbelow=True)
         self.axes.grid(color="#eeeeee")
-        self.axes.set_axisbelow(True)
         # Robots that would be dots are drawn larger than they are.
         self.pixels_of_robot = max(self.robot.radius / metres_per_pixel, LEAST_RADIUS)
         self.radius = self.pixels_of_robot * metres_per_pixel
@@ -139,9 +136,8 @@ class _BoxScene(Scene):
         colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
         touching = bool(self.recording["contact"][step, r])
         speeds = self.recording["wheel_speeds"][step, wheels]
-        failed: FloatArray = np.zeros(len(speeds))
-        if "failed" in self.recording:
-            failed = self.recording["failed"][step, wheels]
+        none = np.zeros_like(self.recording["wheel_speeds"])
+        failed = self.recording.get("failed", none)[step, wheels]
         radius, scale = self.radius, min(1.0, self.pixels_of_robot / 20)
         self._trail(poses, step, colour)
         small = self.pixels_of_robot < WHEELS_FROM
@@ -155,9 +151,8 @@ class _BoxScene(Scene):
             line = [(0.0, 0.0), (radius, 0.0)]  # no longer, or a row of robots looks like a comb
             self._patch(Polygon(line, closed=False, fill=False, ec=edge, lw=0.8), poses[step])
             return
-        nose = Polygon([(radius, 0), (0.4 * radius, 0.35 * radius), (0.4 * radius, -0.35 * radius)])
-        nose.set(facecolor="white", edgecolor=colour, lw=scale)
-        self._patch(nose, poses[step])
+        nose = [(radius, 0), (0.4 * radius, 0.35 * radius), (0.4 * radius, -0.35 * radius)]
+        self._patch(Polygon(nose, fc="white", ec=colour, lw=scale), poses[step])
         length, width = 0.5 * radius, 0.16 * radius
         for wheel, speed, broken in zip(self.robot.wheels, speeds, failed, strict=True):
             corner = (wheel.x - length / 2, wheel.y - width / 2)
@@ -186,12 +181,10 @@ class _BoxScene(Scene):
         eyes = poses[:, None, :2] + radius * along
         segments = np.stack([eyes, eyes + distances[..., None] * along], axis=2)
         hits = linear > 0
-        grey = LineCollection(segments[~hits], colors=RAY_COLOUR, linewidths=0.6, zorder=1.5)
-        readings = infrared.reading(distances[hits])
-        violet = LineCollection(
-            segments[hits], colors=HIT_COLOUR, linewidths=0.8 + 2.2 * readings, zorder=1.5
-        )
-        self._moving += [self.axes.add_collection(lines, autolim=False) for lines in (grey, violet)]
+        widths = 0.8 + 2.2 * infrared.reading(distances[hits])
+        for shown, colour, width in ((~hits, RAY_COLOUR, 0.6), (hits, HIT_COLOUR, widths)):
+            rays = LineCollection(segments[shown], colors=colour, linewidths=width, zorder=1.5)
+            self._moving.append(self.axes.add_collection(rays, autolim=False))
 
     def _patch(self, patch: Patch, pose: FloatArray) -> None:
         patch.set_transform(_at(pose) + self.axes.transData)
@@ -277,7 +270,7 @@ def scene_of(recording: Recording) -> dict[str, Any]:
         "speed": robot.max_speed,
         "wheels": [[wheel.x, wheel.y] for wheel in robot.wheels],
         "agents": [f"robot{r + 1}.{name}" for r in range(robots) for name in robot.wheel_names],
-        "rings": [] if box.radius else [_rounded(ring[:-1]) for ring in box.rings],
+        "rings": [] if box.radius else [ring[:-1].round(5).tolist() for ring in box.rings],
         "disc": round(box.radius, 5),
         "reach": round(box.reach, 5),
     }
@@ -318,10 +311,6 @@ def pack(recording: Recording, scene: Mapping[str, Any]) -> dict[str, Any]:
         "talking": silent.shape[1],
         "scale": round(scale, 9),
         "dt": float(recording["dt"]),
-        "goal": [round(float(v), 5) for v in recording["goal_pose"]],
+        "goal": recording["goal_pose"].round(5).tolist(),
         "data": base64.b64encode(content).decode("ascii"),
     }
-
-
-def _rounded(points: FloatArray) -> list[list[float]]:
-    return [[round(float(v), 5) for v in point] for point in points]

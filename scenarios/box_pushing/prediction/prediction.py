@@ -7,21 +7,88 @@ own block is the wheel speed that is exact.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
 from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.spaces import Blocks, first_alike
+from ....core.interface.spaces import ActionSet, Blocks, first_alike
 from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
-from ..world.settings import reward
-from .belief import outcomes
+from ..states.state_spaces import BoxStateSpace
+from ..world.geometry import Outline
+from ..world.settings import InfraredSettings, Task, reward
+from .belief import PushBelief, outcomes
 from .push import PushModel, push
-from .situation import Premises, Situation
 from .wheel_commands import WheelCommands, choices_of, speeds_of, twist_table, wheel_commands_of
+
+CONTACT_GAP = 0.002
+"""Predicted gap [m] below which a robot counts as touching."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The present, as far as prediction needs it."""
+
+    robots: FloatArray
+    """Poses ``(M, 3)``."""
+    box: FloatArray
+    """Pose ``(3,)``."""
+    goal: FloatArray
+    """Pose ``(3,)``."""
+    speeds: FloatArray
+    """``(n,)`` commanded wheel speeds [m/s]."""
+    effects: tuple[FloatArray, ...]
+    """Per robot ``(3, w + 1)``: twist in its frame = effect @ [wheel speeds, 1]."""
+    groups: tuple[tuple[int, ...], ...]
+    """Agents of each robot."""
+
+    @cached_property
+    def places(self) -> list[tuple[int, int]]:
+        """Robot of every agent, and which of its wheels the agent drives."""
+        return [(r, wheel) for r, group in enumerate(self.groups) for wheel in range(len(group))]
+
+
+@dataclass(frozen=True)
+class Premises:
+    """What all predictions of a scenario rest on."""
+
+    belief: PushBelief
+    """Push models by constants, for `outcomes`."""
+    space: BoxStateSpace
+    """State variables."""
+    action_set: ActionSet
+    """What actions tell the wheels."""
+    increment: float
+    """By how much, as a fraction of `limits`."""
+    limits: FloatArray
+    """``(n,)`` greatest wheel speeds [m/s]."""
+    task: Task
+    """What is rewarded."""
+    infrared: InfraredSettings
+    """What the sensors read."""
+    outline: Outline
+    """Of the box."""
+    hold: float
+    """How long a decision stands [s]."""
+    seconds: float
+    """How far predictions look ahead [s]."""
+
+    def seen(
+        self,
+        situation: Situation,
+        robots: FloatArray,
+        box: FloatArray,
+        gaps: FloatArray,
+        seconds: float,
+    ) -> View:
+        """Return a view of situations that `situation` leads to in `seconds`."""
+        return View(
+            robots, box, gaps, situation.goal, situation.box, seconds / self.hold,
+            self.outline, self.belief.model.friction_radius,
+        )  # fmt: skip
 
 
 class BoxPrediction:
@@ -56,15 +123,9 @@ class BoxPrediction:
         return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
 
     def _after(self, choices: IntArray, seconds: float) -> View:
-        robots, box, gaps = push(
-            self.situation.robots,
-            self.situation.box,
-            self.wheel_commands.twists,
-            choices,
-            seconds,
-            self.model,
-        )
-        return self.premises.seen(self.situation, robots, box, gaps, seconds)
+        now, twists = self.situation, self.wheel_commands.twists
+        robots, box, gaps = push(now.robots, now.box, twists, choices, seconds, self.model)
+        return self.premises.seen(now, robots, box, gaps, seconds)
 
     def _view_again(self, choices: IntArray) -> View:
         """Return the view of `choices`: the last one, if they are the same."""
@@ -133,8 +194,10 @@ class BoxPrediction:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         choices = self._choices(joint_actions)
         view = self._view_again(choices)
-        shared = self.premises.space.shared_of(view, [self.situation.places[agent][0]])[0]
-        return np.concatenate([self._own_after(agent, choices, view), shared], axis=1)
+        (r, wheel), space = self.situation.places[agent], self.premises.space
+        speeds = self.wheel_commands.speeds[r, choices[:, r], wheel]
+        own = space.own(view.robots[:, r], speeds, self.situation.goal)
+        return np.concatenate([own, space.shared_of(view, [r])[0]], axis=1)
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the next own variables of all agents and the shared ones of all robots.
@@ -143,21 +206,13 @@ class BoxPrediction:
         """
         choices = self._choices(joint_actions)
         view = self._view_again(choices)
-        space = self.premises.space
-        shared = space.shared_of(view, range(choices.shape[1]))
-        n, m = len(self.situation.places), len(choices)
+        space, speeds = self.premises.space, speeds_of(choices, self.wheel_commands.speeds)
+        poses: FloatArray = np.zeros((0, 3))
         if space.own_needs_pose:
-            own = np.array([self._own_after(agent, choices, view) for agent in range(n)])
-            return own, shared
-        speeds = speeds_of(choices, self.wheel_commands.speeds)
-        own = space.own(np.zeros((0, 3)), speeds.reshape(-1), self.situation.goal)
-        return own.reshape(n, m, -1), shared
-
-    def _own_after(self, agent: int, choices: IntArray, view: View) -> FloatArray:
-        """Return the own variables ``(m, n_own)`` of an agent after wheel commands ``(m, M)``."""
-        r, wheel = self.situation.places[agent]
-        speeds = self.wheel_commands.speeds[r, choices[:, r], wheel]
-        return self.premises.space.own(view.robots[:, r], speeds, self.situation.goal)
+            of_robots = view.robots.transpose(1, 0, 2)
+            poses = np.repeat(of_robots, len(speeds) // len(of_robots), axis=0).reshape(-1, 3)
+        own = space.own(poses, speeds.reshape(-1), self.situation.goal)
+        return own.reshape(*speeds.shape, -1), space.shared_of(view, range(choices.shape[1]))
 
     def poses(self, joint_actions: IntArray) -> View:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""
@@ -195,11 +250,8 @@ class BoxPrediction:
         """
         choices = self._choices(joint_action[None])[0]
         twists = self.wheel_commands.twists[np.arange(len(choices)), choices]
-        moved: FloatArray = outcomes(
-            self.situation.robots, self.situation.box, twists,
-            self.premises.hold, self.premises.belief, constants,
-        )  # fmt: skip
-        return moved
+        now, premises = self.situation, self.premises
+        return outcomes(now.robots, now.box, twists, premises.hold, premises.belief, constants)
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""
@@ -211,16 +263,9 @@ class BoxPrediction:
         return self._rewards(view)[row]
 
     def _rewards(self, view: View) -> FloatArray:
-        of_parties = reward(
-            self.premises.task,
-            view.distance,
-            -view.approach,
-            view.turn,
-            view.gaps < CONTACT_GAP,
-            self.premises.infrared.reading(view.gaps),
-        )
-        mean: FloatArray = of_parties.mean(axis=1)
-        return mean
+        contact, readings = view.gaps < CONTACT_GAP, self.premises.infrared.reading(view.gaps)
+        of_box = view.distance, -view.approach, view.turn
+        return reward(self.premises.task, *of_box, contact, readings).mean(axis=1)
 
 
 def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:
@@ -238,7 +283,3 @@ def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatA
     ahead = cos * chord[:, 0] + sin * chord[:, 1]
     left = cos * chord[:, 1] - sin * chord[:, 0]
     return np.stack([ahead, left, turn], axis=1) / seconds
-
-
-CONTACT_GAP = 0.002
-"""Predicted gap [m] below which a robot counts as touching."""

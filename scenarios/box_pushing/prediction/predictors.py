@@ -25,10 +25,9 @@ from ..states.relational import View
 from ..world.bodies import BoxSpec, compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
-from .prediction import BoxPrediction
+from .prediction import BoxPrediction, Premises, Situation
 from .push import PushModel
 from .settings import BeliefSettings
-from .situation import Premises, Situation
 
 IMMOBILE = 1e6
 """Ground friction [N] against which nothing moves."""
@@ -113,14 +112,10 @@ class ExactPrediction(BoxPrediction):
     def _after(self, choices: IntArray, seconds: float) -> View:
         periods = round(seconds / CONTROL_PERIOD)
         rows, which = np.unique(choices, axis=0, return_inverse=True)
-        poses, gaps = [], []
-        for row in rows:
-            commands = self.wheel_commands.speeds[np.arange(len(row)), row].ravel()
-            pose, gap = self.future.after(commands, periods)
-            poses.append(pose)
-            gaps.append(gap)
-        pose, gap = np.array(poses)[which], np.array(gaps)[which]
-        return self.premises.seen(self.situation, pose[:, 1:], pose[:, 0], gap, seconds)
+        commands = self.wheel_commands.speeds[np.arange(rows.shape[1]), rows]
+        played = [self.future.after(each.ravel(), periods) for each in commands]
+        poses, gaps = (np.array(part)[which] for part in zip(*played, strict=True))
+        return self.premises.seen(self.situation, poses[:, 1:], poses[:, 0], gaps, seconds)
 
     def after(self, joint_action: IntArray) -> ExactPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""

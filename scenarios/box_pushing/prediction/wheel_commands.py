@@ -58,32 +58,25 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray, merge: bool) ->
     n, w, a = commands.shape
     # Per wheel the distinct speeds in increasing order, and which of them each action commands.
     ordered, number = np.zeros((n, w, a)), np.empty((n, w, a), np.int64)
-    sizes = np.empty((n, w), np.int64)
-    counts = np.empty(n, np.int64)
-    for r in range(n):
-        counts[r] = 1
-        for j in range(w):
-            # By insertion: of so few speeds that is quick, and quick to compile.
-            sizes[r, j] = 0
-            for k in range(a):
-                speed, place = commands[r, j, k], sizes[r, j]
-                while place > 0 and ordered[r, j, place - 1] > speed:
-                    place -= 1
-                if place > 0 and ordered[r, j, place - 1] == speed:
-                    continue
-                for later in range(sizes[r, j], place, -1):
-                    ordered[r, j, later] = ordered[r, j, later - 1]
-                ordered[r, j, place] = speed
-                sizes[r, j] += 1
-            for k in range(a):
-                for place in range(sizes[r, j]):
-                    if ordered[r, j, place] == commands[r, j, k]:
-                        number[r, j, k] = place
-            counts[r] *= sizes[r, j]
+    sizes, counts = np.empty((n, w), np.int64), np.ones(n, np.int64)
     most, n_indices = 0, a**w
     for r in range(n):
-        if counts[r] > most:
-            most = counts[r]
+        for j in range(w):
+            # The least, and then the next: of so few speeds that is quick, and quick to compile.
+            last, least, place = -np.inf, 0.0, 0
+            while least < np.inf:
+                least = np.inf
+                for k in range(a):
+                    if last < commands[r, j, k] < least:
+                        least = commands[r, j, k]
+                    elif commands[r, j, k] == last:
+                        number[r, j, k] = place - 1
+                if least < np.inf:
+                    ordered[r, j, place] = last = least
+                    place += 1
+            sizes[r, j] = place
+            counts[r] *= place
+        most = max(most, counts[r])
     speeds, twists = np.zeros((n, most, w)), np.zeros((n, most, 3))
     which, level = np.empty((n, n_indices), np.int64), np.empty((n, w, n_indices), np.int64)
     n_distinct = np.zeros(n, np.int64)
@@ -150,24 +143,17 @@ def twist_table(commands: WheelCommands) -> tuple[IntArray, IntArray]:
     The combinations are wheel commands ``(m, M)``, the indices number them, ``(A ** n,)``.
     """
     n, n_indices = commands.which.shape
-    rows = 1
-    for distinct in commands.n_distinct:
-        rows *= distinct
-    choices = np.empty((rows, n), np.int64)
-    for c in range(rows):
-        rest = c
-        for r in range(n - 1, -1, -1):
-            choices[c, r] = commands.first[r, rest % commands.n_distinct[r]]
-            rest //= commands.n_distinct[r]
-    row = np.zeros(1, np.int64)
+    rows = commands.n_distinct.prod()
+    choices, row, behind = np.empty((rows, n), np.int64), np.zeros(1, np.int64), rows
     for r in range(n):
-        longer = np.empty(len(row) * n_indices, np.int64)
+        count = commands.n_distinct[r]
+        behind //= count
+        for c in range(rows):
+            choices[c, r] = commands.first[r, c // behind % count]
+        former, row = row, np.empty(len(row) * n_indices, np.int64)
         for c in range(len(row)):
-            start = row[c] * commands.n_distinct[r]
-            for index in range(n_indices):
-                command = commands.which[r, index]
-                longer[c * n_indices + index] = start + commands.distinct[r, command]
-        row = longer
+            command = commands.which[r, c % n_indices]
+            row[c] = count * former[c // n_indices] + commands.distinct[r, command]
     return choices, row
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics import FloatArray, IntArray, njit
-from ...state_variables import StateVariable, filled, find_variable, sensed, space_of
+from ...state_variables import StateVariable, find_variable, sensed, space_of
 from ..world import geometry as rows
 from ..world.geometry import LANES, ON_SURFACE, nearest_points, wrap
 from .relational import ARRIVED, AWAY, CLOSE, KEPT, LEAST, STATE_VARIABLES, STILL, View
@@ -282,22 +282,9 @@ def _of_others(gaps, robot, first, count, aways, work):  # type: ignore[no-untyp
 
 @njit(cache=True)
 def _relational(  # type: ignore[no-untyped-def]
-    robots,
-    box,
-    gaps,
-    goal,
-    origin,
-    before: float,
-    periods: float,
-    edges: FloatArray,
-    friction_radius: float,
-    wanted: IntArray,
-    columns: IntArray,
-    of_push: bool | None,
-    of_contact: bool | None,
-    of_path: bool | None,
-    of_face: bool | None,
-) -> FloatArray:
+    robots, box, gaps, goal, origin, before, periods, edges, friction_radius, wanted, columns,
+    of_push, of_contact, of_path, of_face,
+):  # fmt: skip
     """Return relational shared blocks ``(robots wanted, m, columns)``.
 
     Parameters
@@ -363,9 +350,8 @@ class BoxStateSpace:
 
     def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
-        if self.columns is None:
-            return self.sensed(view, robots)
-        return filled(self.columns.of(view, robots), self.functions, view, robots)
+        compiled = None if self.columns is None else self.columns.of(view, robots)
+        return sensed(self.functions, view, robots, compiled)
 
 
 def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:

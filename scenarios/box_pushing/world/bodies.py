@@ -92,13 +92,9 @@ def moments(edges: FloatArray) -> Moments:
     a, b = edges[:, :2], edges[:, 2:]
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     area = cross.sum() / 2
-    first = (cross[:, None] * (a + b)).sum(axis=0) / 6
     ends = a + b
-    outer = (
-        np.einsum("n,ni,nj->ij", cross, a, a)
-        + np.einsum("n,ni,nj->ij", cross, b, b)
-        + np.einsum("n,ni,nj->ij", cross, ends, ends)
-    ) / 24
+    first = (cross[:, None] * ends).sum(axis=0) / 6
+    outer = sum(np.einsum("n,ni,nj->ij", cross, p, p) for p in (a, b, ends)) / 24
     nodes, weights = np.polynomial.legendre.leggauss(64)
     t = (nodes + 1) / 2
     points = a[:, None] + t[:, None] * (b - a)[:, None]
@@ -176,8 +172,7 @@ def _turns(ring: FloatArray) -> FloatArray:
     """Return the sine of the turn at every vertex of a ring ``(n, 2)``."""
     into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
     cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
-    scale: FloatArray = np.linalg.norm(into, axis=1) * np.linalg.norm(out, axis=1)
-    return cross / scale
+    return cross / (np.linalg.norm(into, axis=1) * np.linalg.norm(out, axis=1))
 
 
 def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
@@ -505,8 +500,7 @@ def nominal_effect(robot: RobotSettings) -> FloatArray:
         ``(3, n_wheels + 1)``: body twist [m/s, m/s, rad/s] = effect @ [wheel speeds [m/s], 1].
     """
     drive = np.array([[robot.stiffness, 0.0, -robot.stiffness * w.y] for w in robot.wheels]).T
-    constant = np.zeros((3, 1))
-    return np.hstack([compliance(robot) @ drive, constant])
+    return np.hstack([compliance(robot) @ drive, np.zeros((3, 1))])
 
 
 _TABLES = tuples(tomllib.loads(Path(__file__).with_name("robots.toml").read_text(encoding="utf-8")))

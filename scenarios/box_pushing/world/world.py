@@ -349,10 +349,12 @@ class World:
         self.contact_time = state.contact_time.copy()
 
     def advance(self, wheel_speeds: FloatArray, periods: int) -> None:
-        """Let control periods pass with held wheel speeds ``(n_wheels,)`` [m/s]."""
-        speeds = np.asarray(wheel_speeds, dtype=float) * UNIT
+        """Let control periods pass with wheel speeds [m/s].
+
+        They are held, ``(n_wheels,)``, or those of each period, ``(periods, n_wheels)``.
+        """
         touched = np.zeros(len(self.robots))
-        for _ in range(periods):
+        for speeds in np.full((periods, self.n_wheels), wheel_speeds) * UNIT:
             for _ in range(SUBSTEPS):
                 self._step(speeds)
             self._observe()
@@ -407,14 +409,11 @@ class World:
     def _add_box(self, ground: Any) -> None:
         """Give the box its shape, its mass and its friction on the ground."""
         box = self.box
-        shapes: list[Any] = [
-            Box2D.b2PolygonShape(vertices=(piece * UNIT).tolist()) for piece in box.fixtures
+        polygons = [
+            Box2D.b2PolygonShape(vertices=(piece * UNIT).tolist(), radius=SKIN)
+            for piece in box.fixtures
         ]
-        for shape in shapes:
-            shape.radius = SKIN
-        if not shapes:
-            shapes = [Box2D.b2CircleShape(radius=box.radius * UNIT)]
-        for shape in shapes:
+        for shape in polygons or [Box2D.b2CircleShape(radius=box.radius * UNIT)]:
             self._box.CreateFixture(shape=shape, density=1.0, friction=box.contact_friction)
         # Set after the fixtures, which would bring masses of their own.
         self._box.massData = Box2D.b2MassData(mass=box.mass, center=(0, 0), I=box.inertia * UNIT**2)
@@ -450,11 +449,4 @@ class WheelFailures(Failures):
         """Let a world go on through (a part of) a step, its wheels being commanded `commands`."""
         if self.strike(step):
             world.set_grip(self.grip)
-        if not self._settings:
-            world.advance(commands, periods)
-            return
-        touched = np.zeros(len(world.robots))
-        for speeds in self.driven(commands, periods):
-            world.advance(speeds, 1)
-            touched += world.contact_time
-        world.contact_time = touched / periods
+        world.advance(self.driven(commands, periods) if self._settings else commands, periods)

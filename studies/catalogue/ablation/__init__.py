@@ -46,8 +46,7 @@ def draw(analysis: Analysis) -> Figures:
     """Return the figures of an analysis by name."""
     from ...presentation.figures import draw_forest
 
-    figure = draw_forest(analysis.differences, "difference from the first condition")
-    return {} if figure is None else {"ablation": figure}
+    return draw_forest("ablation", analysis.differences, "difference from the first condition")
 
 
 __all__ = ["analyse", "draw", "measure"]

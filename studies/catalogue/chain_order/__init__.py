@@ -119,8 +119,7 @@ def draw(analysis: Analysis) -> Figures:
     """Return the figure: what each order differs from the first one by."""
     from ...presentation.figures import draw_forest
 
-    figure = draw_forest(analysis.differences, "difference from the first order")
-    return {} if figure is None else {"chain-order": figure}
+    return draw_forest("chain-order", analysis.differences, "difference from the first order")
 
 
 __all__ = ["analyse", "draw", "measure"]

@@ -81,10 +81,8 @@ def draw(analysis: Analysis) -> Figures:
 
     names = {case.hierarchy for case in analysis.cases}
     figures = _draw_parted(analysis) if {*sum(PARTED, ())} <= names else {}
-    figure = draw_forest(analysis.differences, f"success less that {TRAINED}")
-    if figure is not None:
-        figures["differences"] = figure
-    return figures
+    unit = f"success less that {TRAINED}"
+    return figures | draw_forest("differences", analysis.differences, unit)
 
 
 def _draw_parted(analysis: Analysis) -> Figures:
@@ -97,11 +95,12 @@ def _draw_parted(analysis: Analysis) -> Figures:
     most, size = sizes if sizes > 1 else 4, ((1.9, 1.75), (0.9, 0.5))
     figure, panels = figures.grid(len(settings), most, *size, sharex=True, sharey=True)
     for axes, setting in zip(panels.flat, settings, strict=False):
-        fields = [[by_name[setting, name] for name in row] for row in PARTED]
-        axes.imshow([[float(e.value) for e in row] for row in fields], "Blues", vmin=0, vmax=1)
-        for (row, column), e in np.ndenumerate(np.array(fields, dtype=object)):
-            value, low, high = (two_figures(float(part)) for part in (e.value, e.low, e.high))
-            look: dict[str, Any] = {"ha": "center", "color": "white" if e.value > 0.5 else "black"}
+        fields = np.array([[by_name[setting, name] for name in row] for row in PARTED], dtype=float)
+        axes.imshow(fields[..., 0], "Blues", vmin=0, vmax=1)
+        for row, column in np.ndindex(2, 2):
+            value, low, high = map(two_figures, fields[row, column])
+            colour = "white" if fields[row, column, 0] > 0.5 else "black"
+            look: dict[str, Any] = {"ha": "center", "color": colour}
             axes.text(column, row, value, va="bottom", fontsize=15, **look)
             axes.text(column, row + 0.08, f"{low} to {high}", va="top", fontsize=7, **look)
         axes.set_title(setting, loc="left")

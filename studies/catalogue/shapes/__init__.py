@@ -73,8 +73,7 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation.figures import draw_forest
 
     unit = "success over that with the box of training"
-    figure = draw_forest(dict(analysis.cases), unit, null=1.0)
-    return {} if figure is None else {"shapes": figure}
+    return draw_forest("shapes", dict(analysis.cases), unit, null=1.0)
 
 
 __all__ = ["analyse", "check", "draw", "measure"]

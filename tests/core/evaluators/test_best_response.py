@@ -8,11 +8,11 @@ import pytest
 from nested_agents.core.evaluators import best_response
 from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
 from nested_agents.core.evaluators.evaluator import (
+    Aggregation,
     AutoSettings,
     DecisionProblem,
     Deliberation,
     ExactEnumeration,
-    Pooling,
     Rule,
     Sampling,
     SamplingSettings,
@@ -167,7 +167,9 @@ def test_pooled_means_are_means(order: int, membership: str) -> None:
     states[1::2, :, 2:4] = states[::2, :, 2:4]
     states[:, :, 4:] = states[0, :, 4:]
     theta = rng.normal(size=(6, rules.n_rules))
-    pooling = Pooling(rules, groups)
+    hierarchy = Hierarchy("abcdef", [])
+    problem = DecisionProblem(rules, hierarchy, A, groups, "value", "best-response", 0.9)
+    pooling = Aggregation(problem)
     expected = np.mean([rules.values(theta[i], states[i]) for i in agents], axis=0)
     pooled, joint_actions = pooling.pooled(list(theta), agents), np.zeros((7, 6), dtype=int)
     found = pooling.mean(pooled, Remembered(states), joint_actions)

@@ -104,6 +104,8 @@ def test_bodies_and_variables_of_each() -> None:
         ranges={"first": (-2.0, 2.0)}, hold=3,
     )  # fmt: skip
     assert world.agents == ("body1.1", "body1.2", "body2.1", "body2.2")
+    assert world.roles == ("body.1", "body.2", "body.1", "body.2")
+    assert from_gymnasium(Carts()).roles == ("actuator1", "actuator2")
     assert world.state_space.common == ("mean",)
     first, _ = world.state_space.variables
     assert (first.low, first.high) == (-2.0, 2.0)

@@ -1,21 +1,144 @@
-"""State variables of a foreign environment: numbers of what its players observe."""
+"""The players of a foreign environment: what they do and what they observe.
 
+There is an agent for every number of their actions; state variables are numbers of what they
+observe.
+"""
+
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
+from itertools import compress
 from typing import Any, cast
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
 from gymnasium.spaces.utils import flatten, flatten_space
 
-from ...core.interface.spaces import Variable
-from ...core.numerics import FloatArray
+from ...core.interface.spaces import ActionSet, Variable
+from ...core.numerics import FloatArray, IntArray
+from ..faults.wrappers import limits_of
 from .settings import AdaptedSettings, Direction
 
 MOST_BOUND = 1e6
 """A bound of a space beyond it is none."""
 MOST_CENTRES = 32
 """Values of a discrete observation that each have a membership function of their own, at most."""
+
+
+class Actuators:
+    """What the agents' actions command, by player.
+
+    Parameters
+    ----------
+    spaces
+        Of the players' actions.
+    levels
+        Of each dimension of a Box.
+    neutral
+        Index of the neutral action; None: the level nearest to 0, or the first discrete action.
+    bodies
+        The agents of each body of an only player; none: each is its own. Of several players each
+        is a body.
+
+    Attributes
+    ----------
+    names, roles
+        Of the agents.
+    groups
+        Agents by body.
+    players
+        Whose each body is.
+    action_set
+        Of every agent, the actions of the one that has most.
+
+    Raises
+    ------
+    ValueError
+        If actions are of other kinds, unbounded or mixed, or bodies do not hold all agents; one
+        line.
+    """
+
+    def __init__(
+        self,
+        spaces: Mapping[str, Any],
+        levels: int,
+        neutral: int | None,
+        bodies: Sequence[Sequence[int]] = (),
+    ) -> None:
+        self._spaces = spaces
+        tables = {player: _commands(player, space, levels) for player, space in spaces.items()}
+        if len({isinstance(space, Box) for space in spaces.values()}) > 1:
+            raise ValueError("actions: some are continuous and some discrete, allowed: one kind")
+        rows = [row for table in tables.values() for row in table]
+        n_actions = max(map(len, rows))
+        if n_actions < 2:
+            raise ValueError("actions: agents have 1 each, allowed: at least 2")
+        # An agent with fewer actions has them again from the first on.
+        self._commanded = np.array([np.resize(row, n_actions) for row in rows])
+        self.names: tuple[str, ...] = ()
+        self.groups: tuple[tuple[int, ...], ...] = ()
+        for player, table in tables.items():
+            first = len(self.names)
+            self.groups += (tuple(range(first, first + len(table))),)
+            self.names += tuple(_names(player, len(table)))
+        self._spans = [slice(group[0], group[-1] + 1) for group in self.groups]
+        self.players, self.roles = list(spaces), self.names
+        if len(spaces) == 1:
+            self._embody(bodies)
+        if len(spaces) > 1 or bodies:  # alike but for their numbers
+            self.roles = tuple(re.sub(r"_?\d+(?=$|[.])", "", name, count=1) for name in self.names)
+        self.action_set = self._action_set(neutral)
+
+    def _embody(self, bodies: Sequence[Sequence[int]]) -> None:
+        """Make the agents of an only player those of bodies."""
+        singles = tuple((i,) for i in range(len(self.names)))
+        if bodies and [(i,) for body in bodies for i in body] != [*singles]:
+            raise ValueError(
+                f"scenario.groups = {[list(body) for body in bodies]}: must hold the numbers 0 to "
+                f"{len(singles) - 1} of the agents once each, in order"
+            )
+        if bodies:
+            named = enumerate(bodies, 1)
+            self.names = tuple(f"body{b}.{k + 1}" for b, body in named for k in range(len(body)))
+        self.groups = tuple(map(tuple, bodies)) or singles
+        self.players = self.players * len(self.groups)
+
+    def _action_set(self, neutral: int | None) -> ActionSet:
+        is_continuous = isinstance(next(iter(self._spaces.values())), Box)
+        table = self._commanded
+        n_actions = table.shape[1]
+        if neutral is None:
+            neutral = int(np.abs(table).sum(axis=0).argmin()) if is_continuous else 0
+        if neutral >= n_actions:
+            raise ValueError(f"scenario.neutral = {neutral}: allowed 0 to {n_actions - 1}")
+        names = tuple(f"{v:.3g}" for v in table[0]) if (table == table[0]).all() else ()
+        if len(set(names)) < n_actions:
+            names = tuple(map(str, range(n_actions)))
+        nothing = (0.0,) * n_actions
+        return ActionSet(names, nothing, nothing, neutral)
+
+    def commands(self, joint_action: IntArray) -> dict[str, Any]:
+        """Return the players' actions for a joint action ``(n,)``."""
+        commanded = self._commanded[np.arange(len(joint_action)), joint_action]
+        given: dict[str, Any] = {}
+        for (player, space), span in zip(self._spaces.items(), self._spans, strict=True):
+            own, is_one = commanded[span], isinstance(space, Discrete)
+            given[player] = int(own[0]) if is_one else own.reshape(space.shape).astype(space.dtype)
+        return given
+
+
+def _commands(player: str, space: Any, levels: int) -> Sequence[FloatArray]:
+    """Return what each of a player's agents may command, a row for each."""
+    low, high = limits_of(space, f"actions of {player}" if player else "actions")
+    if isinstance(space, Box):
+        return list(np.linspace(low, high, levels, dtype=float).T)
+    return [np.arange(first, last + 1, dtype=float) for first, last in zip(low, high, strict=True)]
+
+
+def _names(player: str, count: int) -> list[str]:
+    if not player:
+        return [f"actuator{k + 1}" for k in range(count)]
+    return [player] if count == 1 else [f"{player}.{k + 1}" for k in range(count)]
 
 
 def bounds_of(player: str, space: Any) -> FloatArray:
@@ -125,11 +248,7 @@ class Perception:
         self._is_pair = np.array([len(rows) == 2 for rows in kept])
         self._is_angle = np.array([variable.periodic for variable in self.variables])
         is_common = (self._first == self._first[0]) & (self._last == self._last[0])
-        self.common = tuple(
-            variable.name
-            for variable, same in zip(self.variables, is_common.all(axis=0), strict=True)
-            if same and len(spaces) == 1
-        )
+        self.common = tuple(compress(names, is_common.all(axis=0) & (len(spaces) == 1)))
 
     def _find(self, name: str, entries: Any) -> Any:
         """Return where a variable is: ``(1, bodies)``, ``(2, bodies)`` of cosine and sine."""
