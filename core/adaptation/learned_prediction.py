@@ -18,8 +18,6 @@ class LearnedPrediction:
         What has been learned, a `LearnedPredictor`.
     present
         ``(n, d)`` the states of all agents.
-    horizon
-        Decisions ahead.
 
     Attributes
     ----------
@@ -27,8 +25,8 @@ class LearnedPrediction:
         ``(G, L)`` the first robot-action index that comes to the same, of groups of equal size.
     """
 
-    def __init__(self, predictor: Any, present: FloatArray, horizon: int) -> None:
-        self._predictor, self.present, self._horizon = predictor, present, horizon
+    def __init__(self, predictor: Any, present: FloatArray) -> None:
+        self._predictor, self.present = predictor, present
         self._reached = predictor.reached(present)
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
         n, a, _ = self._reached.shape
@@ -46,7 +44,7 @@ class LearnedPrediction:
         if self._last is None or self._last[0] != key:
             own = self._reached[np.arange(joint_actions.shape[1]), joint_actions]
             drivers = self._predictor.drivers(own, joint_actions)
-            shared = self._predictor.after(self.present, drivers, self._horizon)
+            shared = self._predictor.after(self.present, drivers)
             self._last = key, (np.ascontiguousarray(own.swapaxes(0, 1)), shared)
         return self._last[1]
 

@@ -120,10 +120,9 @@ class LearnedPredictor:
                 self.divisors = a ** np.arange(n - w, -1, -w)
                 self.local = np.arange(a**n)[:, None] // self.divisors % a**w
 
-    def predict(self, states: FloatArray, horizon: int | None = None) -> LearnedPrediction:
-        """Predict from states ``(n, d)`` so many decisions ahead; none: as the settings say."""
-        kind = TabulatedPrediction if len(self.joint) else LearnedPrediction
-        return kind(self, states, horizon or self.horizon)
+    def predict(self, states: FloatArray) -> LearnedPrediction:
+        """Predict from states ``(n, d)``."""
+        return (TabulatedPrediction if len(self.joint) else LearnedPrediction)(self, states)
 
     def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
         """Note what a joint action led to from the states of a prediction, as `observe`."""
@@ -179,9 +178,8 @@ class LearnedPredictor:
         of_all = together.T @ together
         m["gram"] += np.stack([each.T @ each, of_all, (b - 2) * of_all])
         m["moment"] += np.stack([each.T @ targets.reshape(-1, 2 * v), together.T @ summed])
-        m["squares"] += np.where(
-            common, (targets[:, 0] ** 2).sum(axis=0), (targets**2).sum(axis=(0, 1))
-        )
+        squares = targets**2
+        m["squares"] += np.where(common, squares[:, 0].sum(axis=0), squares.sum(axis=(0, 1)))
         own, others, explained = self._solved(common)
         left = m["squares"] - explained
         is_angle = self.periods[bodies.columns[0]] > 0.0
@@ -239,8 +237,8 @@ class LearnedPredictor:
         change = np.einsum("nr,narx->nax", phi, self.memory["own_weights"][self.kinds])
         return np.round((own + change) / self.grains) * self.grains
 
-    def after(self, states: FloatArray, drivers: FloatArray, horizon: int) -> FloatArray:
-        """Return the shared variables ``(G, m, s)`` that held drivers ``(m, b, k)`` lead to."""
+    def after(self, states: FloatArray, drivers: FloatArray) -> FloatArray:
+        """Return the shared variables ``(G, m, s)`` that drivers ``(m, b, k)`` lead to."""
         bodies, m = self.bodies, self.memory
         columns = bodies.columns[0]
         present, ranges = states[bodies.agents, bodies.columns], m["seen"][:, columns]
@@ -250,7 +248,7 @@ class LearnedPredictor:
         passes = PASSES if self.settings.midpoint else 1
         moved = driven_states(
             present, drivers, m["weights"], m["keep"],
-            ranges, self.periods[columns], horizon, passes, bodies.rules.layout,
+            ranges, self.periods[columns], self.horizon, passes, bodies.rules.layout,
         )  # fmt: skip
         body, place = bodies.places
         return np.moveaxis(moved[:, body, place], 0, 1)

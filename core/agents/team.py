@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..adaptation.self_model import Calibration, SelfModel
 from ..decision.exploration import Explorer
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from ..interface.hierarchy import Hierarchy
-from ..interface.scenario import Actors, Scenario, Transition, groups_of, rows_of
+from ..interface.scenario import Actors, EmbodiedScenario, Scenario, Transition, groups_of, rows_of
 from ..interface.spaces import NOT_EXPLORING, Prediction
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
@@ -90,7 +90,7 @@ class Team:
             )
         check_prediction(settings, scenario)
         self.hierarchy, self.action_set = hierarchy, scenario.action_set
-        n, n_actions = len(hierarchy), len(scenario.action_set)
+        n, n_actions, space = len(hierarchy), len(scenario.action_set), scenario.state_space
         self.self_model = SelfModel.of(settings.self_model, scenario)
         self.calibration = Calibration.of(settings.calibration, scenario)
         self.predictor: Any = _predictor_of(scenario, settings)
@@ -105,24 +105,11 @@ class Team:
         self._values_actions = settings.values_actions
         self._senders = _senders(settings, self.messages, hierarchy)
         self._n_told = max(map(len, self._senders), default=0)
-        self.space, self.rules = settings.rules_over(
-            scenario.state_space, scenario.action_set, self._n_told
-        )
+        self.space, self.rules = settings.rules_over(space, self.action_set, self._n_told)
         self.learner: Learner = settings.build(self.rules, rows)
-        self._asked = signature(self.learner.observe).parameters.keys() & {
-            "left",
-            "joint_action",
-            "ahead",
-        }
-        horizon = getattr(scenario, "horizon", 1)
-        if "ahead" in self._asked and self.predictor is None and horizon != 1:
-            raise ValueError(
-                f"learner.kind = {settings.kind!r}: learns from what one decision leads to, and "
-                f"the scenario predicts {horizon} at once; use learner.predictor.kind = 'learned'"
-            )
-        self._states: FloatArray = np.zeros((len(hierarchy), scenario.state_space.n_variables))
+        self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
+        self._states: FloatArray = np.zeros((n, space.n_variables))
         self._left: FloatArray = self._states
-        self._entered: Any = None  # the scenario's prediction from the states entered last
         self.evaluator: Evaluator | None = None
         decision = settings.decision
         if decision.rule != "random":
@@ -192,19 +179,13 @@ class Team:
             return self.predictor.predict(self._states)
         if self._values_actions or not hasattr(scenario, "predict"):
             return None
-        prediction = self._given_prediction(scenario)
-        if "ahead" in self._asked:
-            self._entered = prediction
-        return prediction
-
-    def _given_prediction(self, scenario: Any) -> Any:
-        """Return what the scenario predicts, believing what has been learned of it."""
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
-        effects = self.self_model.effects if self.self_model else scenario.nominal_effects
+        embodied = cast(EmbodiedScenario, scenario)
+        effects = self.self_model.effects if self.self_model else embodied.nominal_effects
         if self.calibration is None:
-            return scenario.predict_with(effects)
-        return scenario.predict_with(effects, self.calibration.constants)
+            return embodied.predict_with(effects)
+        return embodied.predict_with(effects, self.calibration.constants)
 
     def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
         """Decide a joint action ``(n,)``, from the top of the hierarchy down.
@@ -263,10 +244,12 @@ class Team:
             if self._senders:
                 told = known[self._senders[i]]
                 self._left[i, self._states.shape[1] :][: len(told)] = told
+            given = NOTHING_GIVEN
+            if self.given.size:
+                given = self.given[i] / self.given[i].sum(axis=2, keepdims=True)
             deliberation = Deliberation(
-                i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders,
-                self._left,
-            )  # fmt: skip
+                i, known, prediction, weights, frequencies, self.rng, given, senders, self._left
+            )
             values = evaluator.values(deliberation)
             if len(values) != n_actions:
                 raise ValueError(f"the evaluator gave {len(values)} values of {n_actions} actions")
@@ -291,13 +274,6 @@ class Team:
         known[senders] = actions
         return senders, known
 
-    def _given_by(self, agent: int) -> FloatArray:
-        """Return how often all took each action ``(A, n, A)`` given each action of an agent."""
-        if not self.given.size:
-            return NOTHING_GIVEN
-        counts = self.given[agent]
-        return counts / counts.sum(axis=2, keepdims=True)
-
     def adapt(self, prediction: Prediction, joint_action: IntArray, transition: Transition) -> None:
         """Revise what predictions rest on by what `joint_action` did."""
         for part in self._adapting.values():
@@ -312,24 +288,8 @@ class Team:
             states, reward = self.mirror.states(states), self.mirror.reward(reward)
             left, taken = self.mirror.states(left), np.tile(taken, 2)
         offered = {"left": left, "joint_action": taken}
-        if "ahead" in self._asked:
-            ahead = self._ahead()
-            offered["ahead"] = ahead if self.mirror is None else self.mirror.states(ahead)
         asked: Any = {name: offered[name] for name in self._asked}
         self._count(self.learner.observe(states, reward, transition.terminated, **asked))
-
-    def _ahead(self) -> FloatArray:
-        """Return the states ``(n, A, d)`` that each own action leads to from those entered."""
-        n, n_actions = len(self.hierarchy), len(self.action_set)
-        prediction = self._entered
-        if self.predictor is not None:
-            prediction = self.predictor.predict(self._states, horizon=1)
-        ahead = np.empty((n, n_actions, self._states.shape[1]))
-        for i in range(n):
-            joint_actions = np.tile(self._last, (n_actions, 1))
-            joint_actions[:, i] = np.arange(n_actions)
-            ahead[i] = prediction.states(i, joint_actions)
-        return ahead
 
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""
@@ -372,9 +332,8 @@ class Team:
                 )
             part.continue_from(*given)
         self.rng.bit_generator.state = former.rng.bit_generator.state
-        self.seen = np.stack(
-            [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
-        )
+        seen = [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
+        self.seen = np.stack(seen)
         if self.given.shape == former.given.shape:
             self.given = former.given.copy()
         for name in self._adapting.keys() & former._adapting.keys():

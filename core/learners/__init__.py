@@ -16,7 +16,6 @@ LEARNERS = SettingsRegistry(
     "learner",
     {
         "batch-td": f"{__name__}.batch:BatchTDSettings",
-        "fitted-value": f"{__name__}.batch:FittedValueSettings",
         "td-lambda": f"{__name__}.td:TDLambdaSettings",
         "optimistic-td": f"{__name__}.td:OptimisticTDSettings",
         "fmq": f"{__name__}.td:FMQSettings",

@@ -20,13 +20,6 @@ knew at a decision, u what it did then, r what all this paid, and (x', u') the n
 
 The maximum is the agent's own: what it was told is part of x', and is not maximised over. There is
 one reward and one target for each *joint* step, so that no agent learns from another's turn.
-
-Fitted value iteration (Gordon 1995) regresses values of after-states as batch TD does, and needs a
-predictor as well. It does not aim at what followed, which is what an earlier policy did, but at the
-best that is predicted to follow. With s_v the after-state that an agent's action v is predicted to
-lead to from s, the others doing what they did last::
-
-    f(s) = R(s) + gamma max_v f(s_v)
 """
 
 from __future__ import annotations
@@ -37,7 +30,6 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..adaptation.predictors import GivenPredictor
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..evaluators.evaluator import Counts, Deliberation
 from ..interface.spaces import ActionSet, StateSpace, choice
@@ -57,9 +49,11 @@ MOST_RULES = 4096
 Function = Callable[[FloatArray], FloatArray]
 
 
-class AfterStateSettings(LearnerSettings):
-    """What the batch learners of values of after-states share."""
+class BatchTDSettings(LearnerSettings):
+    """Batch TD(lambda): towards what followed, regressing on all experience."""
 
+    kind: Literal["batch-td"] = "batch-td"
+    factory: ClassVar[str] = f"{__name__}:BatchTD"
     ridge: Positive = 10.0
     """Weight of the squared consequents against squared errors of rewards scaled by 100: larger, if
     values are jagged; smaller, if they are flat."""
@@ -72,13 +66,6 @@ class AfterStateSettings(LearnerSettings):
     """Decisions of an episode after which is regressed without waiting for its end."""
     mirrored: bool = False
     """Whether what the mirror image of the team would have met is experience as well."""
-
-
-class BatchTDSettings(AfterStateSettings):
-    """Batch TD(lambda): towards what followed, regressing on all experience."""
-
-    kind: Literal["batch-td"] = "batch-td"
-    factory: ClassVar[str] = f"{__name__}:BatchTD"
     trace_decay: Fraction = 0.0
     """Trace decay lambda: 0 bootstraps from the next state, 1 sums the rewards of an episode."""
 
@@ -133,7 +120,7 @@ class BatchTD:
         self._active: list[tuple[IntArray, FloatArray]] = []
         self._regressed = 0
         # By row, the ridge and the sum of phi phi' over so many of these.
-        self._sums_until: dict[int, tuple[FloatArray, int]] = {}
+        self._summed: dict[int, tuple[FloatArray, int]] = {}
 
     def begin_episode(self) -> None:
         """Note that the first after-state follows none, even if the last episode was given up."""
@@ -161,29 +148,20 @@ class BatchTD:
         """Return how many weights have changed: all of them."""
         self._extend()
         s = self.settings
-        for row in range(len(self._active)):
-            taken, strengths = self._taken(row)
+        for row, (taken, strengths) in enumerate(self._active):
             rewards, follower = self._outcomes(row)
             rewards = REWARD_SCALE * rewards
             weights, values_of, solve = self._equations(row, (follower != CUT_OFF).astype(float))
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
             theta = self.theta[row].astype(float) * REWARD_SCALE
             for _ in range(s.regression_iterations):
-                returns = self._returns(values_of(theta), rewards, follower)
+                values = values_of(theta)
+                returns = lambda_returns(values, rewards, follower, s.discount, s.trace_decay)
                 targets = weights * np.clip(returns, low, high)
                 theta = solve(moment(taken, strengths, targets, theta.size))
             change = theta / REWARD_SCALE - self.theta[row]
             self.theta[row] += s.target_averaging_rate * change
         return self.theta.size
-
-    def _taken(self, row: int) -> tuple[IntArray, FloatArray]:
-        """Return the active rules and strengths ``(N, k)`` of what is regressed on."""
-        return self._active[row]
-
-    def _returns(self, values: FloatArray, rewards: FloatArray, follower: IntArray) -> FloatArray:
-        """Return what every after-state was worth ``(N,)``."""
-        s = self.settings
-        return lambda_returns(values, rewards, follower, s.discount, s.trace_decay)
 
     def _equations(self, row: int, known: FloatArray) -> tuple[FloatArray, Function, Function]:
         """Return the weights ``(N,)`` of after-states, and how their values and theta follow.
@@ -195,13 +173,13 @@ class BatchTD:
         known
             ``(N,)`` 1 for after-states of which it is known what followed, 0 for others.
         """
-        active, strengths = self._taken(row)
+        active, strengths = self._active[row]
         k = self.rules.n_rules
-        gram, begin = self._sums_until.get(row, (self.settings.ridge * np.eye(k), 0))
+        gram, begin = self._summed.get(row, (self.settings.ridge * np.eye(k), 0))
         # The last is added once it is known what followed.
         end = len(known) if known[-1] else len(known) - len(self.members[row])
         add_gram(gram, active[begin:end], strengths[begin:end], known[begin:end])
-        self._sums_until[row] = gram, end
+        self._summed[row] = gram, end
         return known, lambda theta: row_values(theta, active, strengths), solver(gram)
 
     def _extend(self) -> None:
@@ -227,34 +205,25 @@ class BatchTD:
         """
         earlier, members = self._earlier[row], self.members[row]
         k, before = len(members), len(earlier.states)
-        steps = np.array(self._follower, dtype=np.int64)
+        steps = np.array(self._follower, dtype=np.int64)[:, None]
         steps[steps == len(steps)] = CUT_OFF  # of a running episode: not known yet
-        follower = np.where(
-            steps[:, None] < 0, steps[:, None], before + steps[:, None] * k + np.arange(k)
-        ).ravel()
+        follower = np.where(steps < 0, steps, before + steps * k + np.arange(k)).ravel()
         rewards = np.array(self._rewards).reshape(-1, self._n_agents)[:, members].ravel()
-        return (
-            np.concatenate([earlier.rewards, rewards]),
-            np.concatenate([earlier.follower, follower]),
-        )
+        return np.append(earlier.rewards, rewards), np.append(earlier.follower, follower)
 
     def states_of(self, row: int, since: int = 0) -> FloatArray:
         """Return the after-states ``(m, d)`` of a row, those since a step of this team alone."""
-        new = np.array(self._states[since:]).reshape(-1, self._n_agents, self._width)
-        own, earlier = new[:, self.members[row]].reshape(-1, self._width), self._earlier[row].states
-        return own if since or not len(earlier) else np.concatenate([earlier, own])
-
-    @property
-    def _width(self) -> int:
-        """Columns of what is remembered of an after-state."""
-        return int((self._states or [self._earlier[0].states])[0].shape[1])
+        d = len(self.rules.partitions)
+        new = np.array(self._states[since:]).reshape(-1, self._n_agents, d)
+        own = new[:, self.members[row]].reshape(-1, d)
+        return own if since else np.concatenate([self._earlier[row].states, own])
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""
-        n = self._n_agents
+        n, d = self._n_agents, len(self.rules.partitions)
         return {
             "theta": self.theta,
-            "states": np.array(self._states).reshape(-1, n, self._width),
+            "states": np.array(self._states).reshape(-1, n, d),
             "rewards": np.array(self._rewards).reshape(-1, n),
             "follower": np.array(self._follower, dtype=np.int64),
             "earlier_rows": np.repeat(
@@ -279,7 +248,7 @@ class BatchTD:
             Earlier(*(arrays[f"earlier_{name}"][rows == row] for name in Earlier._fields))
             for row in range(len(self.theta))
         ]
-        self._active, self._regressed, self._sums_until = [], 0, {}
+        self._active, self._regressed, self._summed = [], 0, {}
 
     def continue_from(self, former: BatchTD, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
@@ -343,59 +312,6 @@ def lambda_returns(
     return returns
 
 
-class FittedValueSettings(AfterStateSettings):
-    """Fitted value iteration: towards the best that is predicted to follow."""
-
-    kind: Literal["fitted-value"] = "fitted-value"
-    factory: ClassVar[str] = f"{__name__}:FittedValue"
-
-    @property
-    def needs_prediction(self) -> bool:
-        """Whether it acts only in scenarios that predict: targets are predicted, too."""
-        return isinstance(self.predictor, GivenPredictor)
-
-
-class FittedValue(BatchTD):
-    """Fitted value iteration: aims at the best of the after-states that are predicted to follow.
-
-    Predictions are those of the predictor as it was when they were made.
-    """
-
-    def observe(  # type: ignore[override]  # what is asked for by name is given
-        self, states: FloatArray, reward: float | FloatArray, terminated: bool, *, ahead: FloatArray
-    ) -> int:
-        """Remember an after-state, and what each own action ``(n, A, d)`` leads to from there."""
-        remembered = np.concatenate([states[:, None], ahead], axis=1).reshape(len(states), -1)
-        return super().observe(remembered, reward, terminated)
-
-    def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Return active rules and strengths ``(m, 1 + A, k)``, of after-states themselves first."""
-        active, strengths = self.rules.active(states.reshape(-1, len(self.rules.partitions)))
-        shape = len(states), -1, active.shape[1]
-        return active.reshape(shape), strengths.reshape(shape)
-
-    def _taken(self, row: int) -> tuple[IntArray, FloatArray]:
-        active, strengths = self._active[row]
-        return np.ascontiguousarray(active[:, 0]), np.ascontiguousarray(strengths[:, 0])
-
-    def _returns(self, values: FloatArray, rewards: FloatArray, follower: IntArray) -> FloatArray:
-        discount = self.settings.discount
-        lasting = rewards / (1.0 - discount)
-        return np.where(follower == TERMINAL, lasting, rewards + discount * values)
-
-    def _equations(self, row: int, known: FloatArray) -> tuple[FloatArray, Function, Function]:
-        """As in batch TD, but with the values ``(N,)`` of the best that is predicted to follow."""
-        weights, _, solve = super()._equations(row, np.ones_like(known))
-        k = self._active[row][0].shape[2]
-        active = self._active[row][0][:, 1:].reshape(-1, k)
-        strengths = self._active[row][1][:, 1:].reshape(-1, k)
-
-        def values_of(theta: FloatArray) -> FloatArray:
-            return row_values(theta, active, strengths).reshape(len(weights), -1).max(axis=1)
-
-        return weights, values_of, solve
-
-
 NOBODY = "nobody"
 """What an agent is told by a sender that it has not."""
 
@@ -443,11 +359,8 @@ class FittedQSettings(LearnerSettings):
         base = RuleBase.build(known, self.rule_base)
         action = choice("action", actions.names)
         own = Partition.of(action, self.rule_base.membership, None, self.rule_base.steepness)
-        rules = RuleBase(
-            (*base.partitions, own),
-            [(*term, len(base.partitions)) for term in base.terms],
-            dtype=self.rule_base.precision,
-        )
+        terms = [(*term, len(base.partitions)) for term in base.terms]
+        rules = RuleBase((*base.partitions, own), terms, dtype=self.rule_base.precision)
         return StateSpace(space.name, (*known.variables, action)), rules
 
     def _check_decision(self) -> None:

@@ -50,9 +50,7 @@ class Learner(Protocol):
 
     A learner whose ``observe`` has arguments of these names is also given, by name, ``left``
     ``(n, d)``, the states that the agents were in, and ``joint_action`` ``(n,)``, what they then
-    did: what learners of state-action values, such as SARSA, learn from; and ``ahead``
-    ``(n, A, d)``, the states that each action of an agent is predicted to lead to from those
-    entered, by one decision, if all others do again what they did.
+    did: what learners of state-action values, such as SARSA, learn from.
 
     A learner that can begin with what one of the same settings has learned for other agents also
     has ``continue_from(former, rows)``: ``rows`` ``(n_rows,)`` says from which row of ``former``,

@@ -24,7 +24,6 @@ from nested_agents.core.interface.scenario import carried_rows
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings
 from nested_agents.core.learners.learner import Decision
-from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from tests.scenarios.test_examples import Tank
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
@@ -41,7 +40,6 @@ TEAMS = {
     "batch-td": {"kind": "batch-td", "ridge": 0.1, "exploration": BURST},
     "batch-td, sigmoid": {"kind": "batch-td", "rule_base": {"membership": "sigmoid"}},
     "fitted-q": {"kind": "fitted-q", "forgetting": 0.1, "exploration": BURST},
-    "fitted-value": {"kind": "fitted-value", "predictor": {"kind": "static"}},
     "sampling": {
         "kind": "batch-td",
         "decision": {
@@ -117,32 +115,6 @@ def test_a_saved_team_continues_bit_for_bit_within_an_episode(
 
     assert carry_on(team, world) == carry_on(restored, elsewhere)
     assert same(team, restored)
-
-
-def test_a_learner_is_told_what_each_own_action_leads_to_if_the_others_do_the_same_again(
-    world,
-) -> None:
-    chain = chain_of(world.agents)
-    team = Team(settings_of({"kind": "fitted-value"}), world, chain, np.random.SeedSequence(0))
-    told = []
-    team.learner.observe = lambda *_, ahead: told.append(ahead) or 0
-    joint = team.act(team.predict(world, world.reset(0)))
-    transition = world.step(joint)
-    prediction = team.predict(world, transition.states)
-    team.learn(transition)
-    for i, k in np.ndindex(4, len(world.action_set)):
-        other = joint.copy()
-        other[i] = k
-        assert (told[0][i, k] == prediction.states(i, other[None])[0]).all()
-
-
-def test_a_prediction_of_several_decisions_is_no_target() -> None:
-    world = BoxPushingSettings(robots=2).build()
-    with pytest.raises(ValueError, match=r"learner.kind = 'fitted-value': .* predicts \d+ at once"):
-        Team(
-            settings_of({"kind": "fitted-value"}), world, chain_of(world.agents),
-            np.random.SeedSequence(0),
-        )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", TEAMS)

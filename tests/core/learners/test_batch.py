@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.batch import (
-    REWARD_SCALE,
-    BatchTD,
-    BatchTDSettings,
-    FittedValue,
-    FittedValueSettings,
-)
+from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
@@ -111,29 +105,6 @@ def test_batch_td_solves_a_known_chain() -> None:
     states = np.arange(5.0).reshape(5, 1, 1)
     feed(learner, (states, np.array([1.0, 0.0, -2.0, 0.0, 0.3]), True))
     assert learner.theta[0] == pytest.approx([1.3483, 0.387, 0.43, 2.7, 3.0], rel=0, abs=1e-10)
-
-
-def test_fitted_value_aims_at_the_best_that_is_predicted_whatever_followed() -> None:
-    # The same chain; from each state an agent can stay or go on. What followed was to go on, but to
-    # stay at the first state pays 1 for ever: 1 / 0.1 = 10. Nowhere else is it better to stay.
-    settings = FittedValueSettings(
-        ridge=1e-13, regression_iterations=300, discount=0.9, target_averaging_rate=1.0
-    )
-    learner, restored = (FittedValue(settings, TABLE, np.arange(1)) for _ in range(2))
-    learner.begin_episode()
-    for s, reward in enumerate([1.0, 0.0, -2.0, 0.0, 0.3]):
-        ahead = np.array([[[s], [min(s + 1, 4)]]], dtype=float)
-        learner.observe(np.array([[float(s)]]), reward, s == 4, ahead=ahead)
-    restored.restore({name: array.copy() for name, array in learner.arrays().items()})
-    for each in (learner, restored):
-        each.end_episode()
-        assert each.theta[0] == pytest.approx([10.0, 0.387, 0.43, 2.7, 3.0], rel=0, abs=1e-10)
-    successor = FittedValue(settings, TABLE, np.zeros(2, dtype=int))
-    successor.continue_from(learner, np.array([0]))
-    successor.begin_episode()
-    successor.observe(np.ones((2, 1)), 0.0, False, ahead=np.full((2, 2, 1), 2.0))
-    successor.end_episode()
-    assert successor.theta[0] == pytest.approx(learner.theta[0], rel=0, abs=1e-9)
 
 
 def test_targets_stay_within_what_rewards_can_sum_to() -> None:
