@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from inspect import iscoroutine
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, cast, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import model_validator
 
@@ -139,13 +139,13 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
     kind, colon, argument = text.partition(":")
     try:
         if kind in TOPOLOGIES.built_in:
-            return _made(kind, _arguments(kind, argument) if colon else {})
+            return TOPOLOGIES.parsed(kind, **(_arguments(kind, argument) if colon else {}))
         if kind in TOPOLOGIES.moved:
             raise ValueError(TOPOLOGIES.moved[kind])
         if sources.is_file(text):
-            return _made("file", {"path": text})
+            return TOPOLOGIES.parsed("file", path=text)
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
-            return _made(text, {})
+            return TOPOLOGIES.parsed(text)
     except ValueError as error:
         raise ValueError(f"topology {text!r}: {getattr(error, 'problem', error)}") from None
     if "." in kind or "/" in kind:
@@ -164,15 +164,11 @@ def _of_table(table: Mapping[str, Any]) -> TopologySettings:
     if not isinstance(kind, str):
         raise ValueError(f"topology.kind = {kind!r}: {closest(kind, TOPOLOGIES.names())}")
     try:
-        return _made(kind, tuples({**table, "kind": kind}))
+        return TOPOLOGIES.parsed(kind, **tuples({**table, "kind": kind}))
     except SettingsError as error:
         raise ValueError(f"topology.{error.problem}") from None
     except ValueError as error:
         raise ValueError(f"topology.kind = {kind!r}: {error}") from None
-
-
-def _made(kind: str, table: Mapping[str, Any]) -> TopologySettings:
-    return cast(TopologySettings, TOPOLOGIES.model(kind)(**table))
 
 
 Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
@@ -363,12 +359,8 @@ def _arguments(kind: str, text: str) -> dict[str, Any]:
     read_as = ARGUMENTS[kind][1]
     if callable(read_as):
         return read_as(text)
-    if TOPOLOGIES.model(kind).model_fields[read_as].annotation is not int:
-        return {read_as: text}
-    try:
-        return {read_as: int(text)}
-    except ValueError:
-        raise ValueError(f"{read_as} = {text!r}: must be a whole number") from None
+    is_number = TOPOLOGIES.model(kind).model_fields[read_as].annotation is int
+    return {read_as: int(text) if is_number and text.removeprefix("-").isdecimal() else text}
 
 
 def read_file(path: str) -> nx.DiGraph | dict[str, Any]:

@@ -153,9 +153,8 @@ class BatchTD:
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
             theta = self.theta[row].astype(float) * REWARD_SCALE
             for _ in range(s.regression_iterations):
-                returns = lambda_returns(
-                    values_of(theta), rewards, follower, s.discount, s.trace_decay
-                )
+                values = values_of(theta)
+                returns = lambda_returns(values, rewards, follower, s.discount, s.trace_decay)
                 targets = weights * np.clip(returns, low, high)
                 theta = solve(moment(taken, strengths, targets, theta.size))
             change = theta / REWARD_SCALE - self.theta[row]
@@ -200,16 +199,11 @@ class BatchTD:
         """
         earlier, members = self._earlier[row], self.members[row]
         k, before = len(members), len(earlier.states)
-        steps = np.array(self._follower, dtype=np.int64)
+        steps = np.array(self._follower, dtype=np.int64)[:, None]
         steps[steps == len(steps)] = CUT_OFF  # of a running episode: not known yet
-        follower = np.where(
-            steps[:, None] < 0, steps[:, None], before + steps[:, None] * k + np.arange(k)
-        ).ravel()
+        follower = np.where(steps < 0, steps, before + steps * k + np.arange(k)).ravel()
         rewards = np.array(self._rewards).reshape(-1, self._n_agents)[:, members].ravel()
-        return (
-            np.concatenate([earlier.rewards, rewards]),
-            np.concatenate([earlier.follower, follower]),
-        )
+        return np.append(earlier.rewards, rewards), np.append(earlier.follower, follower)
 
     def states_of(self, row: int, since: int = 0) -> FloatArray:
         """Return the after-states ``(m, d)`` of a row, those since a step of this team alone."""
@@ -359,11 +353,8 @@ class FittedQSettings(LearnerSettings):
         base = RuleBase.build(known, self.rule_base)
         action = choice("action", actions.names)
         own = Partition.of(action, self.rule_base.membership, None, self.rule_base.steepness)
-        rules = RuleBase(
-            (*base.partitions, own),
-            [(*term, len(base.partitions)) for term in base.terms],
-            dtype=self.rule_base.precision,
-        )
+        terms = [(*term, len(base.partitions)) for term in base.terms]
+        rules = RuleBase((*base.partitions, own), terms, dtype=self.rule_base.precision)
         return StateSpace(space.name, (*known.variables, action)), rules
 
     def _check_decision(self) -> None:

@@ -14,9 +14,10 @@ strengths; it is built explicitly by `RuleBase.features` only, for tests and tab
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import combinations
 from math import prod
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -49,6 +50,19 @@ class RuleBaseSettings(Settings):
 
 MOST_RULES = 2**63 - 1
 """Rules that can be numbered."""
+
+
+class Pooled(NamedTuple):
+    """The consequent weights of k agents of b bodies, summed where they see the same."""
+
+    weights: tuple[FloatArray, FloatArray, FloatArray]
+    """Of the agents ``(k, n_rules)``, of their bodies ``(b, n_rules)``, of all ``(1, n_rules)``."""
+    agents: IntArray
+    """``(k,)`` which agents they are."""
+    bodies: IntArray
+    """``(b,)`` which bodies they are."""
+    firsts: IntArray
+    """``(b + 1,)`` the first agent of every body among them, and k."""
 
 
 class RuleBase:
@@ -155,11 +169,12 @@ class RuleBase:
         actions = [names.index(name) for name in space.actions]
         return cls(partitions, terms, space.n_own, settings.precision, common, actions)
 
-    def shared_by(self, term: tuple[int, ...]) -> Literal["agent", "body", "all"]:
-        """Return who sees the same variables of a term: the agent alone, its body's, or all."""
-        if any(j < self.n_own for j in term):
-            return "agent"
-        return "all" if self.common.issuperset(term) else "body"
+    @cached_property
+    def kinds(self) -> tuple[IntArray, IntArray, IntArray]:
+        """The terms whose variables an agent alone sees, its body's agents do, or all do."""
+        own = np.array([any(j < self.n_own for j in term) for term in self.terms])
+        common = ~own & [self.common.issuperset(term) for term in self.terms]
+        return np.flatnonzero(own), np.flatnonzero(~(own | common)), np.flatnonzero(common)
 
     def features(self, states: FloatArray) -> FloatArray:
         """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly.
@@ -211,23 +226,16 @@ class RuleBase:
             return each_compact(theta, states, self.layout)
         return each_dense(theta, states, self.layout)
 
-    def total(
-        self,
-        weights: tuple[FloatArray, FloatArray, FloatArray],
-        agents: IntArray,
-        firsts: IntArray,
-        kinds: tuple[IntArray, IntArray, IntArray],
-        own: FloatArray,
-        shared: FloatArray,
-    ) -> FloatArray:
+    def total(self, pooled: Pooled, own: FloatArray, shared: FloatArray) -> FloatArray:
         """Return the summed value ``(m,)`` of some agents, each thing shared valued once.
 
-        Arguments as of `core.rules.kernels.states.total_compact`. Shapes are trusted: an evaluator
-        calls this many times at every decision. Where all rules are active, each agent is valued by
-        itself.
+        Own variables are those of all agents, shared ones those of the bodies, as of
+        `core.rules.kernels.states.total_compact`. Shapes are trusted: an evaluator calls this many
+        times at every decision. Where all rules are active, each agent is valued by itself.
         """
+        weights, agents, _, firsts = pooled
         if self.compact:
-            return total_compact(weights, agents, firsts, kinds, own, shared, self.layout)
+            return total_compact(weights, agents, firsts, self.kinds, own, shared, self.layout)
         body = np.repeat(np.arange(len(shared)), np.diff(firsts))
         states = np.concatenate([own[agents], shared[body]], axis=2)
         return each_dense(weights[0], states, self.layout).sum(axis=0)
