@@ -232,8 +232,8 @@ class Task(NamedTuple):
 
     def reached(self, distance: FloatArray, orientation: FloatArray) -> BoolArray:
         """Return whether the goal is reached ``(m,)``; parameters as of `reward`."""
-        most = self.orientation_tolerance or np.inf
-        return (distance <= self.tolerance) & (np.abs(orientation) <= most)
+        near, most = distance <= self.tolerance, self.orientation_tolerance
+        return near if most is None else near & (np.abs(orientation) <= most)
 
 
 def reward(
