@@ -273,13 +273,12 @@ class Aggregation:
         summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
         return Pooled((theta, *summed), agents, bodies, np.append(firsts, len(agents)))
 
-    def mean(self, pooled: Pooled, prediction: Prediction, joint_actions: IntArray) -> FloatArray:
+    def mean(self, pooled: Pooled, prediction: Prediction, joint: IntArray) -> FloatArray:
         """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""
-        groups, rules = self.problem.groups, self.rules
-        own, shared = states_by_group(prediction, joint_actions, groups, rules.n_own)
+        own, shared = states_by_group(prediction, joint, self.problem.groups, self.rules.n_own)
         if len(pooled.bodies) < len(shared):
             shared = shared[pooled.bodies]
-        return rules.total(pooled, own, shared) / len(pooled.agents)
+        return self.rules.total(pooled, own, shared) / len(pooled.agents)
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
