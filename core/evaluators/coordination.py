@@ -192,11 +192,9 @@ class CrossEntropy(Aggregation):
         shape = s.horizon, len(self.hierarchy), self.n_actions
         probabilities = np.full(shape, 1.0 / self.n_actions)
         n_elite = max(1, round(s.elite * s.samples))
-        elite = np.zeros((0, *shape[:2]), dtype=np.int64)
+        elite: IntArray = np.zeros((0, *shape[:2]), dtype=np.int64)
         for _ in range(s.iterations):
-            ladder = probabilities.cumsum(axis=2)[:, :, :-1]
-            draws = rng.random((s.samples, *shape[:2], 1))
-            plans = (draws >= ladder).sum(axis=3)
+            plans = self.drawn(probabilities, s.samples, rng)
             plans[: len(elite[:1])] = elite[:1]  # the best so far
             worths = self._worths(deliberation.agent, prediction, plans)
             elite = plans[np.argsort(-worths, kind="stable")[:n_elite]]

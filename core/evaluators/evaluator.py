@@ -288,6 +288,11 @@ class Aggregation:
         joint[:, list(self.hierarchy.below(agent))] = np.tile(tried, (a, 1))
         return self.worth(deliberation, joint).reshape(a, -1)
 
+    def drawn(self, chances: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:
+        """Return actions ``(samples, ...)`` drawn by their probabilities ``(..., A)``."""
+        ladder = chances.cumsum(axis=-1)[..., :-1]
+        return (rng.random((samples, *ladder.shape[:-1], 1)) >= ladder).sum(axis=-1)
+
     def combine(self, rewards: Predicted, values: Predicted) -> FloatArray:
         """Return what the decision rule makes of rewards and values; it predicts what it needs."""
         if self.problem.rule == "value":
@@ -452,9 +457,7 @@ class Sampling(Aggregation):
             if empirical:
                 probabilities = probabilities_of(frequencies, below)
         elif empirical:
-            ladder = frequencies[list(below)].cumsum(axis=1)[:, :-1]
-            draws = rng.random((self.samples, len(below), 1))
-            tried = (draws >= ladder).sum(axis=2)
+            tried = self.drawn(frequencies[list(below)], self.samples, rng)
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
         return self.aggregate(deliberation, tried, probabilities)
