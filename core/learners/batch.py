@@ -119,6 +119,8 @@ class BatchTD:
         # By row, active rules and strengths of the after-states so far regressed on.
         self._active: list[tuple[IntArray, FloatArray]] = []
         self._regressed = 0
+        # By row, the ridge and the sum of phi phi' over so many of these.
+        self._summed: dict[int, tuple[FloatArray, int]] = {}
 
     def begin_episode(self) -> None:
         """Note that the first after-state follows none, even if the last episode was given up."""
@@ -172,8 +174,12 @@ class BatchTD:
             ``(N,)`` 1 for after-states of which it is known what followed, 0 for others.
         """
         active, strengths = self._active[row]
-        gram = self.settings.ridge * np.eye(self.rules.n_rules)
-        add_gram(gram, active, strengths, known)
+        k = self.rules.n_rules
+        gram, begin = self._summed.get(row, (self.settings.ridge * np.eye(k), 0))
+        # The last is added once it is known what followed.
+        end = len(known) if known[-1] else len(known) - len(self.members[row])
+        add_gram(gram, active[begin:end], strengths[begin:end], known[begin:end])
+        self._summed[row] = gram, end
         return known, lambda theta: row_values(theta, active, strengths), solver(gram)
 
     def _extend(self) -> None:
@@ -241,7 +247,7 @@ class BatchTD:
             Earlier(*(arrays[f"earlier_{name}"][rows == row] for name in Earlier._fields))
             for row in range(len(self.theta))
         ]
-        self._active, self._regressed = [], 0
+        self._active, self._regressed, self._summed = [], 0, {}
 
     def continue_from(self, former: BatchTD, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
