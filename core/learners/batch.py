@@ -221,14 +221,13 @@ class BatchTD:
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""
         n, d = self._n_agents, len(self.rules.partitions)
+        held = [len(earlier.states) for earlier in self._earlier]
         return {
             "theta": self.theta,
             "states": np.array(self._states).reshape(-1, n, d),
             "rewards": np.array(self._rewards).reshape(-1, n),
             "follower": np.array(self._follower, dtype=np.int64),
-            "earlier_rows": np.repeat(
-                np.arange(len(self._earlier)), [len(earlier.states) for earlier in self._earlier]
-            ),
+            "earlier_rows": np.repeat(np.arange(len(held)), held),
             **{
                 f"earlier_{name}": np.concatenate([getattr(e, name) for e in self._earlier])
                 for name in Earlier._fields
