@@ -59,13 +59,6 @@ LOCK = "compiling.lock"
 INNER = "-inner"
 """What tells cached kernels for kernels from those for Python."""
 
-FROM_PYTHON = {"no_cfunc_wrapper": True}
-FROM_KERNELS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
-"""What nobody calls is not compiled: a third to a half of a small kernel is its wrappers."""
-
-DIVISION = {"error_model": "numpy"}
-"""Division by zero gives what it gives in NumPy: that compiles sooner than raising an exception."""
-
 _threads = threading.RLock()
 
 
@@ -169,18 +162,21 @@ class Kernel:
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
-        self.py_func, self._options = function, DIVISION | options
+        # Division by zero gives what it gives in NumPy: that compiles sooner than an exception.
+        self.py_func, self._options = function, {"error_model": "numpy"} | options
         self._ready: Callable[..., Any] | None = None
+
+    # What nobody calls is not compiled: a third to a half of a small kernel is its wrappers.
 
     @cached_property
     def compiled(self) -> Any:
         """What numba makes of the function for Python to call."""
-        return self._made("", **FROM_PYTHON)
+        return self._made("", no_cfunc_wrapper=True)
 
     @cached_property
     def inner(self) -> Any:
         """What numba makes of the function for other kernels to call, by far the less code."""
-        return self._made(INNER, **FROM_KERNELS)
+        return self._made(INNER, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
     def _made(self, suffix: str, **options: bool) -> Any:
         import numba
@@ -309,10 +305,8 @@ def stamp(path: Path) -> str:
         new = _imported(left.pop()) - paths
         paths |= new
         left += new
-    texts = hashlib.sha256()
-    for each in sorted(paths):
-        texts.update(_text(each).encode() + b"\0")
-    return texts.hexdigest()
+    texts = "".join(_text(each) + "\0" for each in sorted(paths))
+    return hashlib.sha256(texts.encode()).hexdigest()
 
 
 @cache

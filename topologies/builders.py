@@ -15,7 +15,7 @@ from itertools import combinations, compress, zip_longest
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, NonNegativeInt
 from typing_extensions import TypeAliasType
 
 from ..core.coordination import graphs
@@ -110,9 +110,6 @@ Bodies: TypeAlias = Sequence[Names]
 Pairs: TypeAlias = tuple[tuple[str, str], ...]
 Members = TypeAliasType("Members", "tuple[str | Members, ...]")
 """The members of a team: agents, or teams of members, to any depth."""
-Seed = Annotated[int, Field(ge=0)]
-
-
 Order: TypeAlias = Literal["listed", "reversed", "interleaved"] | tuple[str, ...]
 
 
@@ -249,7 +246,7 @@ def coordination_graph(
     *,
     shape: Shape | Literal["scenario"] = "line",
     edges: Pairs | None = None,
-    others: Annotated[Seed | None, unwritten(None)] = None,
+    others: Annotated[NonNegativeInt | None, unwritten(None)] = None,
 ) -> nx.Graph:
     """Join neighbours in a shape, or as listed, who decide at once.
 
@@ -281,10 +278,9 @@ def coordination_graph(
             raise ValueError("shape = 'scenario': the scenario has no interactions of its agents")
         graph = nx.relabel_nodes(graphs.shaped(shape, len(agents)), dict(enumerate(agents)))
     else:
-        pairs = [(min(a, b), max(a, b)) for a, b in edges]
-        Hierarchy(agents, [], pairs)  # raises and names what is wrong
+        Hierarchy(agents, [], edges)  # raises and names what is wrong
         graph = nx.empty_graph(agents)
-        graph.add_edges_from(pairs)
+        graph.add_edges_from(edges)
     return graph if others is None else graphs.others(graph, others)
 
 
@@ -318,7 +314,7 @@ def from_edges(
 
 
 def random_hierarchy(
-    agents: Names, bodies: Bodies = (), *, seed: Seed = 0, density: Fraction = 0.3
+    agents: Names, bodies: Bodies = (), *, seed: NonNegativeInt = 0, density: Fraction = 0.3
 ) -> nx.DiGraph:
     """Rank the agents at random, each above each lower one with a probability.
 

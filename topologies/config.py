@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from inspect import iscoroutine
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, cast, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import model_validator
 
@@ -49,6 +49,10 @@ BUILT = (
 """Topologies whose builder is called so."""
 
 
+Oriented = Literal["listed", "reversed"] | tuple[str, ...]
+"""In which order agents decide: that of the scenario, its reverse, or all names."""
+
+
 class TopologySettings(Settings):
     """What the settings of all topologies share."""
 
@@ -60,9 +64,7 @@ class TopologySettings(Settings):
     considers: Annotated[Considers, unwritten("descendants")] = "descendants"
     """Whose actions an agent tries beside its own: those of all below it, of its direct
     subordinates, or of nobody; or a list of bodies, as above, in which those below it are."""
-    oriented: Annotated[Literal["listed", "reversed"] | tuple[str, ...] | None, unwritten(None)] = (
-        None
-    )
+    oriented: Annotated[Oriented | None, unwritten(None)] = None
     """In which order those decide who are joined by undirected edges: in the agents' own, in its
     reverse, or as listed by name; each is above those of its neighbours that come later. None: they
     decide at once."""
@@ -139,13 +141,11 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
     kind, colon, argument = text.partition(":")
     try:
         if kind in TOPOLOGIES.built_in:
-            return _made(kind, _arguments(kind, argument) if colon else {})
-        if kind in TOPOLOGIES.moved:
-            raise ValueError(TOPOLOGIES.moved[kind])
+            return TOPOLOGIES.parsed(kind, **(_arguments(kind, argument) if colon else {}))
         if sources.is_file(text):
-            return _made("file", {"path": text})
+            return TOPOLOGIES.parsed("file", path=text)
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
-            return _made(text, {})
+            return TOPOLOGIES.parsed(text)
     except ValueError as error:
         raise ValueError(f"topology {text!r}: {getattr(error, 'problem', error)}") from None
     if "." in kind or "/" in kind:
@@ -153,8 +153,8 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
         is_there = folder is not None and (folder / text).exists()
         suffixes = f"suffix must be {', '.join(sources.GRAPHS)} or .py:NAME"
         raise ValueError(f"topology {text!r}: {'' if is_there else 'no such file; '}{suffixes}")
-    known = closest(kind, TOPOLOGIES.names())
-    raise ValueError(f"topology {text!r}: {known}, or a file")
+    unknown = f"{closest(kind, TOPOLOGIES.names())}, or a file"
+    raise ValueError(f"topology {text!r}: {TOPOLOGIES.moved.get(kind, unknown)}")
 
 
 def _of_table(table: Mapping[str, Any]) -> TopologySettings:
@@ -164,15 +164,11 @@ def _of_table(table: Mapping[str, Any]) -> TopologySettings:
     if not isinstance(kind, str):
         raise ValueError(f"topology.kind = {kind!r}: {closest(kind, TOPOLOGIES.names())}")
     try:
-        return _made(kind, tuples({**table, "kind": kind}))
+        return TOPOLOGIES.parsed(kind, **tuples({**table, "kind": kind}))
     except SettingsError as error:
         raise ValueError(f"topology.{error.problem}") from None
     except ValueError as error:
         raise ValueError(f"topology.kind = {kind!r}: {error}") from None
-
-
-def _made(kind: str, table: Mapping[str, Any]) -> TopologySettings:
-    return cast(TopologySettings, TOPOLOGIES.model(kind)(**table))
 
 
 Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
@@ -363,12 +359,8 @@ def _arguments(kind: str, text: str) -> dict[str, Any]:
     read_as = ARGUMENTS[kind][1]
     if callable(read_as):
         return read_as(text)
-    if TOPOLOGIES.model(kind).model_fields[read_as].annotation is not int:
-        return {read_as: text}
-    try:
-        return {read_as: int(text)}
-    except ValueError:
-        raise ValueError(f"{read_as} = {text!r}: must be a whole number") from None
+    is_number = TOPOLOGIES.model(kind).model_fields[read_as].annotation is int
+    return {read_as: int(text) if is_number and text.removeprefix("-").isdecimal() else text}
 
 
 def read_file(path: str) -> nx.DiGraph | dict[str, Any]:

@@ -19,7 +19,6 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 from ..core.interface.hierarchy import Hierarchy
 from ..core.numerics import FloatArray, nx
 
-Indices = Sequence[int]
 COLUMNS = 6
 """Levels side by side before the picture is folded."""
 WIDTH, HEIGHT = 1.25, 0.3
@@ -76,21 +75,21 @@ def draw(
     # Edges without which everyone would see the same agents.
     implied = set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
     _arrows(axes, hierarchy, places, implied)
-    _agents(axes, hierarchy, places, bodies or [], failing)
+    body_of = {i: number for number, members in enumerate(bodies or []) for i in members}
+    fills = [COLOURS[body_of.get(i, 0) % len(COLOURS)] for i in range(len(hierarchy))]
+    _agents(axes, hierarchy, places, fills, failing)
     notes = ["numbers: order of decision"]
     if hierarchy.neighbours:
         notes = ["lines: neighbours, who decide at the same time"]
     elif bodies and max(map(len, bodies)) > 1:
         notes.append("colours: bodies")
-    if implied:
-        notes.append("grey arrows: implied by the others")
+    notes += ["grey arrows: implied by the others"] * bool(implied)
     styles = {_style(hierarchy, edge)[1] for edge in hierarchy.edges} - {""}
     notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
     middle: dict[str, Any] = {"ha": "center", "va": "center"}
     axes.text(centre, top + 0.27, title, fontsize=10, **middle)
-    axes.text(
-        centre, top + height - 0.17, "; ".join(notes), fontsize=7.5, color="#555555", **middle
-    )
+    bottom, noted = top + height - 0.17, "; ".join(notes)
+    axes.text(centre, bottom, noted, fontsize=7.5, color="#555555", **middle)
     # Without date and random identifiers, equal hierarchies give equal files.
     metadata = {"Date": None} if Path(path).suffix == ".svg" else None
     with matplotlib.rc_context({"svg.hashsalt": "nested-agents", "svg.fonttype": "none"}):
@@ -163,21 +162,14 @@ def _route(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]
 
 
 def _agents(
-    axes: Axes,
-    hierarchy: Hierarchy,
-    places: FloatArray,
-    bodies: Sequence[Indices],
-    failing: Indices,
+    axes: Axes, hierarchy: Hierarchy, places: FloatArray, fills: list[str], failing: Sequence[int]
 ) -> None:
-    body_of = {i: number for number, members in enumerate(bodies) for i in members}
     for rank, i in enumerate(hierarchy.order, 1):
         (x, y), name = places[i], hierarchy.agents[i]
         corner = x - WIDTH / 2 + 0.05, y - HEIGHT / 2 + 0.05
-        fill = COLOURS[body_of.get(i, 0) % len(COLOURS)]
         frame = BOX | {"edgecolor": "#B00020", "linestyle": "--"} if i in failing else BOX
-        axes.add_patch(
-            FancyBboxPatch(corner, WIDTH - 0.1, HEIGHT - 0.1, facecolor=fill, zorder=3, **frame)
-        )
+        look = {"facecolor": fills[i], "zorder": 3, **frame}
+        axes.add_patch(FancyBboxPatch(corner, WIDTH - 0.1, HEIGHT - 0.1, **look))
         size = min(8.5, 8.5 * 15 / len(name))
         left = x - WIDTH / 2 + 0.07
         axes.text(left, y, str(rank), fontsize=6.5, va="center", color="#777777", zorder=4)

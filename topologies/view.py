@@ -178,9 +178,7 @@ def printed(shown: HierarchyView, form: Form) -> str:
     beside = hierarchy.neighbours
     pairs = sorted([*hierarchy.edges, *beside, *((b, a) for a, b in beside)])
     under = {i: [names[b] for a, b in pairs if a == i] for i in range(n)}
-    rows = [
-        ("", "agent", "below", "tries", "neighbours" if hierarchy.neighbours else "subordinates")
-    ]
+    rows = [("", "agent", "below", "tries", "neighbours" if beside else "subordinates")]
     for rank, i in enumerate(hierarchy.order):
         subordinates = ", ".join(under[i]) or "-"
         tried = readable(shown.tries[i])

@@ -178,9 +178,8 @@ class LearnedPredictor:
         of_all = together.T @ together
         m["gram"] += np.stack([each.T @ each, of_all, (b - 2) * of_all])
         m["moment"] += np.stack([each.T @ targets.reshape(-1, 2 * v), together.T @ summed])
-        m["squares"] += np.where(
-            common, (targets[:, 0] ** 2).sum(axis=0), (targets**2).sum(axis=(0, 1))
-        )
+        squares = targets**2
+        m["squares"] += np.where(common, squares[:, 0].sum(axis=0), squares.sum(axis=(0, 1)))
         own, others, explained = self._solved(common)
         left = m["squares"] - explained
         is_angle = self.periods[bodies.columns[0]] > 0.0

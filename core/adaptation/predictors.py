@@ -203,10 +203,8 @@ class Bodies:
         terms: list[tuple[int, ...]] = [(v,) for v in range(len(first))]
         if products != "none":
             every = products == "all" or len(groups) == 1
-            pairs = combinations(
-                (v for v, (_, j) in enumerate(first) if every or j not in common), 2
-            )
-            terms += [(v, u) for v, u in pairs if first[v][0] == first[u][0]]
+            paired = [v for v, (_, j) in enumerate(first) if every or j not in common]
+            terms += [(v, u) for v, u in combinations(paired, 2) if first[v][0] == first[u][0]]
         parts = [Partition.of(space.variables[j], count=memberships) for _, j in first]
         self.rules = RuleBase(parts, terms)
 

@@ -9,17 +9,15 @@ and policies stay paired. How an agent reads what it was not told is the team's 
 
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self, cast
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.random import Generator
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, NonNegativeInt, model_validator
 
 from ..interface.hierarchy import Hierarchy
 from ..numerics import BoolArray, IntArray, stream_of
 from ..plugins.settings import Fraction, Settings
-
-Index = Annotated[int, Field(ge=0)]
 
 
 def _names(value: object) -> object:
@@ -41,19 +39,14 @@ class Scheduled(Settings):
     part: ClassVar[str] = ""
     """The field that names what fails."""
 
-    episode: Index = 0
+    episode: NonNegativeInt = 0
     """Episode in which it begins, counted from 0."""
-    step: Index = 0
+    step: NonNegativeInt = 0
     """Step of that episode at which it begins."""
-    end_episode: Index | None = None
+    end_episode: NonNegativeInt | None = None
     """Episode in which it ends; none: it lasts."""
-    end_step: Index = 0
+    end_step: NonNegativeInt = 0
     """Step of that episode at which it ends."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """What fails, by name or pattern."""
-        return cast("tuple[str, ...]", getattr(self, self.part))
 
     def lasts(self, episode: int, step: int) -> bool:
         """Return whether it is on at a step of an episode."""
@@ -70,7 +63,7 @@ class Scheduled(Settings):
             If it names one that there is not; the line begins with the key `where` it stands.
         """
         mask = np.zeros(len(agents), dtype=bool)
-        for name in self.names:
+        for name in getattr(self, self.part):
             hit = np.array([fnmatchcase(agent, name) for agent in agents])
             if not hit.any():
                 shown = ", ".join(agents[:8]) + (", ..." if len(agents) > 8 else "")
@@ -232,14 +225,12 @@ class Messages:
         n = len(hierarchy)
         self.failures, self._n_actions = tuple(failures), n_actions
         """What is ever to fail."""
-        places = [f"topology.failures[{k}]" for k in range(len(failures))]
-        self._masks = [
-            f.mask(hierarchy.agents, place) for f, place in zip(failures, places, strict=True)
-        ]
+        where = "topology.failures[{}]".format
+        self._masks = [f.mask(hierarchy.agents, where(k)) for k, f in enumerate(failures)]
         self.told: list[IntArray] = [np.array(hierarchy.above(i), dtype=np.int64) for i in range(n)]
         """Per agent those who tell it, if nothing fails."""
         self._told_instead = {
-            k: _reparented(hierarchy, failure, np.flatnonzero(self._masks[k]), places[k])
+            k: _reparented(hierarchy, failure, np.flatnonzero(self._masks[k]), where(k))
             for k, failure in enumerate(failures)
             if isinstance(failure, ReparentedAgents)
         }
@@ -307,8 +298,7 @@ def _reparented(
     for agent in agents:
         if order.index(superior) >= order.index(agent):
             raise ValueError(f"{known}: must decide before {names[agent]!r}")
-    kept = [(a, b) for a, b in hierarchy.edges if b not in agents]
-    pairs = [*kept, *((superior, int(agent)) for agent in agents)]
-    edges = [(names[a], names[b]) for a, b in pairs]
+    edges = [(names[a], names[b]) for a, b in hierarchy.edges if b not in agents]
+    edges += [(failure.superior, names[agent]) for agent in agents]
     changed = Hierarchy(names, edges, told=hierarchy.told, bodies=hierarchy.bodies)
     return {i: np.array(changed.above(i), dtype=np.int64) for i in range(len(hierarchy))}

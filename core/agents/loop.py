@@ -169,7 +169,6 @@ def control_loop(
 
 Agents = Literal["actuator", "body", "team"]
 """What there is one agent for."""
-Names = tuple[str, ...]
 MOST_ACTIONS = {"body": 4**4, "team": 4**6}
 """The most actions of a body, those of four wheels, and of a team."""
 OF_JOINT_ACTIONS = ("rewards", "commands", "slips", "outcomes")
@@ -191,7 +190,7 @@ def join_agents(scenario: Scenario, agents: Agents) -> Scenario:
 
 def joint_blocks(
     agents: Sequence[str], groups: Sequence[Sequence[int]], n_actions: int, each: Agents
-) -> tuple[Names, tuple[tuple[int, ...], ...]]:
+) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
     """Return the names of those who act, and which agents of a scenario each acts for.
 
     Parameters
@@ -265,16 +264,10 @@ class JointAgents:
             of_block = [agent.rpartition(".")[2] for agent in of_block]
             roles = roles_of(scenario)
             self.roles = tuple("+".join(roles[i] for i in block) for block in self.blocks)
-        own = [
-            replace(v, name=f"{agent}.{v.name}")
-            for agent in of_block
-            for v in space.variables[: self._n_each]
-        ]
-        self.state_space = StateSpace(
-            f"joint {space.name}" if self.whole else f"bodies' {space.name}",
-            (*own, *space.variables[self._n_each :]),
-            0 if self.whole else len(own),
-        )
+        repeated, shared = space.variables[: self._n_each], space.variables[self._n_each :]
+        own = [replace(v, name=f"{agent}.{v.name}") for agent in of_block for v in repeated]
+        name = f"joint {space.name}" if self.whole else f"bodies' {space.name}"
+        self.state_space = StateSpace(name, (*own, *shared), 0 if self.whole else len(own))
         # Row c holds the actions of a block's agents of index c.
         shape = (len(single),) * n_block
         self._local = np.indices(shape).reshape(n_block, -1).T.copy()

@@ -21,9 +21,6 @@ from ..learners.learner import Learner, LearnerSettings
 from ..numerics import FloatArray, IntArray, greatest, set_words, words_of
 from .failures import MessageFailure, Messages
 
-DECIDED = ("rule", "teammates", "value_of", "unseen", "plan")
-"""What of the settings of decisions an evaluator is told."""
-
 
 class Team:
     """Agents in a hierarchy, one rule base each; consequent weights are an agent's own or a role's.
@@ -90,7 +87,7 @@ class Team:
             )
         check_prediction(settings, scenario)
         self.hierarchy, self.action_set = hierarchy, scenario.action_set
-        n, n_actions = len(hierarchy), len(scenario.action_set)
+        n, n_actions, space = len(hierarchy), len(scenario.action_set), scenario.state_space
         self.self_model = SelfModel.of(settings.self_model, scenario)
         self.calibration = Calibration.of(settings.calibration, scenario)
         self.predictor: Any = _predictor_of(scenario, settings)
@@ -105,12 +102,10 @@ class Team:
         self._values_actions = settings.values_actions
         self._senders = _senders(settings, self.messages, hierarchy)
         self._n_told = max(map(len, self._senders), default=0)
-        self.space, self.rules = settings.rules_over(
-            scenario.state_space, scenario.action_set, self._n_told
-        )
+        self.space, self.rules = settings.rules_over(space, self.action_set, self._n_told)
         self.learner: Learner = settings.build(self.rules, rows)
         self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
-        self._states: FloatArray = np.zeros((len(hierarchy), scenario.state_space.n_variables))
+        self._states: FloatArray = np.zeros((n, space.n_variables))
         self._left: FloatArray = self._states
         self.evaluator: Evaluator | None = None
         decision = settings.decision
@@ -119,7 +114,7 @@ class Team:
                 self.rules, hierarchy, n_actions, groups_of(scenario),
                 discount=settings.discount,
                 handed_down=hierarchy.told == "ancestors" and not failures,
-                **{name: getattr(decision, name) for name in DECIDED},
+                **{name: value for name, value in decision if name != "evaluator"},
             )  # fmt: skip
             own: Any = self.learner
             self.evaluator = own if self._values_actions else decision.evaluator.build(problem)
@@ -246,10 +241,12 @@ class Team:
             if self._senders:
                 told = known[self._senders[i]]
                 self._left[i, self._states.shape[1] :][: len(told)] = told
+            given = NOTHING_GIVEN
+            if self.given.size:
+                given = self.given[i] / self.given[i].sum(axis=2, keepdims=True)
             deliberation = Deliberation(
-                i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders,
-                self._left,
-            )  # fmt: skip
+                i, known, prediction, weights, frequencies, self.rng, given, senders, self._left
+            )
             values = evaluator.values(deliberation)
             if len(values) != n_actions:
                 raise ValueError(f"the evaluator gave {len(values)} values of {n_actions} actions")
@@ -273,13 +270,6 @@ class Team:
         known = self._last.copy() if self._unseen == "last" else np.full_like(joint_action, neutral)
         known[senders] = actions
         return senders, known
-
-    def _given_by(self, agent: int) -> FloatArray:
-        """Return how often all took each action ``(A, n, A)`` given each action of an agent."""
-        if not self.given.size:
-            return NOTHING_GIVEN
-        counts = self.given[agent]
-        return counts / counts.sum(axis=2, keepdims=True)
 
     def adapt(self, prediction: Prediction, joint_action: IntArray, transition: Transition) -> None:
         """Revise what predictions rest on by what `joint_action` did."""
@@ -339,9 +329,8 @@ class Team:
                 )
             part.continue_from(*given)
         self.rng.bit_generator.state = former.rng.bit_generator.state
-        self.seen = np.stack(
-            [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
-        )
+        seen = [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
+        self.seen = np.stack(seen)
         if self.given.shape == former.given.shape:
             self.given = former.given.copy()
         for name in self._adapting.keys() & former._adapting.keys():

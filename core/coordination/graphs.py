@@ -27,12 +27,13 @@ import numpy as np
 from ..numerics import FloatArray, IntArray, nx
 
 Scope = tuple[int, ...]
+MOST_ENTRIES = 4**10
+"""Of a table."""
 
 
 def interaction(scopes: Sequence[Scope], n: int) -> nx.Graph:
     """Return the graph of n agents in which those that share a scope are joined."""
-    graph = nx.Graph()
-    graph.add_nodes_from(range(n))
+    graph = nx.empty_graph(n)
     for scope in scopes:
         graph.add_edges_from((a, b) for a in scope for b in scope if a < b)
     return graph
@@ -82,7 +83,7 @@ class Elimination:
     Raises
     ------
     ValueError
-        If the largest table would have more than `most_entries`; before anything is allocated.
+        If the largest table would have more than `MOST_ENTRIES`; before anything is allocated.
 
     Examples
     --------
@@ -94,17 +95,14 @@ class Elimination:
     [1, 1, 0]
     """
 
-    def __init__(
-        self, scopes: Sequence[Scope], n: int, n_actions: int, most_entries: int = 4**10
-    ) -> None:
+    def __init__(self, scopes: Sequence[Scope], n: int, n_actions: int) -> None:
         self.n_actions = n_actions
         self.order, self.width = order_of(interaction(scopes, n))
-        if n_actions ** (1 + self.width) > most_entries:
+        if n_actions ** (1 + self.width) > MOST_ENTRIES:
             raise ValueError(
                 f"width {self.width} of the coordination graph takes tables of {n_actions} ** "
-                f"{1 + self.width} entries, allowed: {most_entries:,}; use max-plus"
+                f"{1 + self.width} entries, allowed: {MOST_ENTRIES:,}; use max-plus"
             )
-        self._n_scopes = len(scopes)
         self._steps = tuple(self._planned(scopes))
 
     def _planned(self, scopes: Sequence[Scope]) -> list[_Step]:
@@ -140,7 +138,7 @@ class Elimination:
             for k, places, shape in step.parts:
                 total = total + known.pop(k).transpose(places).reshape(shape)
             choices.append(total.argmax(axis=-1))
-            known[self._n_scopes + number] = total.max(axis=-1)
+            known[len(tables) + number] = total.max(axis=-1)
         joint = np.zeros(len(self._steps), dtype=np.int64)
         for step, choice in zip(reversed(self._steps), reversed(choices), strict=True):
             joint[step.agent] = choice[tuple(joint[list(step.beside)])]
@@ -164,7 +162,7 @@ class MaxPlus:
     Raises
     ------
     ValueError
-        If the largest table has more than `most_entries`; before anything is allocated.
+        If the largest table has more than `MOST_ENTRIES`; before anything is allocated.
 
     Examples
     --------
@@ -174,23 +172,18 @@ class MaxPlus:
     """
 
     def __init__(
-        self,
-        scopes: Sequence[Scope],
-        n: int,
-        n_actions: int,
-        rounds: int = 100,
-        damping: float = 0.5,
-        most_entries: int = 4**10,
-    ) -> None:
+        self, scopes: Sequence[Scope], n: int, n_actions: int,
+        rounds: int = 100, damping: float = 0.5,
+    ) -> None:  # fmt: skip
         self.n, self.n_actions, self.rounds = n, n_actions, rounds
         # Tables over the same agents are added up: apart, they would receive their own messages.
         apart = list(dict.fromkeys(scopes))
         self._place = [apart.index(scope) for scope in scopes]
         k = max(map(len, apart))
-        if n_actions**k > most_entries:
+        if n_actions**k > MOST_ENTRIES:
             raise ValueError(
                 f"an agent with {k - 1} neighbours in the coordination graph takes a table of "
-                f"{n_actions} ** {k} entries, allowed: {most_entries:,}"
+                f"{n_actions} ** {k} entries, allowed: {MOST_ENTRIES:,}"
             )
         # Shorter scopes are filled up with an agent that is not there, number n.
         self._members = np.array([(*scope, *[n] * (k - len(scope))) for scope in apart])
@@ -275,7 +268,7 @@ def shaped(shape: Shape, n: int) -> nx.Graph:
     if shape == "grid":
         rows = next(r for r in range(isqrt(n), 0, -1) if n % r == 0)
         graph = nx.grid_2d_graph(rows, n // rows)
-        return nx.relabel_nodes(graph, {node: k for k, node in enumerate(sorted(graph))})
+        return nx.convert_node_labels_to_integers(graph, ordering="sorted")
     if shape == "tree":
         return nx.full_rary_tree(2, n)
     return nx.cycle_graph(n) if shape == "ring" and n > 2 else nx.path_graph(n)

@@ -26,7 +26,6 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..interface.hierarchy import Hierarchy
 from ..interface.spaces import BestResponses, Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
@@ -99,8 +98,7 @@ class BestResponse(Aggregation):
     def __init__(self, problem: DecisionProblem, sweeps: int = 1) -> None:
         super().__init__(problem)
         self._sweeps = sweeps
-        why = "best-response plans for 'best-response' only"
-        self.require("teammates", "best-response", why)
+        self.require("teammates", "best-response", "best-response plans for 'best-response' only")
         hierarchy, groups = problem.hierarchy, problem.groups
         n = len(hierarchy)
         nobody = problem.unseen != "plan" and not any(map(hierarchy.below, range(n)))
@@ -118,11 +116,10 @@ class BestResponse(Aggregation):
         self._numbers = np.arange(len(self._actions[sizes[0]]))
         # Per agent, whom it considers, itself included, in the order of decision; those of its
         # body; the others.
-        self._free = [_in_order(hierarchy, {i, *hierarchy.below(i)}) for i in range(n)]
-        self._own = [
-            tuple(j for j in free if self._body_of[j] == self._body_of[i])
-            for i, free in enumerate(self._free)
-        ]
+        considered = [{i, *hierarchy.below(i)} for i in range(n)]
+        self._free = [tuple(j for j in hierarchy.order if j in who) for who in considered]
+        body = self._body_of
+        self._own = [tuple(j for j in self._free[i] if body[j] == body[i]) for i in range(n)]
         self._others = [np.setdiff1d(np.arange(n), free) for free in self._free]
         self._starts: dict[tuple[int, ...], IntArray] = {}
         # The bodies in the order of decision, if what one is worth to one agent is so to all.
@@ -130,7 +127,6 @@ class BestResponse(Aggregation):
         bodies = [own for i in hierarchy.order if (own := self._own[i]) in whole]
         self._bodies = bodies if problem.value_of == "team" else []
         self._rank = {agents: k for k, agents in enumerate(self._bodies)}
-        self._prediction: Prediction | None = None
         self._plans: dict[int, IntArray] = {}
         self._known: _Known | None = None
         self._ahead: _Ahead | None = None
@@ -141,9 +137,8 @@ class BestResponse(Aggregation):
         agent = deliberation.agent
         if self.indifferent(deliberation):
             return np.zeros(self.n_actions)
-        first = agent == self.hierarchy.order[0]
-        if first or deliberation.prediction is not self._prediction:
-            self._prediction, self._plans = deliberation.prediction, {}
+        if self.begins(deliberation):
+            self._plans = {}
             self._known = self._ahead = None
             self._alike = self._compared(deliberation.prediction)
         plan, free = self._plan(deliberation), self._own[agent]
@@ -157,10 +152,9 @@ class BestResponse(Aggregation):
             self.count(agent, self.n_actions ** len(free))
             worths = self._valued(deliberation, plan, free, value)
         self._known = _Known(concerned, plan.copy(), free, worths)
-        best: FloatArray = worths.max(axis=tuple(k for k, i in enumerate(free) if i != agent))
         # What its body does is kept in the plan; what it takes in the end may be told.
         plan[list(free)] = self._actions[len(free)][greatest(worths.ravel(), deliberation.rng)]
-        return best
+        return worths.max(axis=tuple(k for k, i in enumerate(free) if i != agent))
 
     def decide(self, first: Deliberation, exploring: Exploring) -> IntArray | None:
         """Return what all agents decide ``(n,)``, who all hear all, by what the `first` one knows.
@@ -264,8 +258,8 @@ class BestResponse(Aggregation):
         agent, rng = deliberation.agent, deliberation.rng
         free = self._free[agent]
         if self.problem.unseen == "plan":
-            every = set(range(len(self.hierarchy)))
-            free = _in_order(self.hierarchy, every - set(deliberation.told.tolist()))
+            told = set(deliberation.told.tolist())
+            free = tuple(i for i in self.hierarchy.order if i not in told)
         bodies: dict[int, list[int]] = {}
         for i in free:
             bodies.setdefault(int(self._body_of[i]), []).append(i)
@@ -311,17 +305,15 @@ class BestResponse(Aggregation):
 
 def _planners(problem: DecisionProblem) -> list[int]:
     """Return, for every agent, whose plan it decides by: its own, or one that it has or is told."""
-    hierarchy = problem.hierarchy
-    views = [() if problem.unseen == "plan" else hierarchy.unseen(i) for i in hierarchy.order]
-    planners = list(hierarchy.order)
-    if problem.plan == "common":
-        planners = [hierarchy.order[views.index(view)] for view in views]
-    elif problem.handed_down:
-        for k, agent in enumerate(hierarchy.order):
-            above = hierarchy.above(agent)
-            same = (hierarchy.order[j] for j in range(k) if views[j] == views[k])
-            planners[k] = next((giver for giver in same if giver in above), agent)
-    return [planners[hierarchy.order.index(i)] for i in range(len(hierarchy))]
+    hierarchy, planners = problem.hierarchy, {}
+    views = {i: () if problem.unseen == "plan" else hierarchy.unseen(i) for i in hierarchy.order}
+    for i, view in views.items():
+        same = (j for j, other in views.items() if other == view)
+        if problem.plan == "private":
+            givers = hierarchy.above(i) if problem.handed_down else ()
+            same = (j for j in same if j in givers)
+        planners[i] = next(same, i)
+    return [planners[i] for i in range(len(hierarchy))]
 
 
 def _kept_up(problem: DecisionProblem, planners: list[int]) -> list[bool]:
@@ -335,11 +327,6 @@ def _kept_up(problem: DecisionProblem, planners: list[int]) -> list[bool]:
         told_all = all({*users[:k]} <= {*hierarchy.above(i)} for k, i in enumerate(users))
         kept[planner] = problem.handed_down and told_all
     return [kept[planner] for planner in planners]
-
-
-def _in_order(hierarchy: Hierarchy, agents: set[int]) -> tuple[int, ...]:
-    """Return agents in the order of decision."""
-    return tuple(i for i in hierarchy.order if i in agents)
 
 
 def _with(joint_action: IntArray, changes: list[tuple[tuple[int, ...], IntArray]]) -> IntArray:

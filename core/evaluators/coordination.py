@@ -26,8 +26,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..coordination.graphs import Elimination, MaxPlus, Scope
-from ..interface.spaces import Prediction
+from ..coordination.graphs import Elimination, MaxPlus
 from ..numerics import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
 
@@ -94,9 +93,7 @@ class Coordination(Aggregation):
             why = f"{name} adds up own values over neighbours, allowed: {value!r}"
             self.require(key, value, why)
         n = len(hierarchy)
-        self.scopes: tuple[Scope, ...] = tuple(
-            tuple(sorted((i, *hierarchy.below(i)))) for i in range(n)
-        )
+        self.scopes = [tuple(sorted((i, *hierarchy.below(i)))) for i in range(n)]
         try:
             self._maximiser = maximiser(self.scopes, n, self.n_actions)
         except ValueError as error:
@@ -104,15 +101,13 @@ class Coordination(Aggregation):
         sizes = set(map(len, self.scopes))
         self._tried = {k: combinations(tuple(range(k)), self.n_actions) for k in sizes}
         self._concerning = [[k for k, s in enumerate(self.scopes) if i in s] for i in range(n)]
-        self._prediction: Prediction | None = None
         self._tables: list[FloatArray] = []
         self._best: IntArray = np.zeros(n, dtype=np.int64)
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
         agent = deliberation.agent
-        if agent == self.hierarchy.order[0] or deliberation.prediction is not self._prediction:
-            self._prediction = deliberation.prediction
+        if self.begins(deliberation):
             self._tables = [self._table(deliberation, i) for i in range(len(self.scopes))]
             self._best = self._maximiser.best(self._tables)
         values = np.zeros(self.n_actions)
@@ -139,9 +134,6 @@ class Coordination(Aggregation):
         joint[:, list(scope)] = tried
         states = deliberation.prediction.states(agent, joint)
         return self.rules.values(weights, states).reshape(shape)
-
-
-NAME = "cross-entropy"
 
 
 class CrossEntropySettings(EvaluatorSettings):
@@ -175,25 +167,22 @@ class CrossEntropy(Aggregation):
 
     def __init__(self, settings: CrossEntropySettings, problem: DecisionProblem) -> None:
         super().__init__(problem)
-        self.require("rule", "reward", f"{NAME} plans by 'reward' only")
+        self.require("rule", "reward", f"{settings.kind} plans by 'reward' only")
         hierarchy = problem.hierarchy
         if len(hierarchy.below(hierarchy.order[0])) < len(hierarchy) - 1:
             raise ValueError(
-                f"learner.decision.evaluator = {NAME!r}: needs a topology whose first agent is "
-                "above all others and plans for them, as in a chain"
+                f"learner.decision.evaluator = {settings.kind!r}: needs a topology whose first "
+                "agent is above all others and plans for them, as in a chain"
             )
         self.settings = settings
-        self._prediction: Prediction | None = None
         self._plan: IntArray = np.zeros(len(hierarchy), dtype=np.int64)
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        agent = deliberation.agent
-        if agent == self.hierarchy.order[0] or deliberation.prediction is not self._prediction:
-            self._prediction = deliberation.prediction
+        if self.begins(deliberation):
             self._plan = self._planned(deliberation)
         values = np.zeros(self.n_actions)
-        values[self._plan[agent]] = 1.0
+        values[self._plan[deliberation.agent]] = 1.0
         return values
 
     def _planned(self, deliberation: Deliberation) -> IntArray:
@@ -203,20 +192,15 @@ class CrossEntropy(Aggregation):
         shape = s.horizon, len(self.hierarchy), self.n_actions
         probabilities = np.full(shape, 1.0 / self.n_actions)
         n_elite = max(1, round(s.elite * s.samples))
-        best: IntArray | None = None
+        elite: IntArray = np.zeros((0, *shape[:2]), dtype=np.int64)
         for _ in range(s.iterations):
-            ladder = probabilities.cumsum(axis=2)[:, :, :-1]
-            draws = rng.random((s.samples, *shape[:2], 1))
-            plans = (draws >= ladder).sum(axis=3)
-            if best is not None:
-                plans[0] = best
+            plans = self.drawn(probabilities, s.samples, rng)
+            plans[: len(elite[:1])] = elite[:1]  # the best so far
             worths = self._worths(deliberation.agent, prediction, plans)
             elite = plans[np.argsort(-worths, kind="stable")[:n_elite]]
-            best = elite[0]
             seen = (elite[..., None] == np.arange(self.n_actions)).mean(axis=0)
             probabilities = s.smoothing / self.n_actions + (1.0 - s.smoothing) * seen
-        assert best is not None
-        return best[0]
+        return elite[0, 0]
 
     def _worths(self, agent: int, prediction: Any, plans: IntArray) -> FloatArray:
         """Return what plans ``(samples, horizon, n)`` are paid, predicted once where they agree."""

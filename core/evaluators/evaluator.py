@@ -24,21 +24,7 @@ from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import PartSettings
 from ..rules.kernels.dense import Tried
-from ..rules.rule_base import RuleBase
-
-
-class Pooled(NamedTuple):
-    """The consequent weights of k agents of b bodies, summed where they see the same."""
-
-    weights: tuple[FloatArray, FloatArray, FloatArray]
-    """Of the agents ``(k, n_rules)``, of their bodies ``(b, n_rules)``, of all ``(1, n_rules)``."""
-    agents: IntArray
-    """``(k,)`` which agents they are."""
-    bodies: IntArray
-    """``(b,)`` which bodies they are."""
-    firsts: IntArray
-    """``(b + 1,)`` the first agent of every body among them, and k."""
-
+from ..rules.rule_base import Pooled, RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]
 """By what a joint action is valued."""
@@ -221,12 +207,10 @@ class Aggregation:
         self.rules, self.hierarchy = problem.rules, problem.hierarchy
         self.n_actions = problem.n_actions
         self.counts = Counts()
+        self._prediction: Prediction | None = None
         self.concerned = concerned(self.hierarchy, problem.value_of)
         """Per agent ``(k,)`` the agents whose values decide."""
         self._body_of = np.array([g for g, group in enumerate(problem.groups) for _ in group])
-        sharing = np.array([self.rules.shared_by(term) for term in self.rules.terms])
-        own, body, common = (np.flatnonzero(sharing == by) for by in ("agent", "body", "all"))
-        self._kinds = own, body, common
         self._last: tuple[Sequence[FloatArray], IntArray, Pooled] | None = None
 
     def require(self, key: str, allowed: str, why: str) -> None:
@@ -234,6 +218,12 @@ class Aggregation:
         value = getattr(self.problem, key)
         if value != allowed:
             raise ValueError(f"learner.decision.{key} = {value!r}: {why}")
+
+    def begins(self, deliberation: Deliberation) -> bool:
+        """Return whether a decision of the team begins with this one's; it is asked of each."""
+        before, self._prediction = self._prediction, deliberation.prediction
+        first = deliberation.agent == self.hierarchy.order[0]
+        return first or before is not deliberation.prediction
 
     def count(self, agent: int, joint_actions: int) -> None:
         """Note that joint actions have been tried: valued by each agent concerned, or rewarded."""
@@ -283,13 +273,12 @@ class Aggregation:
         summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
         return Pooled((theta, *summed), agents, bodies, np.append(firsts, len(agents)))
 
-    def mean(self, pooled: Pooled, prediction: Prediction, joint_actions: IntArray) -> FloatArray:
+    def mean(self, pooled: Pooled, prediction: Prediction, joint: IntArray) -> FloatArray:
         """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""
-        rules, (weights, agents, bodies, firsts) = self.rules, pooled
-        own, shared = states_by_group(prediction, joint_actions, self.problem.groups, rules.n_own)
-        if len(bodies) < len(shared):
-            shared = shared[bodies]
-        return rules.total(weights, agents, firsts, self._kinds, own, shared) / len(agents)
+        own, shared = states_by_group(prediction, joint, self.problem.groups, self.rules.n_own)
+        if len(pooled.bodies) < len(shared):
+            shared = shared[pooled.bodies]
+        return self.rules.total(pooled, own, shared) / len(pooled.agents)
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
@@ -298,6 +287,11 @@ class Aggregation:
         joint[:, agent] = np.repeat(np.arange(a), len(tried))
         joint[:, list(self.hierarchy.below(agent))] = np.tile(tried, (a, 1))
         return self.worth(deliberation, joint).reshape(a, -1)
+
+    def drawn(self, chances: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:
+        """Return actions ``(samples, ...)`` drawn by their probabilities ``(..., A)``."""
+        ladder = chances.cumsum(axis=-1)[..., :-1]
+        return (rng.random((samples, *ladder.shape[:-1], 1)) >= ladder).sum(axis=-1)
 
     def combine(self, rewards: Predicted, values: Predicted) -> FloatArray:
         """Return what the decision rule makes of rewards and values; it predicts what it needs."""
@@ -332,8 +326,6 @@ class Aggregation:
         return values.mean(axis=1) if probabilities is None else values @ probabilities
 
 
-TABLES = ("blocks", "reward_table")
-"""What predictions have that know what all joint actions lead to."""
 Samples = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
@@ -372,11 +364,10 @@ class ExactEnumeration(Aggregation):
 
     def _tried_by(self, agent: int, places: IntArray) -> Tried:
         below = np.array(self.hierarchy.below(agent), dtype=np.int64)
-        indices = np.arange(self.n_actions)[:, None] * places[agent]
-        indices = indices + (self._below[agent] @ places[below])[None, :]
+        own = np.arange(self.n_actions)[:, None] * places[agent]
         given = places.copy()
         given[agent] = given[below] = 0
-        return indices, given, below
+        return own + self._below[agent] @ places[below], given, below
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
@@ -401,7 +392,8 @@ class ExactEnumeration(Aggregation):
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value each own action with each of the joint actions below, from tables if there are."""
         prediction: Any = deliberation.prediction
-        if not (self._tried and all(hasattr(prediction, name) for name in TABLES)):
+        tabulated = hasattr(prediction, "blocks") and hasattr(prediction, "reward_table")
+        if not (self._tried and tabulated):
             return super().worths(deliberation, tried)
         known, places, _ = self._tried[deliberation.agent]
         indices = (known + int(deliberation.joint_action @ places)).ravel()
@@ -465,9 +457,7 @@ class Sampling(Aggregation):
             if empirical:
                 probabilities = probabilities_of(frequencies, below)
         elif empirical:
-            ladder = frequencies[list(below)].cumsum(axis=1)[:, :-1]
-            draws = rng.random((self.samples, len(below), 1))
-            tried = (draws >= ladder).sum(axis=2)
+            tried = self.drawn(frequencies[list(below)], self.samples, rng)
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
         return self.aggregate(deliberation, tried, probabilities)

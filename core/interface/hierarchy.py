@@ -149,8 +149,7 @@ class Hierarchy:
     def __repr__(self) -> str:
         pairs = [ARROW.format(self.agents[a], self.agents[b]) for a, b in self.edges]
         pairs += [LINE.format(self.agents[a], self.agents[b]) for a, b in self.neighbours]
-        named = ", ".join(pairs)
-        return f"Hierarchy({len(self)} agents: {named or 'no edges'})"
+        return f"Hierarchy({len(self)} agents: {', '.join(pairs) or 'no edges'})"
 
     def below(self, agent: int) -> tuple[int, ...]:
         """Return all agents whose actions `agent` considers, in agent order."""

@@ -138,7 +138,7 @@ class StateSpace:
         if array.shape != wanted:
             given = f"shape {array.shape}" if array.ndim == 2 else type(states).__name__
             raise ValueError(f"states of agents: {given}, allowed: numbers of shape {wanted}")
-        low, width = self._ranges
+        low, width = self.ranges
         near = np.abs((array - low) / width) <= FARTHEST
         if not near.all():
             agent, variable = np.argwhere(~near)[0]
@@ -150,7 +150,8 @@ class StateSpace:
         return array
 
     @cached_property
-    def _ranges(self) -> tuple[FloatArray, FloatArray]:
+    def ranges(self) -> tuple[FloatArray, FloatArray]:
+        """Where the ranges of all variables begin ``(d,)``, and how wide they are ``(d,)``."""
         low, high = np.array([(v.low, v.high) for v in self.variables]).T
         return low, high - low
 

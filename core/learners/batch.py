@@ -119,6 +119,8 @@ class BatchTD:
         # By row, active rules and strengths of the after-states so far regressed on.
         self._active: list[tuple[IntArray, FloatArray]] = []
         self._regressed = 0
+        # By row, the ridge and the sum of phi phi' over so many of these.
+        self._summed: dict[int, tuple[FloatArray, int]] = {}
 
     def begin_episode(self) -> None:
         """Note that the first after-state follows none, even if the last episode was given up."""
@@ -153,9 +155,8 @@ class BatchTD:
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
             theta = self.theta[row].astype(float) * REWARD_SCALE
             for _ in range(s.regression_iterations):
-                returns = lambda_returns(
-                    values_of(theta), rewards, follower, s.discount, s.trace_decay
-                )
+                values = values_of(theta)
+                returns = lambda_returns(values, rewards, follower, s.discount, s.trace_decay)
                 targets = weights * np.clip(returns, low, high)
                 theta = solve(moment(taken, strengths, targets, theta.size))
             change = theta / REWARD_SCALE - self.theta[row]
@@ -173,8 +174,12 @@ class BatchTD:
             ``(N,)`` 1 for after-states of which it is known what followed, 0 for others.
         """
         active, strengths = self._active[row]
-        gram = self.settings.ridge * np.eye(self.rules.n_rules)
-        add_gram(gram, active, strengths, known)
+        k = self.rules.n_rules
+        gram, begin = self._summed.get(row, (self.settings.ridge * np.eye(k), 0))
+        # The last is added once it is known what followed.
+        end = len(known) if known[-1] else len(known) - len(self.members[row])
+        add_gram(gram, active[begin:end], strengths[begin:end], known[begin:end])
+        self._summed[row] = gram, end
         return known, lambda theta: row_values(theta, active, strengths), solver(gram)
 
     def _extend(self) -> None:
@@ -200,16 +205,11 @@ class BatchTD:
         """
         earlier, members = self._earlier[row], self.members[row]
         k, before = len(members), len(earlier.states)
-        steps = np.array(self._follower, dtype=np.int64)
+        steps = np.array(self._follower, dtype=np.int64)[:, None]
         steps[steps == len(steps)] = CUT_OFF  # of a running episode: not known yet
-        follower = np.where(
-            steps[:, None] < 0, steps[:, None], before + steps[:, None] * k + np.arange(k)
-        ).ravel()
+        follower = np.where(steps < 0, steps, before + steps * k + np.arange(k)).ravel()
         rewards = np.array(self._rewards).reshape(-1, self._n_agents)[:, members].ravel()
-        return (
-            np.concatenate([earlier.rewards, rewards]),
-            np.concatenate([earlier.follower, follower]),
-        )
+        return np.append(earlier.rewards, rewards), np.append(earlier.follower, follower)
 
     def states_of(self, row: int, since: int = 0) -> FloatArray:
         """Return the after-states ``(m, d)`` of a row, those since a step of this team alone."""
@@ -221,14 +221,13 @@ class BatchTD:
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""
         n, d = self._n_agents, len(self.rules.partitions)
+        held = [len(earlier.states) for earlier in self._earlier]
         return {
             "theta": self.theta,
             "states": np.array(self._states).reshape(-1, n, d),
             "rewards": np.array(self._rewards).reshape(-1, n),
             "follower": np.array(self._follower, dtype=np.int64),
-            "earlier_rows": np.repeat(
-                np.arange(len(self._earlier)), [len(earlier.states) for earlier in self._earlier]
-            ),
+            "earlier_rows": np.repeat(np.arange(len(held)), held),
             **{
                 f"earlier_{name}": np.concatenate([getattr(e, name) for e in self._earlier])
                 for name in Earlier._fields
@@ -248,7 +247,7 @@ class BatchTD:
             Earlier(*(arrays[f"earlier_{name}"][rows == row] for name in Earlier._fields))
             for row in range(len(self.theta))
         ]
-        self._active, self._regressed = [], 0
+        self._active, self._regressed, self._summed = [], 0, {}
 
     def continue_from(self, former: BatchTD, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
@@ -359,11 +358,8 @@ class FittedQSettings(LearnerSettings):
         base = RuleBase.build(known, self.rule_base)
         action = choice("action", actions.names)
         own = Partition.of(action, self.rule_base.membership, None, self.rule_base.steepness)
-        rules = RuleBase(
-            (*base.partitions, own),
-            [(*term, len(base.partitions)) for term in base.terms],
-            dtype=self.rule_base.precision,
-        )
+        terms = [(*term, len(base.partitions)) for term in base.terms]
+        rules = RuleBase((*base.partitions, own), terms, dtype=self.rule_base.precision)
         return StateSpace(space.name, (*known.variables, action)), rules
 
     def _check_decision(self) -> None:

@@ -12,7 +12,6 @@ A class with a nested ``Settings`` stands for the model that builds it; a functi
 fields are its annotated keyword-only parameters, documented as its docstring does.
 """
 
-import os
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -102,10 +101,9 @@ class Registry:
         place = self.built_in.get(name) or self.installed().get(name)
         if place is None and ":" in name and "." in name.partition(":")[0]:
             place = name
-        if place is None and name in self.moved:
-            raise ValueError(self.moved[name])
         if place is None:
-            raise ValueError(f"{closest(name, self.names())}, or one of your own as file.py:NAME")
+            unknown = f"{closest(name, self.names())}, or one of your own as file.py:NAME"
+            raise ValueError(self.moved.get(name, unknown))
         try:
             return resolve_name(place)
         except Exception as error:
@@ -137,13 +135,8 @@ class Registry:
             raise ValueError(f"{name} is defined in no file: write it to one")
         if module.__package__ or "site-packages" in Path(path).parts:
             return place
-        return f"{_relative(path)}:{name}"
-
-
-def _relative(path: str) -> str:
-    """Return a path as it is written from the working directory."""
-    here, there = os.path.realpath(os.getcwd()), os.path.realpath(path)
-    return os.path.relpath(there, here) if there.startswith(here + os.sep) else there
+        here, there = Path().resolve(), Path(path).resolve()
+        return f"{there.relative_to(here) if there.is_relative_to(here) else there}:{name}"
 
 
 class SettingsRegistry(Registry):
@@ -254,15 +247,15 @@ class SettingsRegistry(Registry):
             model.build = build  # type: ignore[attr-defined]
         return cast(type[Settings], model)
 
-    def parsed(self, text: str) -> Any:
-        """Return the settings that a name alone stands for.
+    def parsed(self, text: str, /, **table: Any) -> Any:
+        """Return the settings that a name stands for, alone or with what else is in its table.
 
         Raises
         ------
         ValueError
             If there is no such thing, or it has settings that must be given.
         """
-        return self.model(text)()
+        return self.model(text)(**table)
 
 
 def _parameters(thing: Any) -> dict[str, Any]:

@@ -87,18 +87,16 @@ class Inputs:
 
     def __init__(self, scenario: Scenario, *, numbered: bool = True) -> None:
         space = scenario.state_space
-        self._low = np.array([v.low for v in space.variables])
-        self._span = np.array([v.high - v.low for v in space.variables])
+        self._low, self._span = space.ranges
         self._periodic = np.array([v.periodic for v in space.variables])
         # Which variable each input is of: all of them, then the cosines of the periodic.
         self._columns = np.append(np.arange(space.n_variables), np.flatnonzero(self._periodic))
-        self._groups, self._n_own = groups_of(scenario), space.n_own
+        self._own = self._columns < space.n_own
+        self._firsts = [group[0] for group in groups_of(scenario)]
         n = len(scenario.agents)
         self._names = np.eye(n) if numbered else np.zeros((n, 0))
-        of_own = int((self._columns < space.n_own).sum())
-        of_shared = len(self._columns) - of_own
         self.n_own = len(self._columns) + self._names.shape[1]
-        self.n_joint = n * of_own + len(self._groups) * of_shared
+        self.n_joint = int(n * self._own.sum() + len(self._firsts) * (~self._own).sum())
 
     def each(self, states: FloatArray) -> FloatArray:
         """Return the inputs ``(n, n_own)`` of every agent: its state, and which one it is."""
@@ -106,10 +104,8 @@ class Inputs:
 
     def joint(self, states: FloatArray) -> FloatArray:
         """Return the inputs ``(n_joint,)`` of all: what agents of a group share stands once."""
-        scaled, own = self._scaled(states), self._columns < self._n_own
-        parts = [scaled[:, own].ravel()]
-        parts += [scaled[group[0], ~own] for group in self._groups]
-        return np.concatenate(parts)
+        scaled, own = self._scaled(states), self._own
+        return np.concatenate([scaled[:, own].ravel(), scaled[self._firsts][:, ~own].ravel()])
 
     def _scaled(self, states: FloatArray) -> FloatArray:
         place = (states - self._low) / self._span

@@ -14,9 +14,10 @@ strengths; it is built explicitly by `RuleBase.features` only, for tests and tab
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import combinations
 from math import prod
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -49,6 +50,19 @@ class RuleBaseSettings(Settings):
 
 MOST_RULES = 2**63 - 1
 """Rules that can be numbered."""
+
+
+class Pooled(NamedTuple):
+    """The consequent weights of k agents of b bodies, summed where they see the same."""
+
+    weights: tuple[FloatArray, FloatArray, FloatArray]
+    """Of the agents ``(k, n_rules)``, of their bodies ``(b, n_rules)``, of all ``(1, n_rules)``."""
+    agents: IntArray
+    """``(k,)`` which agents they are."""
+    bodies: IntArray
+    """``(b,)`` which bodies they are."""
+    firsts: IntArray
+    """``(b + 1,)`` the first agent of every body among them, and k."""
 
 
 class RuleBase:
@@ -155,11 +169,12 @@ class RuleBase:
         actions = [names.index(name) for name in space.actions]
         return cls(partitions, terms, space.n_own, settings.precision, common, actions)
 
-    def shared_by(self, term: tuple[int, ...]) -> Literal["agent", "body", "all"]:
-        """Return who sees the same variables of a term: the agent alone, its body's, or all."""
-        if any(j < self.n_own for j in term):
-            return "agent"
-        return "all" if self.common.issuperset(term) else "body"
+    @cached_property
+    def kinds(self) -> tuple[IntArray, IntArray, IntArray]:
+        """The terms whose variables an agent alone sees, its body's agents do, or all do."""
+        own = np.array([any(j < self.n_own for j in term) for term in self.terms])
+        common = ~own & [self.common.issuperset(term) for term in self.terms]
+        return np.flatnonzero(own), np.flatnonzero(~(own | common)), np.flatnonzero(common)
 
     def features(self, states: FloatArray) -> FloatArray:
         """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly.
@@ -171,9 +186,7 @@ class RuleBase:
         ValueError
             If the states have another shape.
         """
-        self._check_states(states)
-        strengths = [p.strengths(states[:, j]) for j, p in enumerate(self.partitions)]
-        parts = []
+        strengths, parts = self._strengths(states), []
         for term in self.terms:
             product = np.ones((len(states), 1))
             for j in term:
@@ -211,23 +224,16 @@ class RuleBase:
             return each_compact(theta, states, self.layout)
         return each_dense(theta, states, self.layout)
 
-    def total(
-        self,
-        weights: tuple[FloatArray, FloatArray, FloatArray],
-        agents: IntArray,
-        firsts: IntArray,
-        kinds: tuple[IntArray, IntArray, IntArray],
-        own: FloatArray,
-        shared: FloatArray,
-    ) -> FloatArray:
+    def total(self, pooled: Pooled, own: FloatArray, shared: FloatArray) -> FloatArray:
         """Return the summed value ``(m,)`` of some agents, each thing shared valued once.
 
-        Arguments as of `core.rules.kernels.states.total_compact`. Shapes are trusted: an evaluator
-        calls this many times at every decision. Where all rules are active, each agent is valued by
-        itself.
+        Own variables are those of all agents, shared ones those of the bodies, as of
+        `core.rules.kernels.states.total_compact`. Shapes are trusted: an evaluator calls this many
+        times at every decision. Where all rules are active, each agent is valued by itself.
         """
+        weights, agents, _, firsts = pooled
         if self.compact:
-            return total_compact(weights, agents, firsts, kinds, own, shared, self.layout)
+            return total_compact(weights, agents, firsts, self.kinds, own, shared, self.layout)
         body = np.repeat(np.arange(len(shared)), np.diff(firsts))
         states = np.concatenate([own[agents], shared[body]], axis=2)
         return each_dense(weights[0], states, self.layout).sum(axis=0)
@@ -242,10 +248,7 @@ class RuleBase:
         ValueError
             If the states have another shape.
         """
-        self._check_states(states)
-        squares = [
-            (p.strengths(states[:, j]) ** 2).sum(axis=1) for j, p in enumerate(self.partitions)
-        ]
+        squares = [(strengths**2).sum(axis=1) for strengths in self._strengths(states)]
         return np.sum([np.prod([squares[j] for j in term], axis=0) for term in self.terms], axis=0)
 
     def active(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -312,6 +315,11 @@ class RuleBase:
         """
         tables = blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor
         return self._enumerate(theta, tables, tried, joint_action, probabilities, self.layout)
+
+    def _strengths(self, states: FloatArray) -> list[FloatArray]:
+        """Return by variable the firing strengths of states ``(m, d)``."""
+        self._check_states(states)
+        return [p.strengths(states[:, j]) for j, p in enumerate(self.partitions)]
 
     def _check_states(self, states: FloatArray, sets: str = "m") -> None:
         d = len(self.partitions)

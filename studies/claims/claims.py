@@ -1,15 +1,16 @@
 """The claims of papers, each with what is measured and the criterion that decides it.
 
 No verdict is given by hand: measures and criteria stand in ``claims.toml``. What a claim computes
-is a public function of this module; it returns an estimate with its 95 % interval over seeds, or
-None where the results have not what it takes. A criterion looks at that interval. A claim *holds*
-if all of it meets the criterion, *does not hold* if none of it does, and is *not decided* in
-between, or by fewer than `LEAST_SEEDS`.
+is a public function of this module; it returns an estimate with its 95 % interval over seeds. It
+returns None, or raises KeyError, where the results have not what it takes. A criterion looks at
+that interval. A claim *holds* if all of it meets the criterion, *does not hold* if none of it does,
+and is *not decided* in between, or by fewer than `LEAST_SEEDS`.
 """
 
 import json
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from math import inf
@@ -66,7 +67,7 @@ def learned(results: Results, name: str = "", known: Sequence[str] = UNREWARDED)
     """
     controls = [c for c in known if results.has(c, "training")]
     condition = name or learner_of(results)
-    if not results.has(condition, "training") or not controls:
+    if not controls:
         return None
     best = max(controls, key=lambda c: float(results.success(c)[:, LAST].mean()))
     own, base = (results.by_seed(c, "training").iloc[:, LAST] for c in (condition, best))
@@ -80,10 +81,8 @@ def learner_of(results: Results) -> str:
 
 def sooner_than_planned(results: Results) -> Measured | None:
     """Measure the learner's decisions in an evaluation episode over the planner's, by seed."""
-    learner = learner_of(results)
-    if not all(results.has(c, "evaluation") for c in (learner, PLANNER)):
-        return None
-    own, base = (results.means(c, "evaluation", "steps") for c in (learner, PLANNER))
+    conditions = learner_of(results), PLANNER
+    own, base = (results.means(c, "evaluation", "steps") for c in conditions)
     return _paired(own, base, lambda a, b: bootstrap(a / b, bounds=NOT_NEGATIVE))
 
 
@@ -94,10 +93,7 @@ def success(
 
     For the `name` see `learned`.
     """
-    condition = name or learner_of(results)
-    if not results.has(condition, "training"):
-        return None
-    outcomes = results.success(condition)[:, first:last]
+    outcomes = results.success(name or learner_of(results))[:, first:last]
     return Measured(rate(outcomes), len(outcomes), note=note) if outcomes.size else None
 
 
@@ -108,8 +104,6 @@ def contact_gained(results: Results) -> Measured | None:
     """
     gained = []
     for condition in (learner_of(results), PLANNER):
-        if not results.has(condition, "training", CONTACT):
-            return None
         contact = results.values(condition, CONTACT)
         more = contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1)
         gained.append(pd.Series(more, results.seeds(condition)))
@@ -118,13 +112,8 @@ def contact_gained(results: Results) -> Measured | None:
 
 def cost_error(results: Results) -> Measured:
     """Compute how far the paper's two costs are from its formulas."""
-    problem = Problem()
-    errors = [
-        problem.nested(range(4)) / PAPER_NESTED - 1.0,
-        problem.single_agent(4) / PAPER_SINGLE - 1.0,
-    ]
-    worst = np.asarray(max(errors, key=abs))
-    return Measured(Estimate(worst, worst, worst), 0)
+    nested, single = Problem().nested(range(4)), Problem().single_agent(4)
+    return _computed(max(nested / PAPER_NESTED - 1.0, single / PAPER_SINGLE - 1.0, key=abs))
 
 
 def tried_beside_joint_action_learners(results: Results) -> Measured:
@@ -133,24 +122,29 @@ def tried_beside_joint_action_learners(results: Results) -> Measured:
     A joint-action learner considers what all others may do, a nested agent those below it.
     """
     problem, n = Problem(), 4
-    share = np.asarray(problem.decision(range(n)) / problem.decision([n - 1] * n))
-    return Measured(Estimate(share, share, share), 0, note=f"{n} agents")
+    share = problem.decision(range(n)) / problem.decision([n - 1] * n)
+    return _computed(share, f"{n} agents")
+
+
+def _computed(value: float, note: str = "") -> Measured:
+    """Return a value that is of no study: its interval is the value itself."""
+    return Measured(Estimate(*[np.asarray(value)] * 3), 0, note=note)
 
 
 def optimal(results: Results, system: str) -> Measured | None:
     """Measure how often a system ends in the optimum of its worst game."""
-    estimates = {
-        ", ".join(str(v) for k, v in columns.items() if k != "name"): rate(
-            results.success(condition, "evaluation")
-        )
-        for condition, columns in results.columns.items()
-        if columns.get("name") == system and results.has(condition, "evaluation")
-    }
-    if not estimates:
-        return None
-    worst = min(estimates, key=lambda game: float(estimates[game].value))
-    seeds = len(results.seeds(results.conditions[0]))
-    return Measured(estimates[worst], seeds, note=worst)
+    games = []
+    for condition, columns in results.columns.items():
+        if columns.get("name") == system and results.has(condition, "evaluation"):
+            success = results.success(condition, "evaluation")
+            game = ", ".join(str(value) for key, value in columns.items() if key != "name")
+            games.append(Measured(rate(success), len(success), note=game))
+    return _worst(games)
+
+
+def _worst(measured: Iterable[Measured]) -> Measured | None:
+    """Return what is of the least value; None if nothing is measured."""
+    return min(measured, key=lambda m: float(np.nan_to_num(m.estimate.value)), default=None)
 
 
 def gained_by_edges(results: Results, edges: str, less: str) -> Measured | None:
@@ -259,12 +253,8 @@ FAULTS = ("4 wheels, seized", "4 wheels, reversed")
 
 def recovered(results: Results, adapts: str) -> Measured | None:
     """Measure success at the end relative to before the failure, worst fault."""
-    courses = [c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts]
-    ratios = {c.fault: ratio(c.end, c.before) for c in courses}
-    if not ratios:
-        return None
-    worst = min(ratios, key=lambda fault: float(np.nan_to_num(ratios[fault].value)))
-    return Measured(ratios[worst], len(courses[0].success), note=worst)
+    courses = (c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts)
+    return _worst(Measured(ratio(c.end, c.before), len(c.success), note=c.fault) for c in courses)
 
 
 def worst_shape(results: Results, condition: str = "") -> Measured | None:
@@ -273,18 +263,12 @@ def worst_shape(results: Results, condition: str = "") -> Measured | None:
     Of a condition by its label; without, of that by which claims are judged.
     """
     ratios = ratios_of(results, condition or learner_of(results))
-    if not ratios:
-        return None
-    worst = min(ratios, key=lambda d: float(np.nan_to_num(d.estimate.value)))
-    return Measured(worst.estimate, worst.seeds, note=worst.condition)
+    return _worst(Measured(r.estimate, r.seeds, note=r.condition) for r in ratios)
 
 
 def without_model(results: Results) -> Measured | None:
     """Measure evaluation success where the box is predicted not to move, over the default's."""
-    conditions = "static predictor", "default"
-    if not all(results.has(c, "evaluation") for c in conditions):
-        return None
-    own, base = (results.by_seed(c, "evaluation") for c in conditions)
+    own, base = (results.by_seed(c, "evaluation") for c in ("static predictor", "default"))
     return _paired(own, base, ratio)
 
 
@@ -387,7 +371,13 @@ class Finding:
 
     claim: Claim
     measured: Measured | None
-    verdict: Verdict
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the measure meets the criterion; not decided by too few seeds."""
+        if self.measured is None or 0 < self.measured.seeds < LEAST_SEEDS:
+            return "not decided"
+        return self.claim.criterion.decide(self.measured)
 
     @property
     def result(self) -> str:
@@ -395,11 +385,9 @@ class Finding:
         if self.measured is None:
             return "no results"
         value, low, high = map(float, self.measured.estimate)
-        text = f"{value:.2f}" if self.measured.seeds else f"{value:.2g}"
+        text = f"{value:.2g}, computed"
         if self.measured.seeds:
-            text += f" ({low:.2f} to {high:.2f}), {self.measured.seeds} seeds"
-        else:
-            text += ", computed"
+            text = f"{value:.2f} ({low:.2f} to {high:.2f}), {self.measured.seeds} seeds"
         if self.measured.p is not None:
             text += f", p = {self.measured.p:.2g}"
         return text + (f", {self.measured.note}" if self.measured.note else "")
@@ -409,13 +397,11 @@ def judge(results: Mapping[str, Results], paper: str = OWN) -> tuple[Finding, ..
     """Decide every claim of a paper by the results of its study, by name."""
     findings = []
     for claim in PAPERS[paper]:
-        measurement = claim.compute(results.get(claim.study, NOTHING()))
-        if measurement is None or not np.isfinite(measurement.estimate.value):
-            findings.append(Finding(claim, None, "not decided"))
-            continue
-        enough = measurement.seeds == 0 or measurement.seeds >= LEAST_SEEDS
-        verdict = claim.criterion.decide(measurement) if enough else "not decided"
-        findings.append(Finding(claim, measurement, verdict))
+        measured = None
+        with suppress(KeyError):  # there are no such episodes
+            measured = claim.compute(results.get(claim.study, NOTHING()))
+        is_known = measured is not None and np.isfinite(measured.estimate.value)
+        findings.append(Finding(claim, measured if is_known else None))
     return tuple(findings)
 
 
@@ -428,13 +414,10 @@ def print_claims(findings: Sequence[Finding], form: Format) -> None:
     """Print the findings."""
     if form == "json":
         print(json.dumps([_record(finding) for finding in findings], indent=1, allow_nan=False))
-    elif form == "markdown":
+        return
+    if form == "markdown":
         print(markdown(findings))
-    else:
-        _print_table(findings)
-
-
-def _print_table(findings: Sequence[Finding]) -> None:
+        return
     table = Table(box=None, padding=(0, 1, 1, 0), pad_edge=False, header_style="bold")
     for title, width in (("claim", 4), ("measure, criterion", 5), ("result", 3), ("verdict", 2)):
         table.add_column(title, ratio=width)
@@ -456,12 +439,9 @@ def markdown(findings: Sequence[Finding]) -> str:
     lines = ["| claim | in the paper | study | measure | criterion | result | verdict |"]
     lines.append("|---" * 7 + "|")
     for finding in findings:
-        c = finding.claim
-        cells = (
-            c.text, c.place, c.study, c.measure, c.criterion.text, finding.result,
-            f"**{finding.verdict}**",
-        )  # fmt: skip
-        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+        _, claim, place, study, measure, criterion, *_ = _record(finding).values()
+        cells = claim, place, study, measure, criterion, finding.result, f"**{finding.verdict}**"
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 

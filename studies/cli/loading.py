@@ -90,26 +90,20 @@ def progress(store: Store) -> Progress:
     now = None if refusal is not None else look(store.directory)
     begun = {} if now is None else now[1]
     pending = [trial for trial in trials if trial.identity not in states]
-    running = [trial for trial in pending if trial.identity in begun]
-    left = [trial for trial in pending if trial.identity not in begun]
+    running = [(t.condition, t.seed, begun[t.identity]) for t in pending if t.identity in begun]
+    left = [trial.condition for trial in pending if trial.identity not in begun]
     failed = [*states.values()].count("failed")
-    finished = len(trials) - len(pending)
     usual = cores() if left and refusal is None else 0
     processes = usual if now is None else now[0]
-    seconds = _estimate(
-        store.mean_seconds(),
-        [trial.condition for trial in left],
-        [(trial.condition, begun[trial.identity]) for trial in running],
-        processes,
-    )
+    spent = [(condition, seconds) for condition, _, seconds in running]
     return Progress(
         total=len(trials),
-        done=finished - failed,
+        done=len(trials) - len(pending) - failed,
         failed=failed,
-        left=len(trials) - finished - len(running),
-        running=tuple((t.condition, t.seed, begun[t.identity]) for t in running),
+        left=len(left),
+        running=tuple(running),
         processes=processes,
-        seconds=seconds if refusal is None else None,
+        seconds=_estimate(store.mean_seconds(), left, spent, processes),
         damaged=tuple(store.notes),
         refusal=refusal,
     )
@@ -135,6 +129,8 @@ def _estimate(
 def describe(store: Store, now: Progress) -> Iterator[str]:
     """Yield how many trials are done, running, failed and left, and for how long.
 
+    Then, each after an empty line, why nothing can be added to the study, and what is damaged.
+
     Parameters
     ----------
     store
@@ -157,10 +153,6 @@ def describe(store: Store, now: Progress) -> Iterator[str]:
         yield f"spec     {remark}"
     if (versions := store.versions_of_code()) > 1:
         yield f"code     finished trials are of {versions} versions of the installed code"
-
-
-def warnings(now: Progress) -> Iterator[str]:
-    """Yield, each after an empty line, why nothing can be added to a study, and what is damaged."""
     if now.refusal:
         yield f"\nnothing can be added: {now.refusal}"
     for line in now.damaged:

@@ -16,18 +16,16 @@ Tables are for the terminal, as JSON, CSV and LaTeX. Integers keep every digit i
 beyond 2 ** 53, where floating-point numbers lie farther apart, is rounded to an integer.
 """
 
-import io
 import json
 import re
 import sys
 import tracemalloc
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import astuple, dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, astuple, dataclass
 from fractions import Fraction
 from functools import cache
 from html import escape
-from itertools import chain
+from itertools import chain, product
 from statistics import median
 from typing import Any, Literal
 
@@ -46,7 +44,7 @@ from ...core.rules.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ...topologies.view import aligned, readable
-from ..presentation.tables import in_latex, write_csv
+from ..presentation.tables import in_csv, in_latex
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 
 SINGLE_AGENT = "single-agent"
@@ -133,46 +131,6 @@ class CostRow:
         return None if self.nested_exact is None else Fraction(self.single_agent, self.nested_exact)
 
 
-def cost_rows(
-    topologies: Sequence[str],
-    agents: Sequence[int],
-    problem: Problem,
-    repeats: int = 0,
-    network: bool = False,
-) -> Iterator[CostRow]:
-    """Yield the cost of every topology for every number of agents, measured `repeats` times.
-
-    With `network` the messages of a decision are counted, too.
-
-    Raises
-    ------
-    ValueError
-        If there is no topology, one is refused, or two have one label.
-    """
-    if not topologies:
-        raise ValueError("topology = none, allowed: one or more, such as chain or tree:2")
-    written = [LABELLED.fullmatch(text) for text in topologies]
-    named = [m.groups() if m else (t, t) for m, t in zip(written, topologies, strict=True)]
-    labels = [label for label, _ in named]
-    for label, text in named:
-        if labels.count(label) > 1:
-            raise ValueError(f"topology = {label!r} more than once; name each: LABEL={text}")
-        for n in agents:
-            is_one = text not in {SINGLE_AGENT, *WAYS} and is_chain(agents_below(text, n))
-            tried = None if text == SINGLE_AGENT else joint_actions(text, n, problem.actions)
-            yield CostRow(
-                agents=n,
-                topology=label,
-                nested_exact=None if tried is None else problem.sweep(tried),
-                nested_closed_form=problem.chain_closed_form(n) if is_one else None,
-                nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
-                single_agent=problem.single_agent(n),
-                formula=step_formula(text, n) if repeats else None,
-                measured=measure(text, n, repeats) if repeats else None,
-                network=messages(text, n) if network else None,
-            )
-
-
 def joint_actions(text: str, n: int, actions: int) -> list[int]:
     """Return how many joint actions each of n agents tries in a decision."""
     topology, tried = WAYS.get(text, (text, None))
@@ -242,7 +200,7 @@ def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
     tracemalloc.start()
     try:
         team = Team(learner, scenario, hierarchy, policy_seed(0))
-        _steps(team, scenario, 1)
+        _step(team, scenario)
         memory = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -255,7 +213,7 @@ def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
     counted = (int(b - a) // n for a, b, n in zip(before, after, steps, strict=True))
     for seed in range(1, repeats):
         team = Team(learner, scenario, hierarchy, policy_seed(seed))
-        _steps(team, scenario, 1)
+        _step(team, scenario)
         times.append(_timed(team, scenario))
     deciding, learning = (median(part) for part in zip(*chain(*times), strict=True))
     each = tuple(sum(map(median, zip(*taken, strict=True))) for taken in times)
@@ -264,9 +222,9 @@ def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
 
 def _timed(team: Team, scenario: Scenario) -> list[tuple[float, float]]:
     """Take steps until enough time has been measured; return (deciding, learning) [s] of each."""
-    times = _steps(team, scenario, 1)
+    times = [_step(team, scenario)]
     while sum(map(sum, times)) < LEAST_SECONDS and len(times) < MOST_TIMES:
-        times += _steps(team, scenario, 1)
+        times.append(_step(team, scenario))
     return times
 
 
@@ -291,16 +249,16 @@ def _warm_up() -> None:
     line_up = LineUpSettings(carts=2).build()
     for topology in ("chain", "independent"):
         hierarchy = build(topology, line_up.agents)
-        _steps(Team(LEARNER, line_up, hierarchy, policy_seed(0)), line_up, 1)
+        _step(Team(LEARNER, line_up, hierarchy, policy_seed(0)), line_up)
 
 
-def _steps(team: Team, scenario: Scenario, times: int) -> list[tuple[float, float]]:
-    """Take a step some times, always from a fresh start; return (deciding, learning) [s] of each.
+def _step(team: Team, scenario: Scenario) -> tuple[float, float]:
+    """Take a step from a fresh start; return (deciding, learning) [s].
 
     It is the second step of an episode: in the first, the learner has nothing to look back on.
     """
-    records = control_loop(scenario, team, episodes=times, steps=2, seed=0)
-    return [(record.deciding, record.learning) for record in records if record.step == 1]
+    _, record = control_loop(scenario, team, episodes=1, steps=2, seed=0)
+    return record.deciding, record.learning
 
 
 Form = Literal["table", "json", "csv", "latex"]
@@ -319,7 +277,6 @@ NETWORK = ("messages", "in turn", "1 ms", "10 ms", "1 ms*", "10 ms*")
 """Headings of messages, and of the seconds that a decision waits for them."""
 OF_THE_PAPER = PAPER.chain_closed_form(4)
 """Operations of four agents by Eq. 19, with the paper's |S|, |A| and L."""
-COUNTS = ("joint_actions", "rule_evaluations", "weight_updates")
 
 
 def written(rows: Sequence[CostRow], form: Form) -> str:
@@ -327,15 +284,16 @@ def written(rows: Sequence[CostRow], form: Form) -> str:
     if form == "table":
         return _table(rows)
     if form == "latex":
-        return "\n\n".join(map(_tabular, _cells(rows)))
+        return "\n\n".join(map(_tabular, _cells(rows).values()))
     records = [_record(row) for row in rows]
-    with _all_digits():
+    most = sys.get_int_max_str_digits()
+    sys.set_int_max_str_digits(0)  # those of n = 1000 are more than Python prints
+    try:
         if form == "json":
             return "[" + ",\n ".join(json.dumps(record) for record in records) + "]"
-        file = io.StringIO()
-        columns = list(dict.fromkeys(name for record in records for name in record))
-        write_csv(file, columns, [[record.get(name) for name in columns] for record in records])
-        return file.getvalue().rstrip("\n")
+        return in_csv(pd.DataFrame(records, dtype=object)).rstrip("\n")
+    finally:
+        sys.set_int_max_str_digits(most)
 
 
 def scientific(value: int | Fraction | None) -> str:
@@ -364,40 +322,27 @@ def _record(row: CostRow) -> dict[str, Any]:
         record["messages"], record["messages_in_turn"] = row.network
     for what, counts in (("_formula", row.formula), ("", row.measured and row.measured.counted)):
         if counts is not None:
-            record |= {f"{name}{what}_per_step": getattr(counts, name) for name in COUNTS}
-    if row.measured is not None:
-        record["deciding_s"] = row.measured.deciding
-        record["learning_s"] = row.measured.learning
-        record["memory_bytes"] = row.measured.memory
-        step, repeats = row.measured.step, len(row.measured.repeats)
-        record |= {"repeats": repeats, "step_s": float(step.value)}
-        if repeats > 1:
-            record |= {"step_s_low": float(step.low), "step_s_high": float(step.high)}
+            record |= {f"{name}{what}_per_step": n for name, n in asdict(counts).items()}
+    if (cost := row.measured) is not None:
+        record |= {"deciding_s": cost.deciding, "learning_s": cost.learning}
+        record |= {"memory_bytes": cost.memory, "repeats": len(cost.repeats)}
+        record["step_s"], low, high = map(float, cost.step)
+        if len(cost.repeats) > 1:
+            record |= {"step_s_low": low, "step_s_high": high}
     return record
 
 
-@contextmanager
-def _all_digits() -> Iterator[None]:
-    """Let Python print integers of more than 4300 digits, which n = 1000 needs."""
-    most = sys.get_int_max_str_digits()
-    sys.set_int_max_str_digits(0)
-    try:
-        yield
-    finally:
-        sys.set_int_max_str_digits(most)
-
-
-def _cells(rows: Sequence[CostRow]) -> list[list[list[str]]]:
-    """Return the formulas line by line, headings first; then what was measured, and messages."""
-    return [
-        [["n", "topology", *titles], *([str(r.agents), r.topology, *cells(r)] for r in rows)]
-        for titles, asked, cells in (
-            (dict(FORMULAS).values(), True, _formula_cells),
-            (MEASURED, any(row.formula is not None for row in rows), _measured_cells),
-            (NETWORK, any(row.network is not None for row in rows), _network_cells),
+def _cells(rows: Sequence[CostRow]) -> dict[str, list[list[str]]]:
+    """Return the cells of each table, headings first: formulas, then what of rows was asked for."""
+    return {
+        kind: [["n", "topology", *titles], *([str(r.agents), r.topology, *cells(r)] for r in rows)]
+        for kind, titles, cells in (
+            ("topology", dict(FORMULAS).values(), _formula_cells),
+            ("formula", MEASURED, _measured_cells),
+            ("network", NETWORK, _network_cells),
         )
-        if asked
-    ]
+        if kind == "topology" or any(getattr(row, kind) is not None for row in rows)
+    }
 
 
 def _formula_cells(row: CostRow) -> list[str]:
@@ -411,25 +356,24 @@ def _network_cells(row: CostRow) -> list[str]:
 
 
 def _table(rows: Sequence[CostRow]) -> str:
-    formulas, *others = _cells(rows)
-    lines = [*aligned(formulas, "><>>>>>"), ""]
+    tables = _cells(rows)
+    lines = [*aligned(tables["topology"], "><>>>>>"), ""]
     lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
     if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
         lines.append("The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4.")
-    measured = [cells for cells in others if cells[0][2] != NETWORK[0]]
-    for cells in measured:
+    if "formula" in tables:
         same = [row.formula == row.measured.counted for row in rows if row.measured is not None]
         lines += ["", f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):"]
-        lines += ["", *aligned(cells, "><>>>>>>"), ""]
+        lines += ["", *aligned(tables["formula"], "><>>>>>>"), ""]
         lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
         most = max((len(row.measured.repeats) for row in rows if row.measured), default=1)
         if most > 1:
             lines += [f"±: a 95 % interval of the mean of {most} repeats, each with a new team;"]
         lines += ["-: not measured, beyond a second or so a step."]
         lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
-    for cells in others[len(measured) :]:
+    if "network" in tables:
         lines += ["", "Messages of a decision, and how long it waits for them [s]:", ""]
-        lines += [*aligned(cells, "><>>>>>>"), ""]
+        lines += [*aligned(tables["network"], "><>>>>>>"), ""]
         lines += ["in turn: how many follow one another, others going at once, of 1 or 10 ms each;"]
         lines += ["*: on a channel that carries one message at a time."]
     return "\n".join(lines)
@@ -439,16 +383,11 @@ def _measured_cells(row: CostRow) -> list[str]:
     joint = None if row.formula is None else row.formula.joint_actions
     if row.measured is None:
         return [scientific(joint), *["-"] * len(MEASURED[1:])]
-    c = row.measured.counted
-    counts = joint, c.joint_actions, c.rule_evaluations, c.weight_updates
-    step = row.measured.step
-    wide = (
-        f"±{_amount(1e3 * float(step.high - step.value), 2)}"
-        if len(row.measured.repeats) > 1
-        else ""
-    )
-    amounts = _amount(1e3 * float(step.value)) + wide, _amount(1e-6 * row.measured.memory)
-    return [*map(scientific, counts), *amounts]
+    step, ms = row.measured.step, _amount(1e3 * float(row.measured.step.value))
+    if len(row.measured.repeats) > 1:
+        ms += f"±{_amount(1e3 * float(step.high - step.value), 2)}"
+    counts = joint, *astuple(row.measured.counted)
+    return [*map(scientific, counts), ms, _amount(1e-6 * row.measured.memory)]
 
 
 def _amount(value: float, digits: int = 3) -> str:
@@ -532,9 +471,31 @@ def cost_table(
     Raises
     ------
     ValueError
-        If a topology or a number is refused; one line.
+        If there is no topology, one or a number is refused, or two have one label; one line.
     """
     if not 1 <= repeats <= MOST_REPEATS:
         raise ValueError(f"repeats = {repeats}, allowed: 1 to {MOST_REPEATS}")
-    times = repeats if measured else 0
-    return CostTable(tuple(cost_rows(topologies, list(agents), problem, times, network)))
+    if not topologies:
+        raise ValueError("topology = none, allowed: one or more, such as chain or tree:2")
+    matches = [LABELLED.fullmatch(text) for text in topologies]
+    named = [m.groups() if m else (t, t) for m, t in zip(matches, topologies, strict=True)]
+    labels = [label for label, _ in named]
+    rows = []
+    for (label, text), n in product(named, agents):
+        if labels.count(label) > 1:
+            raise ValueError(f"topology = {label!r} more than once; name each: LABEL={text}")
+        is_one = text not in {SINGLE_AGENT, *WAYS} and is_chain(agents_below(text, n))
+        tried = None if text == SINGLE_AGENT else joint_actions(text, n, problem.actions)
+        row = CostRow(
+            agents=n,
+            topology=label,
+            nested_exact=None if tried is None else problem.sweep(tried),
+            nested_closed_form=problem.chain_closed_form(n) if is_one else None,
+            nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
+            single_agent=problem.single_agent(n),
+            formula=step_formula(text, n) if measured else None,
+            measured=measure(text, n, repeats) if measured else None,
+            network=messages(text, n) if network else None,
+        )
+        rows.append(row)
+    return CostTable(tuple(rows))

@@ -18,8 +18,10 @@ of f, all rules being equally likely; which rules were ever visited it does not 
 
 import re
 import sys
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -88,12 +90,9 @@ def take_apart(rules: RuleBase, theta: FloatArray) -> Parts:
     (1.0, [-1.0, 1.0], 0.33)
     """
     sizes = [partition.size for partition in rules.partitions]
-    tensors = []
-    begin = 0
-    for term, size in zip(rules.terms, rules.sizes, strict=True):
-        weights = np.asarray(theta[begin : begin + size], dtype=float)
-        tensors.append((term, weights.reshape([sizes[j] for j in term])))
-        begin += size
+    weights = np.split(np.asarray(theta, dtype=float), np.cumsum(rules.sizes)[:-1])
+    of_terms = zip(rules.terms, weights, strict=True)
+    tensors = [(term, own.reshape([sizes[j] for j in term])) for term, own in of_terms]
     singles: list[FloatArray] = [np.zeros(size) for size in sizes]
     for term, tensor in tensors:
         for j in term:
@@ -110,13 +109,11 @@ def _onto(tensor: FloatArray, term: Sequence[int], kept: Sequence[int]) -> Float
 def _variance(tensors: Sequence[tuple[tuple[int, ...], FloatArray]]) -> float:
     """Return the variance of a sum of terms: terms covary in what their variables in common do."""
     total = 0.0
-    for i, (term, tensor) in enumerate(tensors):
-        for other, second in tensors[i:]:
-            common = [j for j in term if j in other]
-            if common:
-                first = _onto(tensor, term, common) - tensor.mean()
-                covariance = (first * (_onto(second, other, common) - second.mean())).mean()
-                total += float(covariance) * (1.0 if other == term else 2.0)
+    for (term, tensor), (other, second) in combinations_with_replacement(tensors, 2):
+        if common := [j for j in term if j in other]:
+            first = _onto(tensor, term, common) - tensor.mean()
+            covariance = (first * (_onto(second, other, common) - second.mean())).mean()
+            total += float(covariance) * (1.0 if other == term else 2.0)
     return total
 
 
@@ -157,7 +154,7 @@ def rules_table(
     Variables come in the order of their mean share.
     """
     power, lines = exponent(parts), []
-    for j in by_share(parts):
+    for j in mean_shares(parts):
         variable, partition = variables[j], rules.partitions[j]
         shares = [percent(p.share(p.singles[j])) for p in parts]
         lines.append((f"{variable.name}, share of the variance", *shares))
@@ -173,10 +170,10 @@ def rules_table(
     return frame.to_string(line_width=WIDTH, sparsify=False)
 
 
-def by_share(parts: Sequence[Parts]) -> list[int]:
-    """Return the variables in the order of their mean share."""
+def mean_shares(parts: Sequence[Parts]) -> dict[int, float]:
+    """Return the share of each variable, mean over agents, in the order of these means."""
     shares = np.mean([list(map(p.share, p.singles)) for p in parts], axis=0)
-    return [int(j) for j in np.argsort(-shares, kind="stable")]
+    return {int(j): float(shares[j]) for j in np.argsort(-shares, kind="stable")}
 
 
 def percent(share: float) -> str:
@@ -285,20 +282,19 @@ def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]
     with refused(f"{store.directory}: "):  # a file that settings name may not be what it was
         session = Session(trial)
         team = of_fuzzy_agents(session.team)
-    model, bodies = team.self_model, None
-    if model is not None:
-        bodies = Bodies({}, ())
+    model, bodies = team.self_model, Bodies({}, ())
+    if model:
         bodies.note("built", model)
     if arrays is None:
         _train(store, session, bodies)
     else:
         team.restore(arrays)
-    if bodies and model:
+    if model:
         bodies.note("after", model)
-    return team, session.scenario, bodies
+    return team, session.scenario, bodies if model else None
 
 
-def _train(store: Store, session: Session, bodies: Bodies | None) -> None:
+def _train(store: Store, session: Session, bodies: Bodies) -> None:
     trial, model = session.trial, of_fuzzy_agents(session.team).self_model
     episodes = track(
         range(trial.episodes),
@@ -308,7 +304,7 @@ def _train(store: Store, session: Session, bodies: Bodies | None) -> None:
         disable=not sys.stderr.isatty(),
     )
     for episode in episodes:
-        if bodies and model and episode == trial.settings.scenario.onset and episode > 0:
+        if model and episode == trial.settings.scenario.onset and episode > 0:
             bodies.note("before", model)
         session.train(1, episode)
     measured = [measure.name for measure in store.measures()]
@@ -365,11 +361,7 @@ def errors_of(team: Team, scenario: Any, seed: int) -> pd.DataFrame | None:
         return None
     horizon, neutral = predictor.horizon, scenario.action_set.neutral
     given = hasattr(scenario, "predict") and getattr(scenario, "horizon", 1) == horizon
-    errors: dict[str, list[Any]] = {
-        "learned": [],
-        "as it is": [],
-        **({"given": []} if given else {}),
-    }
+    errors: dict[str, list[Any]] = defaultdict(list)
     for episode in range(EVALUATION_WORLDS, EVALUATION_WORLDS + EPISODES):
         world = world_seed(seed, episode)
         states, over = scenario.reset(world, episode), False
@@ -377,7 +369,7 @@ def errors_of(team: Team, scenario: Any, seed: int) -> pd.DataFrame | None:
         for _ in range(DECISIONS):
             prediction = team.predict(scenario, states)
             joint = team.act(prediction, explore=False)
-            guesses = {"as it is": states, "learned": _states(prediction, joint)}
+            guesses = {"learned": _states(prediction, joint), "as it is": states}
             if given:
                 guesses["given"] = _states(scenario.predict(), joint)
             held = np.full_like(joint, neutral) if scenario.state_space.n_own else joint
@@ -389,10 +381,10 @@ def errors_of(team: Team, scenario: Any, seed: int) -> pd.DataFrame | None:
             states = np.array(transition.states)
             if over:
                 break
-            for name in errors:
-                errors[name].append(apart(scenario, states, guesses[name]))
+            for name, guess in guesses.items():
+                errors[name].append(apart(scenario, states, guess))
     index = [variable.name for variable in scenario.state_space.variables]
-    roots = {name: np.sqrt(np.square(e).mean(axis=(0, 1))) for name, e in errors.items() if e}
+    roots = {name: np.sqrt(np.square(e).mean(axis=(0, 1))) for name, e in errors.items()}
     return pd.DataFrame(roots, index=index)
 
 

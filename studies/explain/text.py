@@ -14,7 +14,7 @@ from ...core.numerics import pd
 from ..errors import WIDTH
 from ..presentation import figures
 from ..presentation.figures import add_legend, look, marker
-from .team import Bodies, Explanation, by_share, exponent, percent, rules_table
+from .team import Bodies, Explanation, exponent, mean_shares, percent, rules_table
 
 MOST_AGENTS = 8
 """Agents whose rules are printed; the file holds those of all."""
@@ -32,10 +32,7 @@ def text(explained: Explanation, agents: int | None = None) -> str:
     """
     parts, variables, bodies = explained.parts, explained.variables, explained.bodies
     names = explained.agents[:agents]
-    shares = [
-        f"{variables[j].name} {percent(float(np.mean([p.share(p.singles[j]) for p in parts])))}"
-        for j in by_share(parts)
-    ]
+    shares = [f"{variables[j].name} {percent(share)}" for j, share in mean_shares(parts).items()]
     environment = jinja2.Environment(trim_blocks=True, undefined=jinja2.StrictUndefined)
     environment.filters["wrapped"] = _wrapped
     template = environment.from_string(Path(__file__).with_name("text.txt.jinja").read_text())
@@ -143,17 +140,16 @@ def _functions(explained: Explanation, block: slice) -> Figure:
     panels = panels.ravel()
     power = exponent(explained.parts)
     names, parts = explained.agents[block], explained.parts[block]
+    shares = mean_shares(parts)
     bodies = list(dict.fromkeys(name.partition(".")[0] for name in names))
     for j, (variable, partition) in enumerate(
         zip(explained.variables, explained.rules.partitions, strict=True)
     ):
         axes, turn = panels[j], 180 / np.pi if variable.unit == "rad" else 1.0
-        low, high = (min(partition.centres), max(partition.centres))
-        if variable.periodic:
-            low, high = variable.low, variable.high
+        ends = (variable.low, variable.high) if variable.periodic else partition.centres
         if variable.unit == "rad":
             axes.xaxis.set_major_locator(MultipleLocator(90))
-        x = np.union1d(np.linspace(low, high, 401), partition.centres)
+        x = np.union1d(np.linspace(min(ends), max(ends), 401), partition.centres)
         strengths = partition.strengths(x)
         for name, part in zip(names, parts, strict=True):
             body = name.partition(".")[0]
@@ -163,9 +159,8 @@ def _functions(explained: Explanation, block: slice) -> Figure:
             at = np.searchsorted(x, partition.centres).tolist()
             y = 10.0**power * strengths @ part.singles[j]
             axes.plot(turn * x, y, lw=1.4, markevery=at, label=name, **style)
-        share = float(np.mean([p.share(p.singles[j]) for p in parts]))
         unit = {"rad": " [°]", "1": ""}.get(variable.unit, f" [{variable.unit}]")
-        axes.set_title(f"{variable.name}{unit}, {percent(share)}", loc="left")
+        axes.set_title(f"{variable.name}{unit}, {percent(shares[j])}", loc="left")
         axes.axhline(0.0, color="#cccccc", lw=0.8, zorder=0)
     scale = rf" [$\times 10^{{{-power}}}$]" if power else ""
     figure.supylabel(f"adds to f{scale}", fontsize=9)

@@ -13,10 +13,10 @@ import shutil
 import sqlite3
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from itertools import groupby
+from itertools import chain, count, groupby
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -44,6 +44,12 @@ ILL = (UnicodeError, MemoryError, OverflowError)
 """What Python itself raises when SQLite hands it damaged text or sizes."""
 
 
+class NoStudyError(SpecError):
+    """A directory holds no study, or only what a run left that was killed before it noted one."""
+
+    reason = None
+
+
 class DamageError(SpecError):
     """A database holds something else than was written.
 
@@ -53,8 +59,9 @@ class DamageError(SpecError):
         What is wrong with it.
     """
 
-    def __init__(self, path: Path, reason: str) -> None:
-        super().__init__(f"{path}: is damaged: {reason}; nested-agents run mends it")
+    def __init__(self, path: Path, reason: str, message: str = "") -> None:
+        usual = f"{path}: is damaged: {reason}; nested-agents run mends it"
+        super().__init__(message or usual)
         self.reason = reason
 
 
@@ -69,8 +76,7 @@ def writing(path: Path) -> Iterator[sqlite3.Connection]:
     SpecError
         If it cannot be used, or the disk is full.
     """
-    _check_beside(path)
-    with _one_line(path), _closing(sqlite3.connect(path, isolation_level=None)) as connection:
+    with _one_line(path), closing(_connect(path, isolation_level=None)) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
@@ -88,23 +94,21 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
     SpecError
         If it cannot be read.
     """
-    _check_beside(path)
-    with _one_line(path):
-        # Not mode=ro: such a connection leaves SQLite's -wal and -shm files behind.
-        uri = f"{path.absolute().as_uri()}?mode=rw"
-        with _closing(sqlite3.connect(uri, uri=True, isolation_level=None)) as connection:
-            try:
-                connection.execute("BEGIN")
-                connection.execute("SELECT 1 FROM sqlite_master").fetchone()
-            except sqlite3.OperationalError:
-                connection.close()
-                with copied(path) as copy:
-                    yield copy
-                return
-            except ILL as error:
-                raise DamageError(path, " ".join(str(error).split())) from None
-            connection.execute("PRAGMA query_only = ON")
-            yield connection
+    # Not mode=ro: such a connection leaves SQLite's -wal and -shm files behind.
+    uri = f"{path.absolute().as_uri()}?mode=rw"
+    with _one_line(path), closing(_connect(uri, uri=True, isolation_level=None)) as connection:
+        try:
+            connection.execute("BEGIN")
+            connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+        except sqlite3.OperationalError:
+            connection.close()
+            with copied(path) as copy:
+                yield copy
+            return
+        except ILL as error:
+            raise DamageError(path, " ".join(str(error).split())) from None
+        connection.execute("PRAGMA query_only = ON")
+        yield connection
 
 
 @contextmanager
@@ -118,7 +122,7 @@ def copied(path: Path) -> Iterator[sqlite3.Connection]:
             source = path.with_name(path.name + suffix)
             if source.exists():
                 shutil.copyfile(source, Path(folder) / source.name)
-        with _closing(sqlite3.connect(Path(folder) / path.name)) as connection:
+        with closing(_connect(Path(folder) / path.name)) as connection:
             yield connection
 
 
@@ -126,13 +130,8 @@ def copied(path: Path) -> Iterator[sqlite3.Connection]:
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     """Keep all that is written in the context, or nothing."""
     connection.execute("BEGIN IMMEDIATE")
-    try:
+    with connection:  # which commits, or rolls back what SQLite has not when the disk is full
         yield
-        connection.execute("COMMIT")
-    except BaseException:
-        if connection.in_transaction:  # SQLite itself ends it when the disk is full
-            connection.execute("ROLLBACK")
-        raise
 
 
 def insert(connection: sqlite3.Connection, table: str, rows: list[tuple[object, ...]]) -> None:
@@ -147,26 +146,20 @@ def quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"'
 
 
-@contextmanager
-def _closing(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
+def _connect(database: Path | str, **options: Any) -> sqlite3.Connection:
+    connection = sqlite3.connect(database, **options)
     # A flipped bit may make text that is no UTF-8; checksums tell, decoding need not.
     connection.text_factory = partial(str, encoding="utf-8", errors="replace")
-    try:
-        yield connection
-    finally:
-        connection.close()
-
-
-def _check_beside(path: Path) -> None:
-    """Refuse what stands in the place of a file that SQLite keeps beside the database."""
-    for suffix in ("", "-wal", "-shm"):
-        beside = path.with_name(path.name + suffix)
-        if os.path.lexists(beside) and not beside.is_file():
-            raise SpecError(f"{beside}: is no file, and in the way of one; remove it")
+    return connection
 
 
 @contextmanager
 def _one_line(path: Path) -> Iterator[None]:
+    """Raise errors of a database as one line; it and the files beside it must be files."""
+    for suffix in ("", "-wal", "-shm"):
+        beside = path.with_name(path.name + suffix)
+        if os.path.lexists(beside) and not beside.is_file():
+            raise SpecError(f"{beside}: is no file, and in the way of one; remove it")
     try:
         yield
     except sqlite3.DatabaseError as error:
@@ -193,9 +186,6 @@ AFTER = ("return",)
 """Those after them."""
 
 SECONDS = ("decision", "physics", "sensors", "learning", "total")
-
-PLANNED = ("identity", "condition", "seed", "recorded")
-"""What is noted of every trial of a study before it is run."""
 
 OF_A_TRIAL = ("episodes", "seconds", "numbers", "checksums")
 """The tables that hold what a trial measured, by its identity."""
@@ -287,7 +277,15 @@ def prepare(db: sqlite3.Connection, noted: Noted) -> None:
     definitions = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
     for statement in SCHEMA:
         db.execute(statement)
-    db.execute(_episodes(noted.measures))
+    # A measure is NULL where a scenario has it not.
+    kinds = ((quoted(m.name), "INTEGER" if m.is_rate else "REAL") for m in noted.measures)
+    measured = "".join(f"{name} {kind}, " for name, kind in kinds)
+    db.execute(
+        f"""CREATE TABLE IF NOT EXISTS episodes (
+        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, phase TEXT NOT NULL,
+        episode INTEGER NOT NULL, steps INTEGER NOT NULL, {measured}"return" REAL NOT NULL,
+        PRIMARY KEY (identity, phase, episode)) WITHOUT ROWID"""
+    )
     db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({definitions})")
     db.execute("DELETE FROM conditions")
     by_condition = enumerate(noted.columns.items())
@@ -307,23 +305,12 @@ def prepare(db: sqlite3.Connection, noted: Noted) -> None:
     ]
     insert(db, "planned", planned)
     db.execute("DELETE FROM meta")
-    meta = {"results_version": str(RESULTS_VERSION), "spec": json.dumps(noted.spec)}
-    meta |= {"conditions": json.dumps(noted.conditions)}
-    meta |= {"measures": json.dumps(tables(noted.measures))}
-    meta |= {"sources": json.dumps(noted.sources), "code": json.dumps(noted.code)}
-    insert(db, "meta", list(meta.items()))
+    meta = {"results_version": RESULTS_VERSION, "measures": tables(noted.measures)}
+    meta |= {k: getattr(noted, k) for k in ("spec", "conditions", "sources", "code")}
+    insert(db, "meta", [(key, json.dumps(value)) for key, value in meta.items()])
     insert(db, "meta", [("sha256", study_checksum(db))])
     if db.execute("SELECT 1 FROM ledger").fetchone() is None:
         db.execute("INSERT INTO ledger VALUES (0)")
-
-
-def _episodes(measures: Sequence[Measure]) -> str:
-    """Return what makes the table of episodes: a measure is NULL where a scenario has it not."""
-    measured = "".join(f"{quoted(m.name)} {'INTEGER' if m.is_rate else 'REAL'}, " for m in measures)
-    return f"""CREATE TABLE IF NOT EXISTS episodes (
-        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, phase TEXT NOT NULL,
-        episode INTEGER NOT NULL, steps INTEGER NOT NULL, {measured}"return" REAL NOT NULL,
-        PRIMARY KEY (identity, phase, episode)) WITHOUT ROWID"""
 
 
 def study_checksum(db: sqlite3.Connection) -> str:
@@ -345,31 +332,27 @@ def trial_checksums(
     What has rows in any table counts as a trial. Tables are read from end to end, as asking for
     each of many trials on its own takes longer.
     """
-    trials = _by_identity(
-        db,
-        "trials",
-        "identity, condition, seed, state, recording_sha256, code, error",
-        "",
-        identity,
-    )
+    columns = "identity, condition, seed, state, recording_sha256, code, error"
+    trials = _by_identity(db, identity, "trials", columns=columns)
     # Only what failed has a traceback; that of a finished trial is no part of its checksum.
     first = {key: [r[:-1] if r[-1] is None else r for r in rows] for key, rows in trials}
-    seconds, numbers = (
-        {key: list(rows) for key, rows in _by_identity(db, table, "*", order, identity)}
-        for table, order in (("seconds", ""), ("numbers", ", name"))
-    )
-    left = dict.fromkeys((*first, *seconds, *numbers))
-    for key, rows in _by_identity(db, "episodes", "*", ", phase, episode", identity):
-        left.pop(key, None)
+    seconds = {key: list(rows) for key, rows in _by_identity(db, identity, "seconds")}
+    numbers = {key: list(rows) for key, rows in _by_identity(db, identity, "numbers", ", name")}
+    seen: set[str] = set()
+    without: Rows = ((key, ()) for key in first | seconds | numbers if key not in seen)
+    for key, rows in chain(_by_identity(db, identity, "episodes", ", phase, episode"), without):
+        seen.add(key)
         parts = first.get(key, []), list(rows), seconds.get(key, []), numbers.get(key, [])
         yield key, _sha256(parts)
-    for key in left:
-        yield key, _sha256((first.get(key, []), [], seconds.get(key, []), numbers.get(key, [])))
+
+
+Rows = Iterator[tuple[str, Iterable[tuple[Any, ...]]]]
+"""The identity of each trial, with its rows of a table."""
 
 
 def _by_identity(
-    db: sqlite3.Connection, table: str, columns: str, order: str, identity: str | None
-) -> Iterator[tuple[str, Iterable[tuple[Any, ...]]]]:
+    db: sqlite3.Connection, identity: str | None, table: str, order: str = "", columns: str = "*"
+) -> Rows:
     where, values = ("", ()) if identity is None else ("WHERE identity = ?", (identity,))
     query = f"SELECT {columns} FROM {table} {where} ORDER BY identity{order}"
     return groupby(db.execute(query, values), itemgetter(0))
@@ -383,50 +366,30 @@ def _sha256(content: object) -> str:
     return hashlib.sha256(ENCODER.encode(content).encode()).hexdigest()
 
 
-def damage(path: Path) -> str | None:
-    """Return what is wrong with a database as a whole; None if nothing is, or it is empty.
-
-    Raises
-    ------
-    SpecError
-        If it cannot be read for another reason, is of another version, or is no study's.
-    """
-    if is_orphaned(path):
-        return "its log is there without it"
-    if not path.exists():
-        return None
-    try:
-        with reading(path) as db:
-            return fault(path, db)
-    except DamageError as error:
-        return error.reason
-
-
 def is_orphaned(path: Path) -> bool:
     """Tell whether only the log is left of a database: SQLite would drop it without a word."""
-    log = path.with_name(f"{path.name}-wal")
-    return _size(log) > 0 and _size(path) == 0
-
-
-def holds_tables(path: Path) -> bool:
-    """Tell a study from nothing, and from a run that was killed before it had noted its spec."""
-    if not path.exists():
-        return False
-    with reading(path) as db:
-        return db.execute("SELECT 1 FROM sqlite_master").fetchone() is not None
-
-
-def _size(path: Path) -> int:
-    return path.stat().st_size if path.exists() else 0
+    files = path.with_name(f"{path.name}-wal"), path
+    log_size, size = (file.stat().st_size if file.exists() else 0 for file in files)
+    return log_size > 0 and size == 0
 
 
 def fault(path: Path, db: sqlite3.Connection) -> str | None:
-    """Return what is wrong with an open database as a whole, see `damage`."""
+    """Return what is wrong with an open database as a whole; None if nothing is.
+
+    Raises
+    ------
+    NoStudyError
+        If it is empty.
+    SpecError
+        If it is of another version, or is no study's.
+    """
     try:
         tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master")}
         if not tables:
             (pages,) = db.execute("PRAGMA page_count").fetchone()
-            return "it has no tables" if pages > 1 else None
+            if pages > 1:
+                return "it has no tables"
+            raise NoStudyError(f"{path}: is empty, it holds no study yet")
         if not tables & {"meta", "trials", *OF_A_TRIAL}:
             raise SpecError(f"{path}: is a database, but no study; use another directory")
         (answer,) = db.execute("PRAGMA integrity_check(1)").fetchone()
@@ -453,9 +416,8 @@ def fault(path: Path, db: sqlite3.Connection) -> str | None:
 
 def set_aside(path: Path) -> Path:
     """Give a database, with its log, a name that nothing else has; return it."""
-    number = 1
-    while (aside := path.with_name(f"{path.name}.damaged-{number}")).exists():
-        number += 1
+    names = (path.with_name(f"{path.name}.damaged-{number}") for number in count(1))
+    aside = next(name for name in names if not name.exists())
     # The database last: if this is interrupted, it is found damaged once more.
     for suffix in ("-wal", ""):
         old = path.with_name(path.name + suffix)
@@ -480,44 +442,34 @@ def recover(damaged: Path, db: sqlite3.Connection) -> int:
     int
         How many trials were copied; none if episodes have other measures now.
     """
-    copied = 0
-    for tables in _sound(damaged, _columns(db)):
-        for table, rows in tables.items():
-            insert(db, table, rows)
-        copied += 1
-    db.execute("UPDATE ledger SET trials = ?", (copied,))
-    return copied
+    identities: dict[str, str] = {}
+    taken_over = 0
+    with copied(damaged) as old:
+        with suppress(sqlite3.Error, *ILL):
+            # A table that it cannot understand is passed over.
+            old.execute("PRAGMA writable_schema = ON")
+            noted_by = old.execute("SELECT identity, sha256 FROM checksums")
+            for identity, noted in noted_by if _columns(old) == _columns(db) else ():
+                identities.setdefault(identity, noted)
+        for identity, noted in identities.items():
+            try:
+                if dict(trial_checksums(old, identity)) != {identity: noted}:
+                    continue
+                query = "SELECT * FROM {} WHERE identity = ?"
+                tables = {
+                    table: old.execute(query.format(table), (identity,)).fetchall()
+                    for table in ("trials", *OF_A_TRIAL)
+                }
+            except (sqlite3.Error, *ILL):
+                continue
+            # The row that an index leads to may be another one.
+            tables["checksums"] = [(identity, noted)]
+            for table, rows in tables.items():
+                insert(db, table, rows)
+            taken_over += 1
+    db.execute("UPDATE ledger SET trials = ?", (taken_over,))
+    return taken_over
 
 
 def _columns(db: sqlite3.Connection) -> list[str]:
     return [name for _, name, *_ in db.execute("PRAGMA table_info(episodes)")]
-
-
-def _sound(path: Path, columns: list[str]) -> Iterator[dict[str, list[tuple[object, ...]]]]:
-    """Yield the rows by table of every trial that can be read and has its checksum.
-
-    None if episodes have other `columns`.
-    """
-    identities: dict[str, str] = {}
-    with suppress(sqlite3.Error, *ILL), copied(path) as db:
-        db.execute("PRAGMA writable_schema = ON")  # a table it cannot understand is passed over
-        noted_by = db.execute("SELECT identity, sha256 FROM checksums")
-        for identity, noted in noted_by if _columns(db) == columns else ():
-            identities.setdefault(identity, noted)
-    if not identities:
-        return
-    with copied(path) as db:
-        db.execute("PRAGMA writable_schema = ON")
-        for identity, noted in identities.items():
-            tables: dict[str, list[tuple[object, ...]]] = {}
-            try:
-                if dict(trial_checksums(db, identity)) == {identity: noted}:
-                    for table in ("trials", *OF_A_TRIAL):
-                        query = f"SELECT * FROM {table} WHERE identity = ?"
-                        tables[table] = db.execute(query, (identity,)).fetchall()
-                    # The row that an index leads to may be another one.
-                    tables["checksums"] = [(identity, noted)]
-            except (sqlite3.Error, *ILL):
-                continue
-            if tables:
-                yield tables

@@ -19,7 +19,7 @@ import json
 import os
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
@@ -27,7 +27,7 @@ from typing import Any, TextIO
 from ...core.interface.scenario import Measure
 from ..errors import SpecError
 from . import database, durable
-from .database import DATABASE, Noted, Planned
+from .database import DATABASE, DamageError, NoStudyError, Noted, Planned
 from .durable import Recording
 
 NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
@@ -78,42 +78,44 @@ class Store:
 
         Raises
         ------
+        NoStudyError
+            If the directory holds no study.
+        DamageError
+            If its database is damaged as a whole: what it says of the study, or the number of its
+            trials. For their rows see `verify`.
         SpecError
-            If the directory holds no readable study, or one of another version, or its database is
-            damaged as a whole: what it says of the study, or the number of its trials. For their
-            rows see `verify`.
+            If it cannot be read for another reason, is of another version, or is no study's.
         """
         path = directory / DATABASE
         if database.is_orphaned(path):
-            raise SpecError(
+            raise DamageError(
+                path, "its log is there without it",
                 f"{path}-wal: is the log of a database that is not there any more; nested-agents "
-                "run sets it aside"
-            )
-        if not path.is_file():
-            raise SpecError(f"{directory}: holds no study (no {DATABASE})")
+                "run sets it aside",
+            )  # fmt: skip
+        if not path.exists():
+            raise NoStudyError(f"{directory}: holds no study (no {DATABASE})")
         with database.reading(path) as connection:
             if (wrong := database.fault(path, connection)) is not None:
-                raise database.DamageError(path, wrong)
-            if connection.execute("SELECT 1 FROM sqlite_master").fetchone() is None:
-                raise SpecError(f"{path}: is empty, it holds no study yet")
+                raise DamageError(path, wrong)
             yield cls(directory, connection)
 
     def spec(self) -> Mapping[str, Any]:
         """Return the table of the spec that the study runs."""
-        return self._table("spec")
+        return self._read("spec")
 
     def sources(self) -> dict[str, str]:
         """Return by name the texts of the users' files that the study names, when it began."""
-        return self._table("sources")
+        return self._read("sources")
 
     def settings(self) -> dict[str, Any]:
         """Return the settings of each condition by label, as they were when it began."""
-        return self._table("conditions")
+        return self._read("conditions")
 
     def planned(self) -> tuple[Planned, ...]:
         """Return all trials of the study, as they were noted."""
         rows = self._db.execute(
-            f"SELECT {', '.join(database.PLANNED)} FROM planned ORDER BY position"
+            f"SELECT {', '.join(Planned._fields)} FROM planned ORDER BY position"
         )
         return tuple(
             Planned(identity, condition, seed, {int(k): v for k, v in json.loads(kept).items()})
@@ -127,7 +129,7 @@ class Store:
 
     def code(self) -> dict[str, tuple[str, str]]:
         """Return by module two digests of the code that computed what was added last."""
-        return {name: (text, tree) for name, (text, tree) in self._table("code").items()}
+        return {name: (text, tree) for name, (text, tree) in self._read("code").items()}
 
     def noted(self) -> Noted:
         """Return what the study is, but for its trials and code."""
@@ -135,28 +137,18 @@ class Store:
 
     def measures(self) -> tuple[Measure, ...]:
         """Return what the study measures of its episodes, of any condition."""
-        try:
-            return database.measures_from(json.loads(self.meta("measures")))
-        except (ValueError, TypeError):
-            raise SpecError(
-                f"{self.directory / DATABASE}: is damaged: measures cannot be read"
-            ) from None
+        return self._read("measures", database.measures_from)
 
-    def meta(self, key: str) -> str:
+    def _read(self, key: str, make: Callable[[Any], Any] = dict) -> Any:
         """Return what is noted under `key`, as ``spec`` or ``conditions``."""
         row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        path = self.directory / DATABASE
         if row is None:
-            raise SpecError(f"{self.directory / DATABASE}: is no study: it has no {key}")
-        return str(row[0])
-
-    def _table(self, key: str) -> dict[str, Any]:
+            raise SpecError(f"{path}: is no study: it has no {key}")
         try:
-            table = json.loads(self.meta(key))
-        except ValueError:
-            table = None
-        if not isinstance(table, dict):
-            raise SpecError(f"{self.directory / DATABASE}: is damaged: {key} cannot be read")
-        return table
+            return make(json.loads(row[0]))
+        except (ValueError, TypeError):
+            raise SpecError(f"{path}: is damaged: {key} cannot be read") from None
 
     def verify(self) -> None:
         """Raise `SpecError` if the rows of a trial that was run are not what was written."""
@@ -166,13 +158,9 @@ class Store:
     def _damaged_rows(self) -> dict[str, str]:
         """Return by identity whose rows are not what was written, one line each."""
         noted = dict(self._db.execute("SELECT identity, sha256 FROM checksums").fetchall())
-        names = {
-            identity: f"{condition}, seed {seed}"
-            for table in ("trials", "planned")
-            for identity, condition, seed in self._db.execute(
-                f"SELECT identity, condition, seed FROM {table}"
-            )
-        }
+        known = "SELECT identity, condition, seed FROM "
+        trials = self._db.execute(f"{known} trials UNION ALL {known} planned")
+        names = {identity: f"{condition}, seed {seed}" for identity, condition, seed in trials}
         actual = dict(database.trial_checksums(self._db))
         path = self.directory / DATABASE
         return {
@@ -205,7 +193,7 @@ class Store:
         recorded = [phase for phase, _ in self._db.execute(query)]
         stages = [phase for phase in recorded if phase.startswith(database.STAGE)]
         evaluations = [
-            f"{database.EVALUATION}{name}" for name in self._table("spec").get("evaluations", ())
+            f"{database.EVALUATION}{name}" for name in self._read("spec").get("evaluations", ())
         ]
         ordered = [*known, *stages, *evaluations]
         return [phase for phase in ordered if phase in recorded] + sorted({*recorded} - {*ordered})
@@ -235,9 +223,10 @@ class Store:
         values = {
             (i, n): v for i, n, v in self._db.execute("SELECT identity, name, value FROM numbers")
         }
+        parts = ", ".join(f'{part} AS "seconds.{part}"' for part in database.SECONDS)
         cursor = self._db.execute(
             f"SELECT c.condition, {''.join(f'c.{database.quoted(key)}, ' for key in swept)}seed, "
-            f"state, identity, error, {', '.join(database.SECONDS)} FROM trials "
+            f"state, identity, error, {parts} FROM trials "
             "JOIN conditions c USING (condition) LEFT JOIN seconds USING (identity) "
             "ORDER BY position, seed"
         )
@@ -248,11 +237,7 @@ class Store:
             last = (row[error] or "").rstrip().rpartition("\n")[2] or None
             measured = (values.get((row[identity], name)) for name in names)
             rows.append((*row[:error], last, *row[error + 1 :], *measured))
-        return [
-            *columns[: -len(database.SECONDS)],
-            *(f"seconds.{part}" for part in database.SECONDS),
-            *names,
-        ], rows
+        return [*columns, *names], rows
 
     def mean_seconds(self) -> dict[str, float]:
         """Return by condition how long its finished trials took on average [s]."""
@@ -285,7 +270,7 @@ class Store:
         files
             Contents of files that are kept beside the database, by name.
         damage
-            What is wrong with its database, see `database.damage`.
+            What is wrong with its database, see `DamageError`.
 
         Raises
         ------
@@ -468,7 +453,13 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
     tuple
         How many trials run at a time, and by identity how long each has been running so far [s].
     """
-    if not _locked(directory / LOCK):
+    try:
+        with open(directory / LOCK) as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        return None
+    except BlockingIOError:
+        pass  # somebody writes there
+    except OSError:
         return None
     try:
         mark, now = json.loads((directory / MARK).read_text()), time.time()
@@ -476,14 +467,3 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
         return mark["processes"], seconds
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return 1, {}  # begins or ends just now
-
-
-def _locked(path: Path) -> bool:
-    try:
-        with open(path) as lock:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    return False

@@ -15,8 +15,7 @@ from ..errors import SpecError, show
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import aliases, dumps, flat, named
-from ..store import database
-from ..store.database import DATABASE, SPEC_FILE, Noted
+from ..store.database import DATABASE, SPEC_FILE, DamageError, NoStudyError, Noted
 from ..store.store import Store, locked
 from .trial import AS_IN_SPEC, Trial, column_of, trials_of
 
@@ -146,15 +145,15 @@ def _examine(
     SpecError
         If the directory holds another study, or something that is none.
     """
-    damage, code = database.damage(directory / DATABASE), None
-    if damage is None and database.holds_tables(directory / DATABASE):
+    damage, code = None, None
+    try:
         with Store.open(directory) as store:
-            refusal = _of_study(store, spec, noted, accept_code)
-            code = store.code() if refusal is None else None
-    else:
-        refusal = _of_file(directory, spec, noted, damage)
-    if refusal is not None:
-        raise SpecError(refusal)
+            mismatch, code = _mismatch_of_study(store, spec, noted, accept_code), store.code()
+    except (NoStudyError, DamageError) as error:
+        damage = error.reason
+        mismatch = _mismatch_of_file(directory / SPEC_FILE, spec, noted, damage)
+    if mismatch is not None:
+        raise SpecError(f"{directory}: holds another study: {mismatch}")
     return damage, code
 
 
@@ -167,35 +166,33 @@ def is_copy(path: Path, spec: Spec, noted: Noted) -> bool:
         return False
 
 
-def _of_file(directory: Path, spec: Spec, noted: Noted, damage: str | None) -> str | None:
-    """Return why a spec may not be run where there is no sound database, in one line."""
-    path = directory / SPEC_FILE
+def _mismatch_of_file(path: Path, spec: Spec, noted: Noted, damage: str | None) -> str | None:
+    """Return how a spec differs from that of a file, where there is no sound database."""
     if not path.exists() or is_copy(path, spec, noted):
         return None
     if damage is None:
-        return f"{path}: is in the way of this study's own copy"
+        raise SpecError(f"{path}: is in the way of this study's own copy") from None
     try:
-        mismatch = difference(noted_of(Spec.load(path)), noted)
+        return difference(noted_of(Spec.load(path)), noted)
     except SpecError as error:
-        return (
+        raise SpecError(
             f"{path}: is no spec, and {DATABASE} beside it is damaged: which study this is cannot "
             f"be told ({error})"
-        )
-    return f"{directory}: holds another study: {mismatch}" if mismatch else None
+        ) from None
 
 
-def _of_study(store: Store, spec: Spec, noted: Noted, accept_code: bool) -> str | None:
-    """Return why a spec may not be added to an open study, in one line; None if it may."""
+def _mismatch_of_study(store: Store, spec: Spec, noted: Noted, accept_code: bool) -> str | None:
+    """Return how a spec differs from that of an open study."""
     if not accept_code and (refusal := outdated(store)) is not None:
-        return refusal
+        raise SpecError(refusal)
     mismatch = difference(store.noted(), noted)
     copy = store.directory / SPEC_FILE
     if mismatch is not None and is_copy(copy, spec, noted):
-        return (
+        raise SpecError(
             f"{copy}: is not the spec of the study beside it: {mismatch}; if you did not edit it, "
             f"it is damaged: nested-agents retry {store.directory} goes on by the database"
         )
-    return f"{store.directory}: holds another study: {mismatch}" if mismatch else None
+    return mismatch
 
 
 def difference(old: Noted, new: Noted) -> str | None:
@@ -219,7 +216,8 @@ def _differences(old: Noted, new: Noted) -> Iterator[str]:
             yield f"{name} has changed since"
     for name in SAME:
         yield from _unequal(name, old.spec.get(name, "absent"), new.spec.get(name, "absent"))
-    seeds, more_seeds = _seeds(old), _seeds(new)
+    written = old.spec["seeds"], new.spec["seeds"]
+    seeds, more_seeds = (list(range(s)) if isinstance(s, int) else s for s in written)
     if not set(seeds) <= set(more_seeds):
         yield f"seeds = {show(seeds)} there, {show(more_seeds)} here"
     yield from _unequal("conditions", list(old.conditions), list(new.conditions))
@@ -241,11 +239,6 @@ def _differences(old: Noted, new: Noted) -> Iterator[str]:
 def _unequal(name: str, there: Any, here: Any) -> Iterator[str]:
     if there != here:
         yield f"{name} = {show(there)} there, {show(here)} here"
-
-
-def _seeds(noted: Noted) -> list[int]:
-    seeds = noted.spec["seeds"]
-    return list(range(seeds)) if isinstance(seeds, int) else seeds
 
 
 def _curricula(noted: Noted) -> list[Sequence[Mapping[str, Any]]]:

@@ -186,9 +186,7 @@ def check(
                 if isinstance(error.__cause__, ValueError | None):
                     raise refusal from None
                 failing = failing or refusal
-            except KeyboardInterrupt:
-                raise
-            except BaseException as error:
+            except (Exception, SystemExit) as error:
                 if isinstance(error, Exception) and not place(error):
                     raise  # no code of the user's
                 problem = f"the scenario or topology raises {format_error(error)}{place(error)}"
@@ -227,18 +225,19 @@ def _arrangements(condition: Condition) -> Iterator[Arrangement]:
 
 
 class Stopwatch:
-    """Sums the seconds that the parts of the control loop took."""
+    """Sums the seconds that the parts of the control loop took, and keeps those of decisions."""
 
     def __init__(self) -> None:
         self.seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), 0.0)
+        self.decisions: list[float] = []
 
     def add(self, record: StepRecord) -> None:
         """Take in one step."""
-        spent: Mapping[str, float] = record.transition.info.get("seconds", {})
-        self.seconds["decision"] += record.deciding
-        self.seconds["physics"] += spent.get("physics", 0.0)
-        self.seconds["sensors"] += spent.get("sensors", 0.0)
-        self.seconds["learning"] += record.learning
+        spent = {"decision": record.deciding, "learning": record.learning}
+        spent |= record.transition.info.get("seconds", {})
+        for part in self.seconds:
+            self.seconds[part] += spent.get(part, 0.0)
+        self.decisions.append(record.deciding)
 
 
 EVALUATION_WORLDS = 10**6
@@ -277,12 +276,12 @@ class Session:
         self._own = arrange(trial.settings, trial.seed)
         self.world, self.scenario, self.team = self._own
         self._stages = trial.curriculum  # those that the team has not gone through
-        self.deciding: list[float] = []
-        """Seconds of every decision in training."""
         self._rows: list[EpisodeRow] = []
         self._measures = measures_of(self.world)
         self._recordings: dict[str, Recording] = {}
         self._watch = Stopwatch()
+        self.deciding = self._watch.decisions
+        """Seconds of every decision in training."""
 
     @classmethod
     def compiled(cls, trial: Trial) -> Session:
@@ -306,38 +305,23 @@ class Session:
         return session
 
     def train(
-        self,
-        episodes: int,
-        first: int = 0,
-        *,
-        phase: str = "training",
-        team: Actors | None = None,
-        observe: Observer | None = None,
+        self, episodes: int, first: int = 0, *, phase: str = "training", team: Actors | None = None
     ) -> None:
         """Let the team (or another one, whose time is not counted) explore, learn, be measured.
 
         Before its first episode the team goes through the trial's curriculum. Recorded are, of the
-        trial's own team, the episodes of `Trial.recorded`. Every step is shown to `observe`.
+        trial's own team, the episodes of `Trial.recorded`.
         """
         self._go_through_curriculum()
         is_recorded = isinstance(self.world, RecordedScenario) and len(self.world.recorded) > 0
         kept = self.trial.recorded if team is None and is_recorded else {}
         there = self._own if team is None else self._own._replace(team=team)
-        loop: dict[str, Any] = {
-            "episodes": episodes,
-            "steps": self.trial.steps,
-            "first_episode": first,
-        }
-        if observe is None and not kept and self._at_once(there, phase, **loop):
-            return
-        own: list[Observer] = [self._time] if team is None else []
-        own += [self._record] if kept else []
-        self._run(there, phase, [*own, observe], **loop)
-
-    def _time(self, record: StepRecord) -> None:
-        """Sum up what the parts of a step took."""
-        self._watch.add(record)
-        self.deciding.append(record.deciding)
+        time = self._watch.add if team is None else None
+        record = self._record if kept else None
+        self._run(
+            there, phase, [time, record], at_once=not kept, episodes=episodes,
+            steps=self.trial.steps, first_episode=first,
+        )  # fmt: skip
 
     def _record(self, record: StepRecord) -> None:
         """Record a step if it is of an episode of `Trial.recorded`."""
@@ -379,7 +363,6 @@ class Session:
             self._evaluate(self._own, SAMPLED, None, explore=True)
             rng.state = state
         for name, there in transfer(self._own, trial.settings, trial.evaluations, trial.seed):
-            self._note_measures(there)
             self._evaluate(there, f"{EVALUATION}{name}", (observers or {}).get(name))
             rng.state = state
 
@@ -396,15 +379,11 @@ class Session:
             arrays = self.team.arrays()
             self._recordings[TEAM] = {name: array.copy() for name, array in arrays.items()}
 
-    def _note_measures(self, there: Arrangement) -> None:
-        self._measures = joined((self._measures, measures_of(there.world)))
-
     def _go_through_curriculum(self) -> None:
         """Train team after team in the stages that are left; the trial's own takes over at last."""
         trial, stages, self._stages = self.trial, self._stages, ()
         done = 0
         for stage, there in teach(self._own, trial.settings, stages, trial.seed):
-            self._note_measures(there)
             self._run(
                 there, f"{STAGE}{stage.name}", counted_from=-done, episodes=stage.episodes,
                 steps=trial.steps, first_world=CURRICULUM_WORLDS + done,
@@ -414,14 +393,12 @@ class Session:
     def _evaluate(
         self, there: Arrangement, phase: str, observe: Observer | None, *, explore: bool = False
     ) -> None:
-        loop: dict[str, Any] = {
-            "episodes": self.trial.evaluation,
-            "first_episode": EVALUATION_WORLDS,
-        }
-        loop["steps"] = self.trial.evaluation_steps or self.trial.steps
-        if observe is None and self._at_once(there, phase, **loop, learn=False):
-            return
-        self._run(there, phase, [observe], EVALUATION_WORLDS, **loop, learn=False, explore=explore)
+        trial, first = self.trial, EVALUATION_WORLDS
+        steps = trial.evaluation_steps or trial.steps
+        self._run(
+            there, phase, [observe], first, at_once=observe is None, episodes=trial.evaluation,
+            steps=steps, first_episode=first, learn=False, explore=explore,
+        )  # fmt: skip
 
     def _run(
         self,
@@ -429,13 +406,19 @@ class Session:
         phase: str,
         observers: Sequence[Observer | None] = (),
         counted_from: int = 0,
+        *,
+        at_once: bool = False,
         **loop: Any,
     ) -> None:
         """Run a `control_loop`, show its steps to observers, and keep the row of each episode.
 
-        The number of an episode in its row is counted from `counted_from`.
+        The number of an episode in its row is counted from `counted_from`. If nobody needs to see
+        the steps, whole episodes may be run `at_once`, compiled.
         """
         measures = measures_of(there.world)
+        self._measures = joined((self._measures, measures))
+        if at_once and self._at_once(there, phase, counted_from, **loop):
+            return
         for record in control_loop(there.scenario, there.team, seed=self.trial.seed, **loop):
             if record.step == 0:
                 meter = EpisodeMeter(phase, record.episode - counted_from, measures)
@@ -445,33 +428,23 @@ class Session:
             if record.last:
                 self._rows.append(meter.row())
 
-    def _at_once(
-        self,
-        there: Arrangement,
-        phase: str,
-        *,
-        episodes: int,
-        steps: int,
-        first_episode: int,
-        learn: bool = True,
-    ) -> bool:
+    def _at_once(self, there: Arrangement, phase: str, counted_from: int, **loop: Any) -> bool:
         """Run whole episodes compiled and keep their rows, or return that it cannot be done."""
-        scenario = there.scenario
+        scenario, first, learn = there.scenario, loop["first_episode"], loop.get("learn", True)
         if not hasattr(scenario, "run_episode") or not isinstance(there.team, Team):
             return False
-        for episode in range(first_episode, first_episode + episodes):
+        for episode in range(first, first + loop["episodes"]):
             begin = perf_counter()
             seed = world_seed(self.trial.seed, episode)
-            summary = scenario.run_episode(there.team, seed, episode, steps, learn=learn)
+            summary = scenario.run_episode(there.team, seed, episode, loop["steps"], learn=learn)
             if summary is None:
                 return False
             if learn and there.team is self.team:
                 spent = perf_counter() - begin
                 self._watch.seconds["decision"] += spent
                 self.deciding += [spent / summary.steps] * summary.steps
-            number = episode if learn else episode - first_episode
-            row = EpisodeRow(phase, number, summary.steps, summary.measures, summary.return_)
-            self._rows.append(row)
+            row = phase, episode - counted_from, summary.steps, summary.measures, summary.return_
+            self._rows.append(EpisodeRow(*row))
         return True
 
     def result(

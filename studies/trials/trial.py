@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf, isfinite
+from operator import add
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -44,6 +45,12 @@ class EpisodeRow(NamedTuple):
         """Return it with the measures of these names in place of all; None where it has not one."""
         measured = (self.measures.get(name) for name in names)
         return (self.phase, self.episode, self.steps, *measured, self.return_)
+
+
+GATHER: dict[str, Callable[[float, float], float]] = {
+    "last": lambda _, value: value, "max": max, "sum": add, "mean": add,
+}  # fmt: skip
+"""What is gathered of two values, one after the other; a mean is divided at the end."""
 
 
 class EpisodeMeter:
@@ -81,12 +88,7 @@ class EpisodeMeter:
         self._steps += 1
         for measure in self._measures:
             value, before = _taken(measure, transition), self._values[measure.name]
-            if measure.gathering == "last":
-                self._values[measure.name] = value
-            elif measure.gathering == "max":
-                self._values[measure.name] = max(before, value)
-            else:
-                self._values[measure.name] = before + value
+            self._values[measure.name] = GATHER[measure.gathering](before, value)
         self._return += float(np.mean(transition.reward))
 
     def row(self) -> EpisodeRow:
@@ -97,18 +99,14 @@ class EpisodeMeter:
         FloatingPointError
             If one of them is not finite: the trial has come to nothing, and says so.
         """
-        measured = {m.name: self._gathered(m) for m in self._measures}
+        means = [m.name for m in self._measures if m.gathering == "mean"]
+        measured = self._values | {name: self._values[name] / self._steps for name in means}
         for name, value in {**measured, "return": self._return}.items():
             if not isfinite(value):
                 where = f"{self._phase} episode {self._episode}"
                 raise FloatingPointError(f"{name} = {value} in {where}")
+        measured |= {m.name: bool(measured[m.name]) for m in self._measures if m.is_rate}
         return EpisodeRow(self._phase, self._episode, self._steps, measured, self._return)
-
-    def _gathered(self, measure: Measure) -> float:
-        value = self._values[measure.name]
-        if measure.gathering == "mean":
-            value /= self._steps
-        return bool(value) if measure.is_rate and isfinite(value) else value
 
 
 def _taken(measure: Measure, transition: Transition) -> float:
@@ -217,13 +215,10 @@ class Trial:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Settings of a user's thing are of a class that only its file can make again.
-        content = {
-            **{name: getattr(self, name) for name in ("condition", "seed", *AS_IN_SPEC)},
-            "settings": self.settings.model_dump(),
-            "evaluations": [(name, other.model_dump()) for name, other in self.evaluations],
-            "curriculum": [(s.name, s.episodes, s.scenario.model_dump()) for s in self.curriculum],
-        }
-        return _revived, (self.sources, content)
+        evaluations = [(name, other.model_dump()) for name, other in self.evaluations]
+        curriculum = [(s.name, s.episodes, s.scenario.model_dump()) for s in self.curriculum]
+        plain = {name: getattr(self, name) for name in ("condition", "seed", *AS_IN_SPEC)}
+        return _revived, (self.sources, self.settings.model_dump(), evaluations, curriculum, plain)
 
     @cached_property
     def identity(self) -> str:
@@ -332,19 +327,15 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
     return tuple(trial.with_seed(seed) for seed in spec.seeds for trial in first)
 
 
-def _revived(sources: Sources, content: dict[str, Any]) -> Trial:
+def _revived(sources: Sources, own: Any, evaluations: Any, curriculum: Any, plain: Any) -> Trial:
     """Return a trial that was pickled, its settings made again by its files."""
-
-    def settings(table: dict[str, Any]) -> ConditionSettings:
-        return ConditionSettings.model_validate(table, strict=True)
-
+    made = partial(ConditionSettings.model_validate, strict=True)
     with sources.active():
-        made = {
-            "settings": settings(content["settings"]),
-            "evaluations": tuple((name, settings(s)) for name, s in content["evaluations"]),
-            "curriculum": tuple(
-                Stage(name, episodes, settings({"scenario": s}).scenario)
-                for name, episodes, s in content["curriculum"]
-            ),
-        }
-    return Trial(**{**content, **made}, sources=sources)
+        stages = [(name, n, made({"scenario": table}).scenario) for name, n, table in curriculum]
+        return Trial(
+            settings=made(own),
+            evaluations=tuple((name, made(table)) for name, table in evaluations),
+            curriculum=tuple(Stage(*stage) for stage in stages),
+            sources=sources,
+            **plain,
+        )

@@ -14,7 +14,7 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from platform import python_version
 from queue import Empty, SimpleQueue
@@ -80,14 +80,13 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
     A scenario that calls ``sys.exit``, or raises KeyboardInterrupt, has failed like any other: a
     worker ignores Ctrl-C, so that neither can come from anybody else.
     """
-    begin = time.perf_counter()
+    begin, error, result = time.perf_counter(), None, None
     try:
         with trial.sources.active():
             result = run_trial(trial)
     except BaseException:
         error = storable(traceback.format_exc())
-        return Outcome(trial, error, time.perf_counter() - begin)
-    return Outcome(trial, None, time.perf_counter() - begin, result)
+    return Outcome(trial, error, time.perf_counter() - begin, result)
 
 
 def storable(error: str) -> str:
@@ -197,19 +196,15 @@ def run_trials(
     """
     lost: list[Trial] = []
     with Running(store.directory, workers.processes) as running:
+        again = (_alone(trial, run_trial, workers, running) for trial in lost)
         with closing(workers.arrivals(trials, run_trial, running.begin)) as arriving:
-            for outcome in arriving:
+            for outcome in chain(arriving, again):
                 running.end(outcome.trial.identity)
                 if outcome.lost:
                     lost.append(outcome.trial)
                 else:
                     _keep(store, outcome)
                     yield outcome
-        for trial in lost:
-            outcome = _alone(trial, run_trial, workers, running)
-            running.end(trial.identity)
-            _keep(store, outcome)
-            yield outcome
 
 
 def _alone(trial: Trial, run_trial: RunTrial, workers: Workers, running: Running) -> Outcome:
@@ -218,7 +213,8 @@ def _alone(trial: Trial, run_trial: RunTrial, workers: Workers, running: Running
             (outcome,) = arriving
         if not outcome.lost:
             return outcome
-    return outcome._replace(error=f"its worker died {ATTEMPTS} times: {outcome.error}")
+    error = f"its worker died {ATTEMPTS} times: {outcome.error}"
+    return outcome._replace(error=error, lost=False)
 
 
 def _keep(store: Store, outcome: Outcome) -> None:

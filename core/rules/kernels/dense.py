@@ -238,8 +238,7 @@ def _aggregate(values, tried, probabilities):  # type: ignore[no-untyped-def]
                 out[a] = max(out[a], values[c])
         return out
     joint, size = np.empty(m), 1
-    for c in range(m):
-        joint[c] = 1.0
+    joint[0] = 1.0
     for agent in below:
         n_actions = probabilities.shape[1]
         for c in range(size - 1, -1, -1):

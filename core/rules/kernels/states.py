@@ -294,23 +294,21 @@ def looked_up(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # t
     """Return f of joint-action indices from block tables: every active rule is looked up."""
     own, own_rows, shared, shared_rows, divisor = tables
     n_local = len(own_rows) if len(own_rows) else len(own)
-    # The own block with which a shared one was last met, and the number of that pair.
+    # The own block, from 1, with which a shared one was last met, and the number of that pair.
     n_known = len(shared) if len(shared_rows) else 0
-    known, number = np.empty(n_known, np.int64), np.empty(n_known, np.int64)
-    for row in range(n_known):
-        known[row] = -1
+    known, number = np.zeros(n_known, np.int64), np.empty(n_known, np.int64)
     mine, theirs = np.empty(len(indices), np.int64), np.empty(len(indices), np.int64)
     pair_of, n_pairs = np.empty(len(indices), np.int64), 0
     for c in range(len(indices)):
         local = indices[c] // divisor % n_local
         a = own_rows[local] if len(own_rows) else local
         row = shared_rows[indices[c]] if len(shared_rows) else indices[c]
-        if len(known) and known[row] == a:
+        if len(known) and known[row] == a + 1:
             pair_of[c] = number[row]
             continue
         mine[n_pairs], theirs[n_pairs], pair_of[c] = a, row, n_pairs
         if len(known):
-            known[row], number[row] = a, n_pairs
+            known[row], number[row] = a + 1, n_pairs
         n_pairs += 1
     values, n_own = np.zeros(n_pairs), lay.n_own
     terms = _numbered(len(lay.lengths))

@@ -18,10 +18,8 @@ from ..display import print_wrapped
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from ....core.agents.loop import Agents
     from ....topologies.view import HierarchyView
     from ...cost.cost import Form
-    from ...spec.spec import Spec
 
 
 @click.command()
@@ -315,14 +313,7 @@ def list_all() -> int:
 )
 @options.formats("table", "json")
 @options.plot
-def show(
-    topology: str,
-    form: Any,
-    plot: Path | None,
-    per: Agents,
-    actions: int,
-    **sizes: int | None,
-) -> int:
+def show(topology: str, form: Any, plot: Path | None, **team: Any) -> int:
     """Show a topology: edges, order of decision, who sees whom, cost.
 
     SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json,
@@ -333,8 +324,8 @@ def show(
     with refused():
         views = _of_spec(topology)
         if views is None:
-            views = [view(topology, actions=actions, per=per, **sizes)]
-        elif any(sizes.values()) or per != "actuator":
+            views = [view(topology, **team)]
+        elif team["agents"] or team["robots"] or team["per"] != "actuator":
             raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
         for number, shown in enumerate(views, 1):
             if plot is not None:
@@ -349,7 +340,15 @@ def show(
 
 
 def _of_spec(path: str) -> list[HierarchyView] | None:
-    """Return the hierarchies of a study's spec; None if the path is not that of one."""
+    """Return the distinct hierarchies of conditions and evaluations of a study's spec, or None.
+
+    Each is called by the first that has it; None if the path is not that of a spec.
+
+    Raises
+    ------
+    SpecError
+        If one cannot be built; one line.
+    """
     if not path.endswith(".toml") or not Path(path).is_file():
         return None
     try:
@@ -358,22 +357,11 @@ def _of_spec(path: str) -> list[HierarchyView] | None:
         return None  # whoever reads it as a topology says why
     if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
         return None
-    from ...spec.spec import Spec
-
-    return _views(Spec.load(Path(path)))
-
-
-def _views(spec: Spec) -> list[HierarchyView]:
-    """Return the distinct hierarchies of conditions and evaluations, called by the first of each.
-
-    Raises
-    ------
-    SpecError
-        If one cannot be built; one line.
-    """
     from ....core.interface.scenario import groups_of
     from ....topologies.view import HierarchyView
+    from ...spec.spec import Spec
 
+    spec = Spec.load(Path(path))
     distinct: dict[tuple[object, ...], HierarchyView] = {}
     with spec.sources.active():
         for condition in spec.conditions():

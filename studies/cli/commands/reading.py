@@ -12,7 +12,7 @@ from ...store import durable
 from ...store.store import Store
 from .. import options
 from ..display import print_study, print_table
-from ..loading import describe, load_results, opened, progress, trust_files, warnings
+from ..loading import describe, load_results, opened, progress, trust_files
 
 
 @click.command()
@@ -26,8 +26,6 @@ def status(directory: Path) -> int:
         now = progress(store)
         print(*describe(store, now), sep="\n")
         failed = store.failed()
-    for line in warnings(now):
-        print(line)
     for condition, seed, error in failed:
         print(f"\n{condition}, seed {seed} failed:\n{error.rstrip()}")
     if failed:
@@ -172,41 +170,10 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool) -> i
     DIR is where the study is kept. JSON is one small file of spec, seeds and rounded measures, fit
     to be published with a paper; `nested-agents table` reads it.
     """
+    folder = directory / "export" if out is None else out
     with opened(directory) as store:
-        folder = directory / "export" if out is None else out
-        for path in write_files(store, folder, form, overwrite=overwrite):
-            print(path)
-    return 0
-
-
-def write_files(store: Store, folder: Path, form: Files, *, overwrite: bool = False) -> list[Path]:
-    """Write what a study holds; a file is there whole or not at all.
-
-    Parameters
-    ----------
-    store
-        An open study.
-    folder
-        Where to write ``episodes`` and ``trials``, or with JSON ``results``; made if it does not
-        exist.
-    form
-        Of the files, and their suffix; for JSON and marl-eval, ``marl-eval.json``, see
-        `nested_agents.studies.results.published`.
-    overwrite
-        Whether files of these names may be replaced.
-
-    Returns
-    -------
-    list of Path
-        The files.
-
-    Raises
-    ------
-    SpecError
-        If a file is in the way, or the database is damaged.
-    """
-    store.verify()
-    paths = {folder / name: text for name, text in _texts(store, form).items()}
+        store.verify()
+        paths = {folder / name: text for name, text in _texts(store, form).items()}
     there = [path for path in paths if path.exists()]
     # Of an export that was killed the first file is left, and is what would be written.
     is_rest = len(there) < len(paths) and all(
@@ -220,11 +187,12 @@ def write_files(store: Store, folder: Path, form: Files, *, overwrite: bool = Fa
         raise SpecError(f"--out {folder}: {error.strerror or error}") from None
     for path, text in paths.items():
         durable.write(path, text.encode())
-    return list(paths)
+    print(*paths, sep="\n")
+    return 0
 
 
 def _texts(store: Store, form: Files) -> dict[str, str]:
-    """Return the content of each file by its name."""
+    """Return the content of each file by its name, see `results.published`."""
     from ...catalogue.study import published_part
     from ...presentation.tables import in_csv
     from ...results import published

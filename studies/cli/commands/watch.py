@@ -17,7 +17,7 @@ from rich.text import Text
 from ...results.results import NOTHING, Results, read
 from ...store.store import Store
 from .. import options
-from ..loading import Progress, describe, progress, warnings
+from ..loading import Progress, describe, progress
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 CURVE = 24
@@ -49,7 +49,7 @@ def frame(directory: Path) -> tuple[Group, bool]:
     """
     with Store.open(directory) as store:
         now = progress(store)
-        lines = Text("\n".join([*describe(store, now), *warnings(now)]))
+        lines = Text("\n".join(describe(store, now)))
         results = NOTHING() if now.damaged else read(store)
         failed = store.failed()
         planned = Counter(trial.condition for trial in store.planned())

@@ -34,14 +34,14 @@ def heard(made: Messages, agent: int, decided: np.ndarray = DECIDED) -> dict[int
 def test_all_that_is_told_arrives_unless_something_fails() -> None:
     assert heard(messages(), 3) == {0: 3, 1: 1, 2: 0}
     assert heard(messages(), 0) == {}
-    assert not messages().fail
+    assert not messages().failures
 
 
 def test_those_who_are_silent_are_not_heard_and_act_on() -> None:
     made = messages(LostMessages(agents=["a", "c"]))
     assert heard(made, 3) == {1: 1}
     assert not made.is_absent(0)
-    assert made.fail
+    assert made.failures
 
 
 def test_messages_are_lost_as_often_as_they_should_be() -> None:

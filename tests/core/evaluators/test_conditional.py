@@ -29,7 +29,7 @@ def test_values_are_means_by_what_was_seen_with_the_same_own_action():
             for j in range(3):
                 counts[i, joint[i], j, joint[j]] += 1.0
     assert (team.given == counts).all()
-    given = team._given_by(0)
+    given = counts[0] / counts[0].sum(axis=2, keepdims=True)
     captured = {}
 
     def values(deliberation):

@@ -18,7 +18,7 @@ from nested_agents.studies.cost.cost import (
     CostRow,
     StepCost,
     agents_below,
-    cost_rows,
+    cost_table,
     measure,
     messages,
     step_formula,
@@ -158,7 +158,8 @@ def test_ways_to_decide_count_as_their_formula(way: str, n: int) -> None:
 
 def test_ways_to_decide_are_added_up_as_the_hierarchies() -> None:
     """Of six agents the first tries 4 + 3 * 12 starts and 6 * 4 around them, each its own four."""
-    rows = {row.topology: row for row in cost_rows([*WAYS, "independent"], [6], Problem(7, 4, 5))}
+    table = cost_table([*WAYS, "independent"], [6], Problem(7, 4, 5))
+    rows = {row.topology: row for row in table.rows}
     exact = {name: row.nested_exact for name, row in rows.items()}
     assert exact["best-response"] == 35 * (68**2 + 5 * 4**2)
     assert exact["fitted-q"] == exact["independent"] == 35 * 6 * 4**2
@@ -285,7 +286,7 @@ def test_the_legend_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     drawn = []
     monkeypatch.setattr(figures, "write", lambda figure, path: drawn.append(figure))
     labels = {"chain": "chain", "evenodd.py:even_odd": "star"}
-    rows = [row for t in labels.values() for row in cost_rows([t], [4, 8], Problem())]
+    rows = [row for t in labels.values() for row in cost_table([t], [4, 8], Problem()).rows]
     names = {text: label for label, text in labels.items()}
     draw([replace(row, topology=names[row.topology]) for row in rows], tmp_path / "cost.svg")
     (figure,) = drawn
@@ -303,6 +304,6 @@ def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
     assert "All counts equal the formulas in 4 of 4 rows." in out
     assert max(map(len, out.splitlines())) <= 80
     assert "<svg" in figure.read_text()
-    rows = list(cost_rows(["chain"], [2], Problem(), repeats=1))
+    rows = cost_table(["chain"], [2], Problem(), measured=True).rows
     (record,) = json.loads(written(rows, "json"))
     assert record["joint_actions_per_step"] == record["joint_actions_formula_per_step"] == 20
