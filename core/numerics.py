@@ -305,10 +305,8 @@ def stamp(path: Path) -> str:
         new = _imported(left.pop()) - paths
         paths |= new
         left += new
-    texts = hashlib.sha256()
-    for each in sorted(paths):
-        texts.update(_text(each).encode() + b"\0")
-    return texts.hexdigest()
+    texts = "".join(_text(each) + "\0" for each in sorted(paths))
+    return hashlib.sha256(texts.encode()).hexdigest()
 
 
 @cache

@@ -78,10 +78,9 @@ class LineUp:
 
     def __init__(self, settings: LineUpSettings) -> None:
         self.settings = settings
-        n_agents = settings.carts
-        self.agents = tuple(f"cart{i + 1}" for i in range(n_agents))
-        self.groups = tuple((i,) for i in range(n_agents))
-        self.roles = ("cart",) * n_agents
+        self.agents = tuple(f"cart{i + 1}" for i in range(settings.carts))
+        self.groups = tuple((i,) for i in range(settings.carts))
+        self.roles = ("cart",) * settings.carts
         self.action_set = ActionSet()
         self.state_space = StateSpace("line-up", (DISTANCE, LEAD), n_own=1)
         LineUp.reset(self, 0)
@@ -100,16 +99,13 @@ class LineUp:
         self._commands = self._commanded(joint_action)
         self._places, self._speeds = advance(self._places, self._speeds, self._commands)
         arrived = bool((np.abs(self._places) < TOLERANCE).all())
-        return Transition(
-            self._states(), float(reward(self._places)), arrived, False, self.measure()
-        )
+        paid = float(reward(self._places))
+        return Transition(self._states(), paid, arrived, False, self.measure())
 
     def predict(self) -> LineUpPrediction:
         """Predict from the present state."""
-        n, n_actions = len(self.agents), len(self.action_set)
-        every = np.tile(np.arange(n_actions)[:, None], n)
-        commands = self._commanded(every)
-        places, _ = advance(self._places, self._speeds, commands)
+        every = np.tile(np.arange(len(self.action_set))[:, None], len(self.agents))
+        places, _ = advance(self._places, self._speeds, self._commanded(every))
         return LineUpPrediction(places.T.copy())
 
     def measure(self) -> Mapping[str, Any]:

@@ -90,20 +90,17 @@ def guarded(view: Any) -> Any:
 
 
 def sensed(
-    things: Sequence[StateVariable],
-    view: Any,
-    bodies: Sequence[int],
-    given: FloatArray | None = None,
+    parts: Sequence[StateVariable], view: Any, bodies: Sequence[int], done: FloatArray | None = None
 ) -> FloatArray:
     """Return state variables ``(len(bodies), m, variables)`` of bodies.
 
     By the functions alone, and those that are the same for all bodies are computed once. Or, if
-    compiled ones are `given`, with those of users filled in: then every body is asked, so that a
+    compiled ones are `done`, with those of users filled in: then every body is asked, so that a
     check of the scenario finds what is wrongly called common.
     """
-    once, shape = given is None, (len(bodies), view.n_situations, len(things))
-    values = np.empty(shape) if given is None else given
-    wanted = [(c, thing) for c, thing in enumerate(things) if once or not thing.trusted]
+    once, shape = done is None, (len(bodies), view.n_situations, len(parts))
+    values = np.empty(shape) if done is None else done
+    wanted = [(c, thing) for c, thing in enumerate(parts) if once or not thing.trusted]
     safe = view if all(thing.trusted for _, thing in wanted) else guarded(view)
     for column, thing in wanted:
         for k, body in enumerate(bodies):

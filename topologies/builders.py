@@ -278,10 +278,9 @@ def coordination_graph(
             raise ValueError("shape = 'scenario': the scenario has no interactions of its agents")
         graph = nx.relabel_nodes(graphs.shaped(shape, len(agents)), dict(enumerate(agents)))
     else:
-        pairs = [(min(a, b), max(a, b)) for a, b in edges]
-        Hierarchy(agents, [], pairs)  # raises and names what is wrong
+        Hierarchy(agents, [], edges)  # raises and names what is wrong
         graph = nx.empty_graph(agents)
-        graph.add_edges_from(pairs)
+        graph.add_edges_from(edges)
     return graph if others is None else graphs.others(graph, others)
 
 

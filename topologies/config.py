@@ -49,6 +49,10 @@ BUILT = (
 """Topologies whose builder is called so."""
 
 
+Oriented = Literal["listed", "reversed"] | tuple[str, ...]
+"""In which order agents decide: that of the scenario, its reverse, or all names."""
+
+
 class TopologySettings(Settings):
     """What the settings of all topologies share."""
 
@@ -60,9 +64,7 @@ class TopologySettings(Settings):
     considers: Annotated[Considers, unwritten("descendants")] = "descendants"
     """Whose actions an agent tries beside its own: those of all below it, of its direct
     subordinates, or of nobody; or a list of bodies, as above, in which those below it are."""
-    oriented: Annotated[Literal["listed", "reversed"] | tuple[str, ...] | None, unwritten(None)] = (
-        None
-    )
+    oriented: Annotated[Oriented | None, unwritten(None)] = None
     """In which order those decide who are joined by undirected edges: in the agents' own, in its
     reverse, or as listed by name; each is above those of its neighbours that come later. None: they
     decide at once."""
@@ -140,8 +142,6 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
     try:
         if kind in TOPOLOGIES.built_in:
             return TOPOLOGIES.parsed(kind, **(_arguments(kind, argument) if colon else {}))
-        if kind in TOPOLOGIES.moved:
-            raise ValueError(TOPOLOGIES.moved[kind])
         if sources.is_file(text):
             return TOPOLOGIES.parsed("file", path=text)
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
@@ -153,8 +153,8 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
         is_there = folder is not None and (folder / text).exists()
         suffixes = f"suffix must be {', '.join(sources.GRAPHS)} or .py:NAME"
         raise ValueError(f"topology {text!r}: {'' if is_there else 'no such file; '}{suffixes}")
-    known = closest(kind, TOPOLOGIES.names())
-    raise ValueError(f"topology {text!r}: {known}, or a file")
+    unknown = f"{closest(kind, TOPOLOGIES.names())}, or a file"
+    raise ValueError(f"topology {text!r}: {TOPOLOGIES.moved.get(kind, unknown)}")
 
 
 def _of_table(table: Mapping[str, Any]) -> TopologySettings:

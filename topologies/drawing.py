@@ -83,8 +83,7 @@ def draw(
         notes = ["lines: neighbours, who decide at the same time"]
     elif bodies and max(map(len, bodies)) > 1:
         notes.append("colours: bodies")
-    if implied:
-        notes.append("grey arrows: implied by the others")
+    notes += ["grey arrows: implied by the others"] * bool(implied)
     styles = {_style(hierarchy, edge)[1] for edge in hierarchy.edges} - {""}
     notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
     middle: dict[str, Any] = {"ha": "center", "va": "center"}

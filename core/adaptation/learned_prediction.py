@@ -35,8 +35,7 @@ class LearnedPrediction:
         if predictor.digits.size:
             groups, digits = np.array(predictor.groups), predictor.digits
             places = a ** np.arange(digits.shape[1])[::-1]
-            keys = self._level[groups[:, None], digits[None]] @ places
-            self.alike = first_alike(keys)
+            self.alike = first_alike(self._level[groups[:, None], digits[None]] @ places)
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return own variables ``(n, m, n_own)`` and shared ones ``(G, m, d - n_own)``."""

@@ -107,12 +107,10 @@ class SelfModel:
 
         Those of its filters, times how much larger their innovations are than they expect.
         """
-        larger = (
-            (unit * np.sqrt(np.maximum(1.0, ratio)))[:, None]
-            for unit, ratio in zip(self._units, self._ratios, strict=True)
-        )
+        larger = (np.sqrt(np.maximum(1.0, ratio)) for ratio in self._ratios)
+        scales = (scale[:, None] for scale in map(np.multiply, self._units, larger))
         own = (np.sqrt(np.diagonal(c, axis1=1, axis2=2)) for c in self._covariances)
-        return tuple(map(np.multiply, larger, own))
+        return tuple(map(np.multiply, scales, own))
 
     @classmethod
     def of(cls, settings: SelfModelSettings, scenario: Scenario) -> SelfModel | None:

@@ -21,9 +21,6 @@ from ..learners.learner import Learner, LearnerSettings
 from ..numerics import FloatArray, IntArray, greatest, set_words, words_of
 from .failures import MessageFailure, Messages
 
-DECIDED = ("rule", "teammates", "value_of", "unseen", "plan")
-"""What of the settings of decisions an evaluator is told."""
-
 
 class Team:
     """Agents in a hierarchy, one rule base each; consequent weights are an agent's own or a role's.
@@ -117,7 +114,7 @@ class Team:
                 self.rules, hierarchy, n_actions, groups_of(scenario),
                 discount=settings.discount,
                 handed_down=hierarchy.told == "ancestors" and not failures,
-                **{name: getattr(decision, name) for name in DECIDED},
+                **{name: value for name, value in decision if name != "evaluator"},
             )  # fmt: skip
             own: Any = self.learner
             self.evaluator = own if self._values_actions else decision.evaluator.build(problem)

@@ -192,20 +192,15 @@ class CrossEntropy(Aggregation):
         shape = s.horizon, len(self.hierarchy), self.n_actions
         probabilities = np.full(shape, 1.0 / self.n_actions)
         n_elite = max(1, round(s.elite * s.samples))
-        best: IntArray | None = None
+        elite: IntArray = np.zeros((0, *shape[:2]), dtype=np.int64)
         for _ in range(s.iterations):
-            ladder = probabilities.cumsum(axis=2)[:, :, :-1]
-            draws = rng.random((s.samples, *shape[:2], 1))
-            plans = (draws >= ladder).sum(axis=3)
-            if best is not None:
-                plans[0] = best
+            plans = self.drawn(probabilities, s.samples, rng)
+            plans[: len(elite[:1])] = elite[:1]  # the best so far
             worths = self._worths(deliberation.agent, prediction, plans)
             elite = plans[np.argsort(-worths, kind="stable")[:n_elite]]
-            best = elite[0]
             seen = (elite[..., None] == np.arange(self.n_actions)).mean(axis=0)
             probabilities = s.smoothing / self.n_actions + (1.0 - s.smoothing) * seen
-        assert best is not None
-        return best[0]
+        return elite[0, 0]
 
     def _worths(self, agent: int, prediction: Any, plans: IntArray) -> FloatArray:
         """Return what plans ``(samples, horizon, n)`` are paid, predicted once where they agree."""

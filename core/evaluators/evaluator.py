@@ -273,13 +273,12 @@ class Aggregation:
         summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
         return Pooled((theta, *summed), agents, bodies, np.append(firsts, len(agents)))
 
-    def mean(self, pooled: Pooled, prediction: Prediction, joint_actions: IntArray) -> FloatArray:
+    def mean(self, pooled: Pooled, prediction: Prediction, joint: IntArray) -> FloatArray:
         """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""
-        groups, rules = self.problem.groups, self.rules
-        own, shared = states_by_group(prediction, joint_actions, groups, rules.n_own)
+        own, shared = states_by_group(prediction, joint, self.problem.groups, self.rules.n_own)
         if len(pooled.bodies) < len(shared):
             shared = shared[pooled.bodies]
-        return rules.total(pooled, own, shared) / len(pooled.agents)
+        return self.rules.total(pooled, own, shared) / len(pooled.agents)
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
@@ -288,6 +287,11 @@ class Aggregation:
         joint[:, agent] = np.repeat(np.arange(a), len(tried))
         joint[:, list(self.hierarchy.below(agent))] = np.tile(tried, (a, 1))
         return self.worth(deliberation, joint).reshape(a, -1)
+
+    def drawn(self, chances: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:
+        """Return actions ``(samples, ...)`` drawn by their probabilities ``(..., A)``."""
+        ladder = chances.cumsum(axis=-1)[..., :-1]
+        return (rng.random((samples, *ladder.shape[:-1], 1)) >= ladder).sum(axis=-1)
 
     def combine(self, rewards: Predicted, values: Predicted) -> FloatArray:
         """Return what the decision rule makes of rewards and values; it predicts what it needs."""
@@ -453,9 +457,7 @@ class Sampling(Aggregation):
             if empirical:
                 probabilities = probabilities_of(frequencies, below)
         elif empirical:
-            ladder = frequencies[list(below)].cumsum(axis=1)[:, :-1]
-            draws = rng.random((self.samples, len(below), 1))
-            tried = (draws >= ladder).sum(axis=2)
+            tried = self.drawn(frequencies[list(below)], self.samples, rng)
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
         return self.aggregate(deliberation, tried, probabilities)

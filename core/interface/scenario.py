@@ -204,8 +204,7 @@ def can_draw(scenario: Scenario) -> bool:
 
 def groups_of(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
     """Return the agents by body, consecutive; of a scenario without ``groups``, each alone."""
-    single = tuple((i,) for i in range(len(scenario.agents)))
-    return getattr(scenario, "groups", single)
+    return getattr(scenario, "groups", tuple((i,) for i in range(len(scenario.agents))))
 
 
 def roles_of(scenario: Scenario) -> tuple[str, ...]:

@@ -119,6 +119,8 @@ class BatchTD:
         # By row, active rules and strengths of the after-states so far regressed on.
         self._active: list[tuple[IntArray, FloatArray]] = []
         self._regressed = 0
+        # By row, the ridge and the sum of phi phi' over so many of these.
+        self._summed: dict[int, tuple[FloatArray, int]] = {}
 
     def begin_episode(self) -> None:
         """Note that the first after-state follows none, even if the last episode was given up."""
@@ -172,8 +174,12 @@ class BatchTD:
             ``(N,)`` 1 for after-states of which it is known what followed, 0 for others.
         """
         active, strengths = self._active[row]
-        gram = self.settings.ridge * np.eye(self.rules.n_rules)
-        add_gram(gram, active, strengths, known)
+        k = self.rules.n_rules
+        gram, begin = self._summed.get(row, (self.settings.ridge * np.eye(k), 0))
+        # The last is added once it is known what followed.
+        end = len(known) if known[-1] else len(known) - len(self.members[row])
+        add_gram(gram, active[begin:end], strengths[begin:end], known[begin:end])
+        self._summed[row] = gram, end
         return known, lambda theta: row_values(theta, active, strengths), solver(gram)
 
     def _extend(self) -> None:
@@ -215,14 +221,13 @@ class BatchTD:
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""
         n, d = self._n_agents, len(self.rules.partitions)
+        held = [len(earlier.states) for earlier in self._earlier]
         return {
             "theta": self.theta,
             "states": np.array(self._states).reshape(-1, n, d),
             "rewards": np.array(self._rewards).reshape(-1, n),
             "follower": np.array(self._follower, dtype=np.int64),
-            "earlier_rows": np.repeat(
-                np.arange(len(self._earlier)), [len(earlier.states) for earlier in self._earlier]
-            ),
+            "earlier_rows": np.repeat(np.arange(len(held)), held),
             **{
                 f"earlier_{name}": np.concatenate([getattr(e, name) for e in self._earlier])
                 for name in Earlier._fields
@@ -242,7 +247,7 @@ class BatchTD:
             Earlier(*(arrays[f"earlier_{name}"][rows == row] for name in Earlier._fields))
             for row in range(len(self.theta))
         ]
-        self._active, self._regressed = [], 0
+        self._active, self._regressed, self._summed = [], 0, {}
 
     def continue_from(self, former: BatchTD, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""

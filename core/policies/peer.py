@@ -95,10 +95,8 @@ class Inputs:
         self._firsts = [group[0] for group in groups_of(scenario)]
         n = len(scenario.agents)
         self._names = np.eye(n) if numbered else np.zeros((n, 0))
-        of_own = int(self._own.sum())
-        of_shared = len(self._columns) - of_own
         self.n_own = len(self._columns) + self._names.shape[1]
-        self.n_joint = n * of_own + len(self._firsts) * of_shared
+        self.n_joint = int(n * self._own.sum() + len(self._firsts) * (~self._own).sum())
 
     def each(self, states: FloatArray) -> FloatArray:
         """Return the inputs ``(n, n_own)`` of every agent: its state, and which one it is."""

@@ -186,9 +186,7 @@ class RuleBase:
         ValueError
             If the states have another shape.
         """
-        self._check_states(states)
-        strengths = [p.strengths(states[:, j]) for j, p in enumerate(self.partitions)]
-        parts = []
+        strengths, parts = self._strengths(states), []
         for term in self.terms:
             product = np.ones((len(states), 1))
             for j in term:
@@ -250,10 +248,7 @@ class RuleBase:
         ValueError
             If the states have another shape.
         """
-        self._check_states(states)
-        squares = [
-            (p.strengths(states[:, j]) ** 2).sum(axis=1) for j, p in enumerate(self.partitions)
-        ]
+        squares = [(strengths**2).sum(axis=1) for strengths in self._strengths(states)]
         return np.sum([np.prod([squares[j] for j in term], axis=0) for term in self.terms], axis=0)
 
     def active(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -320,6 +315,11 @@ class RuleBase:
         """
         tables = blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor
         return self._enumerate(theta, tables, tried, joint_action, probabilities, self.layout)
+
+    def _strengths(self, states: FloatArray) -> list[FloatArray]:
+        """Return by variable the firing strengths of states ``(m, d)``."""
+        self._check_states(states)
+        return [p.strengths(states[:, j]) for j, p in enumerate(self.partitions)]
 
     def _check_states(self, states: FloatArray, sets: str = "m") -> None:
         d = len(self.partitions)

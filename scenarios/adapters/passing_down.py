@@ -15,10 +15,11 @@ which is all that came between.
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
-from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from gymnasium.spaces import Box, Discrete, MultiDiscrete, Tuple
+from gymnasium.spaces.utils import flatten_space
 from pettingzoo import ParallelEnv
 from pettingzoo.utils import AgentSelector
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
@@ -67,8 +68,7 @@ class PassingDownEnv(parallel_to_aec_wrapper):
 
     def __init__(self, env: ParallelEnv[str, Any, Any], hierarchy: Hierarchy | None = None) -> None:
         names = list(env.possible_agents)
-        if hierarchy is None:
-            hierarchy = Hierarchy(names, pairwise(names))
+        hierarchy = hierarchy or Hierarchy(names, pairwise(names))
         if set(hierarchy.agents) != set(names):
             raise ValueError(
                 f"hierarchy: agents {', '.join(hierarchy.agents)}, those of the environment are "
@@ -76,11 +76,9 @@ class PassingDownEnv(parallel_to_aec_wrapper):
             )
         super().__init__(env)
         self.hierarchy = hierarchy
-        self._order = [hierarchy.agents[i] for i in hierarchy.order]
-        self._above = {
-            name: {hierarchy.agents[j] for j in hierarchy.above(i)}
-            for i, name in enumerate(hierarchy.agents)
-        }
+        team = hierarchy.agents
+        self._order = [team[i] for i in hierarchy.order]
+        self._above = {name: {team[j] for j in hierarchy.above(i)} for i, name in enumerate(team)}
         self._choices = {name: _choices(name, env.action_space(name)) for name in names}
         self._spaces = {name: self._space(name) for name in names}
 
@@ -89,11 +87,8 @@ class PassingDownEnv(parallel_to_aec_wrapper):
         if not isinstance(own, Box) or len(own.shape) != 1:
             raise ValueError(f"observations of {name!r}: {own}, allowed a Box of one dimension")
         passed = sum(int(choices.sum()) for choices in self._choices.values())
-        low, high = (
-            np.append(bound, np.full(passed, end)).astype(own.dtype)
-            for bound, end in ((own.low, 0.0), (own.high, 1.0))
-        )
-        return Box(low, high, dtype=own.dtype)
+        both = Tuple((own, Box(0, 1, (passed,), own.dtype)))
+        return cast(Box, flatten_space(both))
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an agent's observations."""

@@ -75,8 +75,6 @@ class ParallelSimulator:
         self.players = tuple(env.possible_agents)
         self.observation_spaces = {p: env.observation_space(p) for p in self.players}
         self.action_spaces = {p: env.action_space(p) for p in self.players}
-        self._observed: dict[str, Any] = {}
-        self._terminated: dict[str, bool] = {}
 
     def reset(self, seed: int) -> Mapping[str, Any]:
         """Start an episode; return what is observed."""

@@ -141,8 +141,8 @@ def _warnings(settings: Any) -> Iterator[str]:
     yield from _length("infrared.reach", settings.infrared.reach, LARGEST_REACH)
     yield from _length("tolerance", settings.tolerance, LARGEST_BOX)
     if settings.tolerance < NEAREST_GOAL:
-        problem = f"{settings.tolerance:g} m: hardly any episode will reach the goal"
-        yield f"scenario.tolerance = {problem}"
+        tolerance = f"{settings.tolerance:g} m"
+        yield f"scenario.tolerance = {tolerance}: hardly any episode will reach the goal"
     if settings.orientation_tolerance is not None and settings.orientation_tolerance > pi:
         angle = settings.orientation_tolerance
         yield _suggest_unit("orientation_tolerance", angle, "rad", "degrees", pi / 180.0)
@@ -155,8 +155,9 @@ def _length(key: str, value: float, most: float) -> Iterator[str]:
 
 
 def _suggest_unit(key: str, value: float, unit: str, other: str, factor: float) -> str:
-    problem = f"{value:g} {unit}: perhaps meant in {other}, {value * factor:.3g} {unit}"
-    return f"scenario.{key} = {problem}"
+    return (
+        f"scenario.{key} = {value:g} {unit}: perhaps meant in {other}, {value * factor:.3g} {unit}"
+    )
 
 
 CONTROLS = ("frozen", "random", "planner")

@@ -58,10 +58,8 @@ class Seat:
         self.places: IntArray = every[self.wheels] if by_wheel else np.concatenate(parts)
         low, high = np.moveaxis(space.bounds[self.places % d].astype(np.float32), -1, 0)
         self.observation_space = Box(low, high, dtype=np.float32)
-        actions = len(scenario.action_set)
-        self.action_space = (
-            Discrete(actions) if len(self.wheels) == 1 else MultiDiscrete([actions] * len(wheels))
-        )
+        actions, n = len(scenario.action_set), len(self.wheels)
+        self.action_space = Discrete(actions) if n == 1 else MultiDiscrete([actions] * n)
 
     def observe(self, states: FloatArray) -> FloatArray:
         """Return the observation in the states ``(n, d)`` of all wheels."""
@@ -232,9 +230,8 @@ class WheelsEnv(Game, ParallelEnv):
         transition, truncated = self.advance(joint)
         observations, infos = self._observe(transition.states, transition.info)
         rewards = {name: self.seats[name].paid(transition.reward) for name in self.agents}
-        ends, breaks = (
-            dict.fromkeys(self.agents, value) for value in (transition.terminated, truncated)
-        )
+        ends = dict.fromkeys(self.agents, transition.terminated)
+        breaks = dict.fromkeys(self.agents, truncated)
         if transition.terminated or truncated:
             self.agents = []
         return observations, rewards, ends, breaks, infos

@@ -114,13 +114,12 @@ class Drivers:
         near = np.hypot(*(robots[:, :2] - robots[robot, :2]).T) < within
         near[robot] = False
         others = robots[near, :2]
-        poses, first = robots[robot][None], None
-        cost = np.zeros(1)
-        for _ in range(depth):
+        poses, cost, first = robots[robot][None], np.zeros(1), np.zeros(1, dtype=np.int64)
+        for level in range(depth):
             after, twists = self.next(now)
             row, option = np.nonzero(_distinct(after))
             poses, cost = poses[row], cost[row]
-            first = option if first is None else first[row]
+            first = first[row] if level else option
             now, twists = after[row, option], twists[row, option]
             for _ in range(2):
                 poses = moved(poses, twists, self.seconds / 2)
@@ -133,7 +132,6 @@ class Drivers:
                 turn = np.abs(wrap(poses[:, 2] - target[2]))
                 left = path + 0.06 * turn * np.exp(-path / 0.05)
                 cost = cost + 0.1 * left
-        assert first is not None
         return int(first[(cost + left).argmin()])
 
 

@@ -18,9 +18,9 @@ from ...core.interface.scenario import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.numerics import FloatArray, IntArray, stream_of
 from .config import BoxPushingSettings
-from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
+from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.settings import BeliefSettings
 from .states.relational import View
 from .states.state_spaces import state_space_for
@@ -90,16 +90,12 @@ class BoxPushing:
         similar = settings.scaling == "similar"
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
         robots = [self.robot] * settings.robots
-        wheels = len(self.robot.wheels)
-        every = np.arange(settings.robots * wheels).reshape(-1, wheels)
+        names, numbers = self.robot.wheel_names, range(settings.robots)
+        self.agents = tuple(f"robot{r + 1}.{name}" for r in numbers for name in names)
+        self.roles = names * settings.robots
+        every = np.arange(len(self.agents)).reshape(-1, len(names))
         self.groups = tuple(map(tuple, every.tolist()))
-        self._body = np.repeat(np.arange(settings.robots), wheels)
-        self.agents = tuple(
-            f"robot{r + 1}.{name}"
-            for r in range(settings.robots)
-            for name in self.robot.wheel_names
-        )
-        self.roles = self.robot.wheel_names * settings.robots
+        self._body = np.repeat(numbers, len(names))
         self.action_set = ActionSet()
         self.world = World(robots, self.box, infrared=settings.infrared)
         self._space = state_space_for(settings.state_space, self.robot.max_speed)
@@ -151,10 +147,8 @@ class BoxPushing:
         Failures are scheduled by the number of the `episode`.
         """
         self._sensing = stream_of(seed, SENSING)
-        rng = np.random.default_rng(seed)
-        robots, box, self._goal = place(
-            self.settings.start, rng, [self.robot] * self.settings.robots, self.box, self._unit
-        )
+        rng, start = np.random.default_rng(seed), self.settings.start
+        robots, box, self._goal = place(start, rng, self.world.robots, self.box, self._unit)
         self.world.place(robots, box)
         self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
@@ -244,7 +238,7 @@ class BoxPushing:
         from .pictures.policy import policy_of
 
         self.reset(0)
-        robots = [self.robot] * self.settings.robots
+        robots = list(self.world.robots)
         return policy_of(team, team.predict(self), self.box, robots, self.settings.start)
 
     def _save(self) -> None:
@@ -282,8 +276,7 @@ class BoxPushing:
         self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
 
     def _distance(self) -> float:
-        ahead = self._goal[:2] - self.world.box_pose[:2]
-        return float(np.hypot(ahead[0], ahead[1]))
+        return float(np.hypot(*(self._goal - self.world.box_pose)[:2]))
 
     def _orientation(self) -> float:
         return float(wrap(self.world.box_pose[2] - self._goal[2]))

@@ -136,11 +136,9 @@ def faults_of_sensing(scenario: Scenario, steps: FloatArray) -> Iterator[str]:
 def met_variables(scenario: Scenario, steps: FloatArray) -> tuple[MetVariable, ...]:
     """Return what was met of every variable, and of the reward, in steps ``(m, 3, n, d + 1)``."""
     before, predicted, after = np.moveaxis(steps, 1, 0)
-    error, persistence = (
-        np.sqrt((apart(scenario, after, guess) ** 2).mean(axis=(0, 1)))
-        for guess in (predicted, before)
-    )
-    numbers = np.stack([after.min(axis=(0, 1)), after.max(axis=(0, 1)), error, persistence], 1)
+    squares = [apart(scenario, after, guess) ** 2 for guess in (predicted, before)]
+    errors = np.sqrt(np.mean(squares, axis=(1, 2)))
+    numbers = np.stack([after.min(axis=(0, 1)), after.max(axis=(0, 1)), *errors], axis=1)
     claims = [(v.name, v.unit, v.low, v.high) for v in scenario.state_space.variables]
     claims.append(("reward", "1", np.nan, np.nan))
     return tuple(MetVariable(*c, *row) for c, row in zip(claims, numbers.tolist(), strict=True))
@@ -380,9 +378,8 @@ def _senses(of: Examination) -> Iterator[str]:
     for seed, episode in product(of.seeds, of.episodes):
         scenario: Any = of.factory()
         if not hasattr(scenario, "with_exact_prediction"):
-            of.unchecked["sensed and predicted"] = (
-                "without with_exact_prediction, predictions may be off; see their errors"
-            )
+            why = "without with_exact_prediction, predictions may be off; see their errors"
+            of.unchecked["sensed and predicted"] = why
             return
         exact, actions = scenario.with_exact_prediction(), of.actions(scenario, seed)
         for fault in faults_of_sensing(exact, predicted_steps(exact, seed, episode, actions)):

@@ -33,8 +33,14 @@ class Examination:
     """Why something could not be checked, by its name; checks write it."""
 
     def actions(self, scenario: Scenario, seed: int) -> IntArray:
-        """Return the actions that are tried in the world of a seed."""
-        return random_actions(scenario, self.steps, seed)
+        """Return joint actions ``(steps, n)`` drawn by a seed, most of them held for some steps."""
+        rng = np.random.default_rng(seed)
+        shape = self.steps, len(scenario.agents)
+        actions = rng.integers(len(scenario.action_set), size=shape)
+        held = rng.random(shape) < 0.7
+        for step in range(1, self.steps):
+            actions[step, held[step]] = actions[step - 1, held[step]]
+        return actions
 
     def play(
         self,
@@ -66,17 +72,6 @@ class Examination:
             yield frame
             if frame["terminated"] or frame["truncated"]:
                 return
-
-
-def random_actions(scenario: Scenario, steps: int, seed: int) -> IntArray:
-    """Return joint actions ``(steps, n)``, most of them held for some steps."""
-    rng = np.random.default_rng(seed)
-    shape = steps, len(scenario.agents)
-    actions = rng.integers(len(scenario.action_set), size=shape)
-    held = rng.random(shape) < 0.7
-    for step in range(1, steps):
-        actions[step, held[step]] = actions[step - 1, held[step]]
-    return actions
 
 
 def opening(scenario: Scenario, seed: int, episode: int) -> Frame:
@@ -140,8 +135,7 @@ def look_ahead(scenario: Scenario) -> None:
     if not hasattr(scenario, "predict"):
         return
     prediction = scenario.predict()
-    some = np.zeros((2, len(scenario.agents)), dtype=np.int64)
-    some[1] = len(scenario.action_set) - 1
+    some = np.repeat([[0], [len(scenario.action_set) - 1]], len(scenario.agents), axis=1)
     for agent in range(len(scenario.agents)):
         prediction.states(agent, some)
     if hasattr(prediction, "rewards"):

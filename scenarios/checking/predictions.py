@@ -105,9 +105,7 @@ def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator)
     count = n_actions**n
     if too_many(scenario):
         return
-    indices: IntArray = np.arange(count)
-    if count > SAMPLED:
-        indices = np.sort(rng.choice(count, SAMPLED, replace=False))
+    indices = np.sort(rng.choice(count, min(count, SAMPLED), replace=False))
     joint_actions = np.stack(np.unravel_index(indices, (n_actions,) * n), axis=-1)
     for group in groups_of(scenario):
         divisor = n_actions ** (n - 1 - group[-1])

@@ -209,12 +209,11 @@ class Failures:
 
     def strike(self, step: int) -> bool:
         """Let begin and end what is due at a step; return whether anything changed."""
-        active = tuple(
+        former = self._active
+        self._active = tuple(
             i for i in self._delays_first if self._settings[i].lasts(self._episode, step)
         )
-        changed = active != self._active
-        self._active = active
-        return changed
+        return self._active != former
 
     def driven(self, commands: FloatArray, periods: int) -> FloatArray:
         """Return the speeds ``(periods, n)`` that the servos hold.

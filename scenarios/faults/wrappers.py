@@ -176,8 +176,6 @@ class _Faulty:
 
     env: Any
     """The environment beneath."""
-    _by_prefix: Callable[[Any, Any], Any]
-    """Returns the action spaces of an environment by prefix, and the actions at rest likewise."""
 
     def __init__(
         self,
@@ -199,7 +197,11 @@ class _Faulty:
                     f"faults[{i}]: no {commands} makes an actuator {fault.kind}; give a "
                     f"mechanism that does, or say what else actions command"
                 )
-        spaces, rests = self._by_prefix(env, rest)
+        # Actions by prefix: those of Gymnasium have none, those of PettingZoo the agent's name.
+        spaces, rests = {"": env.action_space}, {"": rest}
+        if hasattr(env, "possible_agents"):
+            spaces = {agent: env.action_space(agent) for agent in env.possible_agents}
+            rests = rest or {}
         self._parts: dict[str, tuple[ActionScale, slice]] = {}
         names: list[str] = []
         for prefix, space in spaces.items():
@@ -311,10 +313,6 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
         If a fault names no actuator or cannot be expressed, or the actions are of another kind.
     """
 
-    @staticmethod
-    def _by_prefix(env: Any, rest: Any) -> Any:
-        return {"": env.action_space}, {"": rest}
-
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Do what faulty actuators make of an action."""
         self.carried = self._carry({"": action})[""]
@@ -343,10 +341,6 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
     carried
         The last actions that were done, by agent.
     """
-
-    @staticmethod
-    def _by_prefix(env: Any, rest: Any) -> Any:
-        return {agent: env.action_space(agent) for agent in env.possible_agents}, rest or {}
 
     def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
         """Do what faulty actuators make of the agents' actions."""

@@ -25,7 +25,7 @@ from pydantic import Field
 
 from ...core.evaluators import EvaluatorSettings
 from ...core.evaluators.evaluator import Counts, DecisionProblem, Deliberation
-from ...core.numerics import FloatArray, IntArray
+from ...core.numerics import FloatArray
 from .scenario import ChainPrediction
 from .variables import ends_of, jacobian_of
 
@@ -49,17 +49,14 @@ class _Scripted(ABC):
             raise ValueError(
                 f"learner.decision.evaluator: {type(self).__name__} moves a kinematic-chain only"
             )
-        above = np.array(self.problem.hierarchy.above(agent), dtype=np.int64)
+        above = list(self.problem.hierarchy.above(agent))
         turns = np.zeros(len(prediction.angles))
         turns[above] = prediction.turns[above, deliberation.joint_action[above]]
         places = ends_of(prediction.angles + turns, prediction.arm.length)
-        wanted = self._wanted(prediction, agent, above, places)
-        return -np.abs(prediction.turns[agent] - wanted)
+        return -np.abs(prediction.turns[agent] - self._wanted(prediction, agent, places))
 
     @abstractmethod
-    def _wanted(
-        self, prediction: ChainPrediction, agent: int, above: IntArray, places: FloatArray
-    ) -> float:
+    def _wanted(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
         """Return the turn that is wanted of a joint [rad].
 
         `places` are the joints and the tip ``(n + 1, 2)`` once those above have turned.
@@ -77,9 +74,8 @@ class DampedLeastSquares(_Scripted):
 
     settings: Settings
 
-    def _wanted(
-        self, prediction: ChainPrediction, agent: int, above: IntArray, places: FloatArray
-    ) -> float:
+    def _wanted(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
+        above = list(self.problem.hierarchy.above(agent))
         least, most = prediction.turns.min(axis=1), prediction.turns.max(axis=1)
         free = most > least
         free[above] = False
@@ -103,9 +99,7 @@ class CyclicCoordinateDescent(_Scripted):
     class Settings(EvaluatorSettings):
         """The settings of the controller: there is nothing to set."""
 
-    def _wanted(
-        self, prediction: ChainPrediction, agent: int, above: IntArray, places: FloatArray
-    ) -> float:
+    def _wanted(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
         x, y = places[-1] - places[agent]
         ahead, aside = prediction.goal - places[agent]
         return float(np.arctan2(x * aside - y * ahead, x * ahead + y * aside))

@@ -9,7 +9,7 @@ and is *not decided* in between, or by fewer than `LEAST_SEEDS`.
 
 import json
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -133,18 +133,18 @@ def _computed(value: float, note: str = "") -> Measured:
 
 def optimal(results: Results, system: str) -> Measured | None:
     """Measure how often a system ends in the optimum of its worst game."""
-    estimates = {
-        ", ".join(str(v) for k, v in columns.items() if k != "name"): rate(
-            results.success(condition, "evaluation")
-        )
-        for condition, columns in results.columns.items()
-        if columns.get("name") == system and results.has(condition, "evaluation")
-    }
-    if not estimates:
-        return None
-    worst = min(estimates, key=lambda game: float(estimates[game].value))
-    seeds = len(results.seeds(results.conditions[0]))
-    return Measured(estimates[worst], seeds, note=worst)
+    games = []
+    for condition, columns in results.columns.items():
+        if columns.get("name") == system and results.has(condition, "evaluation"):
+            success = results.success(condition, "evaluation")
+            game = ", ".join(str(value) for key, value in columns.items() if key != "name")
+            games.append(Measured(rate(success), len(success), note=game))
+    return _worst(games)
+
+
+def _worst(measured: Iterable[Measured]) -> Measured | None:
+    """Return what is of the least value; None if nothing is measured."""
+    return min(measured, key=lambda m: float(np.nan_to_num(m.estimate.value)), default=None)
 
 
 def gained_by_edges(results: Results, edges: str, less: str) -> Measured | None:
@@ -253,12 +253,8 @@ FAULTS = ("4 wheels, seized", "4 wheels, reversed")
 
 def recovered(results: Results, adapts: str) -> Measured | None:
     """Measure success at the end relative to before the failure, worst fault."""
-    courses = [c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts]
-    ratios = {c.fault: ratio(c.end, c.before) for c in courses}
-    if not ratios:
-        return None
-    worst = min(ratios, key=lambda fault: float(np.nan_to_num(ratios[fault].value)))
-    return Measured(ratios[worst], len(courses[0].success), note=worst)
+    courses = (c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts)
+    return _worst(Measured(ratio(c.end, c.before), len(c.success), note=c.fault) for c in courses)
 
 
 def worst_shape(results: Results, condition: str = "") -> Measured | None:
@@ -267,10 +263,7 @@ def worst_shape(results: Results, condition: str = "") -> Measured | None:
     Of a condition by its label; without, of that by which claims are judged.
     """
     ratios = ratios_of(results, condition or learner_of(results))
-    if not ratios:
-        return None
-    worst = min(ratios, key=lambda d: float(np.nan_to_num(d.estimate.value)))
-    return Measured(worst.estimate, worst.seeds, note=worst.condition)
+    return _worst(Measured(r.estimate, r.seeds, note=r.condition) for r in ratios)
 
 
 def without_model(results: Results) -> Measured | None:

@@ -44,6 +44,12 @@ ILL = (UnicodeError, MemoryError, OverflowError)
 """What Python itself raises when SQLite hands it damaged text or sizes."""
 
 
+class NoStudyError(SpecError):
+    """A directory holds no study, or only what a run left that was killed before it noted one."""
+
+    reason = None
+
+
 class DamageError(SpecError):
     """A database holds something else than was written.
 
@@ -53,8 +59,9 @@ class DamageError(SpecError):
         What is wrong with it.
     """
 
-    def __init__(self, path: Path, reason: str) -> None:
-        super().__init__(f"{path}: is damaged: {reason}; nested-agents run mends it")
+    def __init__(self, path: Path, reason: str, message: str = "") -> None:
+        usual = f"{path}: is damaged: {reason}; nested-agents run mends it"
+        super().__init__(message or usual)
         self.reason = reason
 
 
@@ -359,25 +366,6 @@ def _sha256(content: object) -> str:
     return hashlib.sha256(ENCODER.encode(content).encode()).hexdigest()
 
 
-def damage(path: Path) -> str | None:
-    """Return what is wrong with a database as a whole; None if nothing is, or it is empty.
-
-    Raises
-    ------
-    SpecError
-        If it cannot be read for another reason, is of another version, or is no study's.
-    """
-    if is_orphaned(path):
-        return "its log is there without it"
-    if not path.exists():
-        return None
-    try:
-        with reading(path) as db:
-            return fault(path, db)
-    except DamageError as error:
-        return error.reason
-
-
 def is_orphaned(path: Path) -> bool:
     """Tell whether only the log is left of a database: SQLite would drop it without a word."""
     files = path.with_name(f"{path.name}-wal"), path
@@ -385,21 +373,23 @@ def is_orphaned(path: Path) -> bool:
     return log_size > 0 and size == 0
 
 
-def holds_tables(path: Path) -> bool:
-    """Tell a study from nothing, and from a run that was killed before it had noted its spec."""
-    if not path.exists():
-        return False
-    with reading(path) as db:
-        return db.execute("SELECT 1 FROM sqlite_master").fetchone() is not None
-
-
 def fault(path: Path, db: sqlite3.Connection) -> str | None:
-    """Return what is wrong with an open database as a whole, see `damage`."""
+    """Return what is wrong with an open database as a whole; None if nothing is.
+
+    Raises
+    ------
+    NoStudyError
+        If it is empty.
+    SpecError
+        If it is of another version, or is no study's.
+    """
     try:
         tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master")}
         if not tables:
             (pages,) = db.execute("PRAGMA page_count").fetchone()
-            return "it has no tables" if pages > 1 else None
+            if pages > 1:
+                return "it has no tables"
+            raise NoStudyError(f"{path}: is empty, it holds no study yet")
         if not tables & {"meta", "trials", *OF_A_TRIAL}:
             raise SpecError(f"{path}: is a database, but no study; use another directory")
         (answer,) = db.execute("PRAGMA integrity_check(1)").fetchone()

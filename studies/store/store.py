@@ -27,7 +27,7 @@ from typing import Any, TextIO
 from ...core.interface.scenario import Measure
 from ..errors import SpecError
 from . import database, durable
-from .database import DATABASE, Noted, Planned
+from .database import DATABASE, DamageError, NoStudyError, Noted, Planned
 from .durable import Recording
 
 NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
@@ -78,24 +78,26 @@ class Store:
 
         Raises
         ------
+        NoStudyError
+            If the directory holds no study.
+        DamageError
+            If its database is damaged as a whole: what it says of the study, or the number of its
+            trials. For their rows see `verify`.
         SpecError
-            If the directory holds no readable study, or one of another version, or its database is
-            damaged as a whole: what it says of the study, or the number of its trials. For their
-            rows see `verify`.
+            If it cannot be read for another reason, is of another version, or is no study's.
         """
         path = directory / DATABASE
         if database.is_orphaned(path):
-            raise SpecError(
+            raise DamageError(
+                path, "its log is there without it",
                 f"{path}-wal: is the log of a database that is not there any more; nested-agents "
-                "run sets it aside"
-            )
-        if not path.is_file():
-            raise SpecError(f"{directory}: holds no study (no {DATABASE})")
+                "run sets it aside",
+            )  # fmt: skip
+        if not path.exists():
+            raise NoStudyError(f"{directory}: holds no study (no {DATABASE})")
         with database.reading(path) as connection:
             if (wrong := database.fault(path, connection)) is not None:
-                raise database.DamageError(path, wrong)
-            if connection.execute("SELECT 1 FROM sqlite_master").fetchone() is None:
-                raise SpecError(f"{path}: is empty, it holds no study yet")
+                raise DamageError(path, wrong)
             yield cls(directory, connection)
 
     def spec(self) -> Mapping[str, Any]:
@@ -268,7 +270,7 @@ class Store:
         files
             Contents of files that are kept beside the database, by name.
         damage
-            What is wrong with its database, see `database.damage`.
+            What is wrong with its database, see `DamageError`.
 
         Raises
         ------

@@ -15,8 +15,7 @@ from ..errors import SpecError, show
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import aliases, dumps, flat
-from ..store import database
-from ..store.database import DATABASE, SPEC_FILE, Noted
+from ..store.database import DATABASE, SPEC_FILE, DamageError, NoStudyError, Noted
 from ..store.store import Store, locked
 from .trial import AS_IN_SPEC, Trial, column_of, trials_of
 
@@ -148,11 +147,12 @@ def _examine(
     SpecError
         If the directory holds another study, or something that is none.
     """
-    damage, code = database.damage(directory / DATABASE), None
-    if damage is None and database.holds_tables(directory / DATABASE):
+    damage, code = None, None
+    try:
         with Store.open(directory) as store:
             mismatch, code = _mismatch_of_study(store, spec, noted, accept_code), store.code()
-    else:
+    except (NoStudyError, DamageError) as error:
+        damage = error.reason
         mismatch = _mismatch_of_file(directory / SPEC_FILE, spec, noted, damage)
     if mismatch is not None:
         raise SpecError(f"{directory}: holds another study: {mismatch}")
@@ -173,7 +173,7 @@ def _mismatch_of_file(path: Path, spec: Spec, noted: Noted, damage: str | None) 
     if not path.exists() or is_copy(path, spec, noted):
         return None
     if damage is None:
-        raise SpecError(f"{path}: is in the way of this study's own copy")
+        raise SpecError(f"{path}: is in the way of this study's own copy") from None
     try:
         return difference(noted_of(Spec.load(path)), noted)
     except SpecError as error:

@@ -305,18 +305,12 @@ class Session:
         return session
 
     def train(
-        self,
-        episodes: int,
-        first: int = 0,
-        *,
-        phase: str = "training",
-        team: Actors | None = None,
-        observe: Observer | None = None,
+        self, episodes: int, first: int = 0, *, phase: str = "training", team: Actors | None = None
     ) -> None:
         """Let the team (or another one, whose time is not counted) explore, learn, be measured.
 
         Before its first episode the team goes through the trial's curriculum. Recorded are, of the
-        trial's own team, the episodes of `Trial.recorded`. Every step is shown to `observe`.
+        trial's own team, the episodes of `Trial.recorded`.
         """
         self._go_through_curriculum()
         is_recorded = isinstance(self.world, RecordedScenario) and len(self.world.recorded) > 0
@@ -325,8 +319,8 @@ class Session:
         time = self._watch.add if team is None else None
         record = self._record if kept else None
         self._run(
-            there, phase, [time, record, observe], at_once=observe is None and not kept,
-            episodes=episodes, steps=self.trial.steps, first_episode=first,
+            there, phase, [time, record], at_once=not kept, episodes=episodes,
+            steps=self.trial.steps, first_episode=first,
         )  # fmt: skip
 
     def _record(self, record: StepRecord) -> None:

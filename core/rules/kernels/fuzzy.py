@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, inf, isfinite
-from typing import Literal, NamedTuple, TypeAlias, get_args
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
@@ -192,18 +192,9 @@ Packed: TypeAlias = tuple[IntArray, FloatArray]
 
 def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_own: int) -> Packed:
     """Pack partitions and terms for the kernels."""
-    d, t = len(partitions), len(terms)
-    widest = (max(len(p.knots) for p in partitions) + 7) // 8 * 8  # whole vectors
-    knots, bounds, slopes = np.zeros((d, widest)), np.zeros((d, widest)), np.zeros((d, widest))
-    for j, p in enumerate(partitions):
-        k = p.knots
-        knots[j, : len(k)] = k
-        bounds[j, : len(k) - 1] = 0.5 * (k[:-1] + k[1:])
-        slopes[j, : len(k) - 1] = p.steepness / np.diff(k)
+    d, t, knots = len(partitions), len(terms), [p.knots for p in partitions]
+    widest = (max(map(len, knots)) + 7) // 8 * 8  # whole vectors
     counts = np.array([p.size for p in partitions])
-    padded = np.full((t, d), -1)
-    for i, term in enumerate(terms):
-        padded[i, : len(term)] = term
     own = [[j for j in term if j < n_own] for term in terms]
     own_sizes = np.array([int(np.prod(counts[o])) for o in own])
     sizes = np.array([int(np.prod(counts[list(term)])) for term in terms])
@@ -218,7 +209,7 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_
     whole = [
         [int(sigmoid), d, t, widest, sum(2 ** len(term) for term in terms), n_own],
         counts,
-        [len(p.knots) for p in partitions],
+        [len(k) for k in knots],
         [len(term) for term in terms],
         [len(o) for o in own],
         own_sizes,
@@ -228,11 +219,13 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_
         [len(row) + len(part) for row, part in zip(rows, parts, strict=True)],
         [int(np.prod(counts[list(part)])) for part in parts],
         [0, *np.cumsum(sizes)],
-        padded,
+        _filled(terms, d, -1),
     ]
     real = [
-        *(knots, bounds, slopes),
-        [_series(p, widest) for p in partitions],
+        _filled(knots, widest),
+        _filled([0.5 * (k[:-1] + k[1:]) for k in knots], widest),
+        _filled([p.steepness / np.diff(p.knots) for p in partitions], widest),
+        _filled([_series(p) for p in partitions], widest),
         [p.period for p in partitions],
         [0.5 * (p.centres[0] + p.centres[-1] - p.period) for p in partitions],
     ]
@@ -279,10 +272,14 @@ MOST_GROWTH = 400.0
 """Logarithm of the range that a series of exponentials may span: what was cut off stays so."""
 
 
-def _series(partition: Partition, width: int) -> FloatArray:
-    """Return the exponentials of all sigmoids at one point, as multiples of the first's."""
-    gaps, series = np.diff(partition.knots), np.zeros(width)
+def _series(partition: Partition) -> FloatArray:
+    """Return the exponentials of all sigmoids at one point, as multiples of the first's, if any."""
+    gaps = np.diff(partition.knots)
     even = np.allclose(gaps, gaps[0], rtol=1e-9, atol=0.0)
-    if even and partition.steepness * len(gaps) <= MOST_GROWTH:
-        series[: len(gaps)] = np.exp(partition.steepness * np.arange(len(gaps)))
-    return series
+    few = partition.steepness * len(gaps) <= MOST_GROWTH
+    return np.exp(partition.steepness * np.arange(len(gaps))) if even and few else np.zeros(0)
+
+
+def _filled(rows: Sequence[Any], width: int, filling: float = 0.0) -> FloatArray:
+    """Return rows of different lengths as an array of this width."""
+    return np.array([[*row, *[filling] * (width - len(row))] for row in rows])

@@ -20,8 +20,7 @@ from ..states.relational import View
 from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline
 from ..world.settings import InfraredSettings, Task, reward
-from .belief import PushBelief, outcomes
-from .push import PushModel, push
+from .push import PushBelief, PushModel, outcomes, push
 from .wheel_commands import WheelCommands, choices_of, speeds_of, twist_table, wheel_commands_of
 
 CONTACT_GAP = 0.002
@@ -44,11 +43,6 @@ class Situation:
     """Per robot ``(3, w + 1)``: twist in its frame = effect @ [wheel speeds, 1]."""
     groups: tuple[tuple[int, ...], ...]
     """Agents of each robot."""
-
-    @cached_property
-    def places(self) -> list[tuple[int, int]]:
-        """Robot of every agent, and which of its wheels the agent drives."""
-        return [(r, wheel) for r, group in enumerate(self.groups) for wheel in range(len(group))]
 
 
 @dataclass(frozen=True)
@@ -75,20 +69,6 @@ class Premises:
     """How long a decision stands [s]."""
     seconds: float
     """How far predictions look ahead [s]."""
-
-    def seen(
-        self,
-        situation: Situation,
-        robots: FloatArray,
-        box: FloatArray,
-        gaps: FloatArray,
-        seconds: float,
-    ) -> View:
-        """Return a view of situations that `situation` leads to in `seconds`."""
-        return View(
-            robots, box, gaps, situation.goal, situation.box, seconds / self.hold,
-            self.outline, self.belief.model.friction_radius,
-        )  # fmt: skip
 
 
 class BoxPrediction:
@@ -119,20 +99,29 @@ class BoxPrediction:
         limits = self.premises.limits[:, None]
         commands = actions.apply(
             speeds[:, None], np.arange(len(actions)), self.premises.increment * limits, limits
-        ).reshape(len(self.situation.groups), -1, len(actions))
+        ).reshape(len(self.groups), -1, len(actions))
         return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
 
     def _after(self, choices: IntArray, seconds: float) -> View:
         now, twists = self.situation, self.wheel_commands.twists
         robots, box, gaps = push(now.robots, now.box, twists, choices, seconds, self.model)
-        return self.premises.seen(now, robots, box, gaps, seconds)
+        return self._seen(robots, box, gaps, seconds)
 
-    def _view_again(self, choices: IntArray) -> View:
-        """Return the view of `choices`: the last one, if they are the same."""
+    def _seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
+        """Return a view of situations that the present one leads to in `seconds`."""
+        now, premises = self.situation, self.premises
+        return View(
+            robots, box, gaps, now.goal, now.box, seconds / premises.hold, premises.outline,
+            self.model.friction_radius,
+        )  # fmt: skip
+
+    def _view_again(self, joint_actions: IntArray) -> tuple[IntArray, View]:
+        """Return wheel commands ``(m, M)``, and their view: the last one, if they are the same."""
+        choices = self._choices(joint_actions)
         key = choices.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, self._after(choices, self.premises.seconds)
-        return self._last[1]
+        return choices, self._last[1]
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
         """Return the wheel command ``(m, M)`` of each robot in joint actions ``(m, n)``."""
@@ -152,49 +141,42 @@ class BoxPrediction:
     @cached_property
     def _alone(self) -> list[FloatArray]:
         """Per robot ``(K, 3)``: its pose after every wheel command if it pushed alone."""
+        now, model, commands = self.situation, self.model, self.wheel_commands
         poses = []
-        for r, count in enumerate(self.wheel_commands.counts):
-            model = self.model._replace(
-                radii=self.model.radii[r : r + 1], compliance=self.model.compliance[r : r + 1]
-            )
-            robots, _, _ = push(
-                self.situation.robots[r : r + 1], self.situation.box,
-                self.wheel_commands.twists[r : r + 1], np.arange(count)[:, None],
-                self.premises.seconds, model,
-            )  # fmt: skip
-            poses.append(robots[:, 0])
+        for r, count in enumerate(commands.counts):
+            only, every = slice(r, r + 1), np.arange(count)[:, None]
+            alone = model._replace(radii=model.radii[only], compliance=model.compliance[only])
+            twists, seconds = commands.twists[only], self.premises.seconds
+            poses.append(push(now.robots[only], now.box, twists, every, seconds, alone)[0][:, 0])
         return poses
 
     @cached_property
     def _shared(self) -> FloatArray:
         """The shared blocks ``(M, m, d - n_own)`` in the situations of the table."""
-        return self.premises.space.shared_of(self._table[0], range(len(self.situation.groups)))
+        return self.premises.space.shared_of(self._table[0], range(len(self.groups)))
 
     def blocks(self, agent: int) -> Blocks:
-        """Return the next states of `agent` for all joint actions, own block as if alone."""
-        r, wheel = self.situation.places[agent]
-        row = self._table[1]
-        own, which = self._own_block(r, wheel)
-        behind = sum(len(group) for group in self.situation.groups[r + 1 :])
-        divisor = len(self.premises.action_set) ** behind
-        alone = self.premises.space.own_needs_pose
-        return Blocks(own, self._shared[r], divisor, which, row, alone)
+        """Return the next states of `agent` for all joint actions, own block as if alone.
 
-    def _own_block(self, r: int, wheel: int) -> tuple[FloatArray, IntArray]:
-        """Return the own variables that occur, as if alone, and the row of each robot action."""
+        Own variables are those that occur, each with its row for every robot action.
+        """
         commands, space, goal = self.wheel_commands, self.premises.space, self.situation.goal
+        r, wheel = divmod(agent, len(self.groups[0]))
         if space.own_needs_pose:
             speeds = commands.speeds[r, : commands.counts[r], wheel]
-            return space.own(self._alone[r], speeds, goal), commands.which[r]
-        speeds = commands.levels[r, wheel, : commands.n_levels[r, wheel]]
-        own = space.own(np.zeros((len(speeds), 3)), speeds, goal)
-        return own, commands.level[r, wheel]
+            own, which = space.own(self._alone[r], speeds, goal), commands.which[r]
+        else:
+            speeds = commands.levels[r, wheel, : commands.n_levels[r, wheel]]
+            own = space.own(np.zeros((len(speeds), 3)), speeds, goal)
+            which = commands.level[r, wheel]
+        behind = sum(len(group) for group in self.groups[r + 1 :])
+        divisor = len(self.premises.action_set) ** behind
+        return Blocks(own, self._shared[r], divisor, which, self._table[1], space.own_needs_pose)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        choices = self._choices(joint_actions)
-        view = self._view_again(choices)
-        (r, wheel), space = self.situation.places[agent], self.premises.space
+        choices, view = self._view_again(joint_actions)
+        (r, wheel), space = divmod(agent, len(self.groups[0])), self.premises.space
         speeds = self.wheel_commands.speeds[r, choices[:, r], wheel]
         own = space.own(view.robots[:, r], speeds, self.situation.goal)
         return np.concatenate([own, space.shared_of(view, [r])[0]], axis=1)
@@ -204,8 +186,7 @@ class BoxPrediction:
 
         ``(n, m, n_own)`` and ``(M, m, d - n_own)``, for joint actions ``(m, n)``.
         """
-        choices = self._choices(joint_actions)
-        view = self._view_again(choices)
+        choices, view = self._view_again(joint_actions)
         space, speeds = self.premises.space, speeds_of(choices, self.wheel_commands.speeds)
         poses: FloatArray = np.zeros((0, 3))
         if space.own_needs_pose:
@@ -220,11 +201,8 @@ class BoxPrediction:
 
     def after(self, joint_action: IntArray) -> BoxPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
-        view = self.poses(joint_action[None])
-        reached = replace(
-            self.situation,
-            robots=view.robots[0], box=view.box[0], speeds=self.commands(joint_action),
-        )  # fmt: skip
+        view, speeds = self.poses(joint_action[None]), self.commands(joint_action)
+        reached = replace(self.situation, robots=view.robots[0], box=view.box[0], speeds=speeds)
         return BoxPrediction(reached, self.model, self.premises)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
@@ -238,10 +216,9 @@ class BoxPrediction:
         Over the decision period, to be held against what is measured in it.
         """
         choices = self._choices(joint_action[None])
-        hold = self.premises.hold
-        after = self._after(choices, hold).robots[0]
+        after = self._after(choices, self.premises.hold).robots[0]
         free = self.wheel_commands.twists[np.arange(len(after)), choices[0]]
-        return mean_twists(self.situation.robots, after, hold) - free
+        return mean_twists(self.situation.robots, after, self.premises.hold) - free
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return mean twists ``(k, M + 1, 3)``, the box's first, under constants ``(k, 3)``.
@@ -255,7 +232,7 @@ class BoxPrediction:
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""
-        return self._rewards(self._view_again(self._choices(joint_actions)))
+        return self._rewards(self._view_again(joint_actions)[1])
 
     def reward_table(self) -> FloatArray:
         """Return the predicted rewards ``(A ** n,)`` of all joint actions."""
@@ -278,8 +255,6 @@ def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatA
     heading = before[:, 2] + 0.5 * turn
     # The chord of an arc is shorter than the arc by the sinc of half its angle.
     shorter = np.maximum(np.sinc(0.5 * turn / pi), 2.0 / pi)
-    chord = (after[:, :2] - before[:, :2]) / shorter[:, None]
+    x, y = ((after - before)[:, :2] / shorter[:, None]).T
     cos, sin = np.cos(heading), np.sin(heading)
-    ahead = cos * chord[:, 0] + sin * chord[:, 1]
-    left = cos * chord[:, 1] - sin * chord[:, 0]
-    return np.stack([ahead, left, turn], axis=1) / seconds
+    return np.stack([cos * x + sin * y, cos * y - sin * x, turn], axis=1) / seconds

@@ -74,8 +74,7 @@ class View:
     @cached_property
     def distance(self) -> FloatArray:
         """Distance ``(m,)`` of the box from the goal [m]."""
-        ahead = self.goal[:2] - self.box[:, :2]
-        return fixed(np.hypot(ahead[:, 0], ahead[:, 1]))
+        return fixed(np.hypot(*(self.goal[:2] - self.box[:, :2]).T))
 
     @cached_property
     def before(self) -> float:

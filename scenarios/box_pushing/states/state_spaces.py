@@ -355,10 +355,9 @@ class BoxStateSpace:
 
 
 def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
-    ahead = goal[:2] - poses[:, :2]
-    bearing = np.arctan2(ahead[:, 1], ahead[:, 0])
-    distance = np.hypot(ahead[:, 0], ahead[:, 1])
-    return np.stack([wrap(poses[:, 2]), wrap(bearing - poses[:, 2]), distance, speeds], axis=1)
+    (x, y), heading = (goal[:2] - poses[:, :2]).T, poses[:, 2]
+    bearing = wrap(np.arctan2(y, x) - heading)
+    return np.stack([wrap(heading), bearing, np.hypot(x, y), speeds], axis=1)
 
 
 _EVEN = tuple(float(c) for c in np.linspace(-pi, pi, 5, endpoint=False))

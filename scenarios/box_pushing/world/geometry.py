@@ -93,8 +93,7 @@ def surface(
         The nearest surface point [m].
     """
     best = np.inf
-    qx = qy = 0.0
-    ex = ey = 0.0
+    qx = qy = ex = ey = 0.0
     inside = False
     for i in range(edges.shape[0]):
         x0, y0 = edges[i, 0], edges[i, 1]

@@ -232,10 +232,8 @@ class Task(NamedTuple):
 
     def reached(self, distance: FloatArray, orientation: FloatArray) -> BoolArray:
         """Return whether the goal is reached ``(m,)``; parameters as of `reward`."""
-        near: BoolArray = distance <= self.tolerance
-        if self.orientation_tolerance is not None:
-            near = near & (np.abs(orientation) <= self.orientation_tolerance)
-        return near
+        near, most = distance <= self.tolerance, self.orientation_tolerance
+        return near if most is None else near & (np.abs(orientation) <= most)
 
 
 def reward(
@@ -273,10 +271,8 @@ def reward(
     [[-0.002]]
     """
     settings = task.reward
-    if settings.of == "team":  # of robots (m, parties, members)
-        contact, readings = contact[:, None], readings[:, None]
-    else:
-        contact, readings = contact[:, :, None], readings[:, :, None]
+    at = np.s_[:, None] if settings.of == "team" else np.s_[:, :, None]
+    contact, readings = contact[at], readings[at]  # of robots (m, parties, members)
     distance, approach, orientation = distance[:, None], approach[:, None], orientation[:, None]
     r1 = settings.c1 * np.exp(-settings.r1 * distance)
     r2_r3 = (settings.c2 * np.exp(-settings.r2 * readings)).sum(axis=2)

@@ -124,8 +124,7 @@ def place(
     box_pose = np.array([*(goal[:2] - away), angle])
     local = _around(spec, rng, robots, box) if spec.around else _behind(spec, rng, robots, box)
     turn = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
-    headings = wrap(local[:, 2] + angle)
-    poses = np.column_stack([box_pose[:2] + local[:, :2] @ turn.T, headings])
+    poses = np.column_stack([box_pose[:2] + local[:, :2] @ turn.T, wrap(local[:, 2] + angle)])
     return poses, box_pose, goal
 
 

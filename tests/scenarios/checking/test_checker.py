@@ -28,7 +28,7 @@ from nested_agents.scenarios.checking.checker import (
     faults_of_sensing,
     predicted_steps,
 )
-from nested_agents.scenarios.checking.frames import random_actions
+from nested_agents.scenarios.checking.frames import Examination
 from nested_agents.scenarios.checking.predictions import faults_of_prediction
 from nested_agents.scenarios.line_up import (
     DISTANCE,
@@ -145,7 +145,8 @@ def test_predictions_are_held_against_the_time_that_they_look_ahead() -> None:
 def test_a_variable_with_a_hidden_state_is_sensed_otherwise_than_predicted() -> None:
     scenario: Any = perceiving(stale)()
     exact = scenario.with_exact_prediction()
-    steps = predicted_steps(exact, 0, 0, random_actions(scenario, 5, 0))
+    actions = Examination(perceiving(stale), 5, (0, 1), (0,)).actions(scenario, 0)
+    steps = predicted_steps(exact, 0, 0, actions)
     fault = next(faults_of_sensing(exact, steps), None)
     assert re.match(r"stale of agent \d is \d, predicted \d, at step 1", fault or "")
 

@@ -11,14 +11,14 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.belief import (
+from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
+from nested_agents.scenarios.box_pushing.prediction.push import (
     CONSTANTS,
     believing,
     least_gap,
     outcomes,
+    push,
 )
-from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
-from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build
 
