@@ -186,7 +186,9 @@ def check(
                 if isinstance(error.__cause__, ValueError | None):
                     raise refusal from None
                 failing = failing or refusal
-            except (Exception, SystemExit) as error:
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
                 if isinstance(error, Exception) and not place(error):
                     raise  # no code of the user's
                 problem = f"the scenario or topology raises {format_error(error)}{place(error)}"

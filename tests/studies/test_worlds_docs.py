@@ -21,6 +21,7 @@ COLUMNS = ("success last 5", "evaluation success", "total reward")
         ("cartpole", ("success last 5", "evaluation success", "evaluation steps")),
         ("spread", ("evaluation steps", "total reward")),
         ("swimmer", COLUMNS),
+        ("swimmer-transfer", (*COLUMNS[:2], "success, eight", COLUMNS[2])),
         ("multiwalker", ("evaluation steps", "total reward")),
     ],
 )
