@@ -298,8 +298,8 @@ def test_whatever_a_scenario_raises_when_it_is_built_is_one_line(act, tmp_path, 
 @pytest.mark.parametrize(
     ("act", "status", "line"),
     [
-        ("raise ValueError('no power')", 2, "error: no power, in line 7 of raises.py"),
-        ("raise KeyboardInterrupt", 130, "interrupted in line 7 of raises.py"),
+        ("raise ValueError('no power')", 2, "error: no power, in line 9 of raises.py"),
+        ("raise KeyboardInterrupt", 130, "interrupted in line 9 of raises.py"),
     ],
 )
 def test_its_own_words_and_an_interruption_have_their_line(
@@ -320,4 +320,4 @@ def test_what_a_scenario_raises_on_being_asked_is_one_line_too(tmp_path, capsys)
     spec.write_text('[scenario]\nkind = "raises.py:Raises"\n')
     assert main(["run", str(spec), "--out", str(tmp_path / "study")]) == 2
     error = capsys.readouterr().err
-    assert "raises ZeroDivisionError: division by zero in line 8 of raises.py" in error
+    assert "raises ZeroDivisionError: division by zero in line 10 of raises.py" in error
