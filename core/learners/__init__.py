@@ -46,11 +46,13 @@ def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
     """
     if not settings.needs_prediction or hasattr(scenario, "predict"):
         return
+    unnamed = f"the scenario {type(scenario).__name__} has no method predict"
+    lack = getattr(scenario, "lacks_prediction", unnamed)
     others = [k for k in LEARNERS.built_in if not LEARNERS.parsed(k).needs_prediction]
     raise ValueError(
-        f"learner.kind = {settings.kind!r}: decides by predicted states, and the scenario "
-        f"{type(scenario).__name__} has no method predict; without it do {', '.join(others)}, and "
-        "any with learner.predictor.kind = 'learned' or learner.decision.rule = 'random'"
+        f"learner.kind = {settings.kind!r}: decides by predicted states, and {lack}; without it "
+        f"do {', '.join(others)}, and any with learner.predictor.kind = 'learned' or "
+        "learner.decision.rule = 'random'"
     )
 
 

@@ -79,11 +79,12 @@ class AdaptedWorld:
     def __init__(self, settings: AdaptedSettings, make: Make = make_by_id) -> None:
         try:
             self._actuators, self._perception = surveyed(settings, make)
-        except ValueError:  # says what does not fit
-            raise
         except Exception as error:  # an environment may be anybody's
-            which = f"scenario.id = {settings.id!r}:" if settings.id else "the environment"
-            raise ValueError(f"{which} cannot be played, {format_error(error)}") from None
+            is_said = isinstance(error, ValueError)  # what does not fit
+            fault = str(error) if is_said else f"cannot be played, {format_error(error)}"
+            which = f"scenario.id = {settings.id!r}: " if settings.id else "the environment: "
+            is_named = fault.startswith("scenario.") or (is_said and not settings.id)
+            raise ValueError(fault if is_named else which + fault) from None
         self.settings, self._make, self._simulator = settings, make, make(settings, None)
         self.agents, self.roles = self._actuators.names, self._actuators.roles
         self.groups, self.action_set = self._actuators.groups, self._actuators.action_set
@@ -94,6 +95,9 @@ class AdaptedWorld:
         self.horizon, self._seed, self._return = settings.horizon, 0, 0.0
         self._last: IntArray = np.full(len(self.agents), self.action_set.neutral)
         self._states: FloatArray = np.zeros((len(self.agents), self.state_space.n_variables))
+        self.lacks_prediction = (
+            f"scenario.predictor = {settings.predictor!r} gives none ('copy' does)"
+        )
         if settings.predictor == "copy":
             self.predict = self._predict
             self.with_exact_prediction = self._with_exact_prediction

@@ -65,9 +65,10 @@ class AdaptedSettings(ScenarioSettings):
     to 0, of discrete actions the first."""
     hold: Annotated[int, Field(ge=1, le=10_000)] = 1
     """Steps of the environment for which a decision is held; their rewards are added."""
-    predictor: Literal["none", "copy"] = "none"
-    """What predicts: nothing, or copies of the simulator, which are stepped for every joint action
-    that is tried. A copy knows the simulator exactly, its random numbers too."""
+    predictor: Literal["none", "copy", "learned"] = "none"
+    """What predicts: nothing; copies of the simulator, which are stepped for every joint action
+    that is tried and know it exactly, its random numbers too; or, with the presets ``default`` and
+    ``own-value``, what the team learns, as ``learner.predictor.kind = "learned"`` says."""
     horizon: Annotated[int, Field(ge=1, le=10_000)] = 1
     """Decisions that copies look ahead, the joint action being held; the reward predicted is the
     mean of theirs."""
@@ -102,7 +103,9 @@ class AdaptedSettings(ScenarioSettings):
         return () if self.success else (nothing,)
 
     def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
-        """Return that few joint actions are tried, where each is played by a copy."""
+        """Return that predictions are learned, or few joint actions tried where each is played."""
+        if self.predictor == "learned" and preset in ("default", "own-value"):
+            return {"learner": {"predictor": {"kind": "learned"}}}
         is_slow = self.predictor == "copy" and preset in ("default", "own-value", "frozen")
         return {"learner": {"decision": {"evaluator": "best-response"}}} if is_slow else {}
 

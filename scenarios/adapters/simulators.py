@@ -12,6 +12,7 @@ anew of that. Either way a copy has the random numbers of the original.
 from __future__ import annotations
 
 import pickle
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
@@ -111,7 +112,12 @@ def make_by_id(settings: AdaptedSettings, render_mode: str | None) -> Simulator:
     options = {**settings.options, **rendering}
     try:
         if isinstance(settings, GymnasiumSettings):
-            return simulator_of(gymnasium.make(settings.id, disable_env_checker=True, **options))
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", r".*the latest versioned environment")
+                env = gymnasium.make(settings.id, disable_env_checker=True, **options)
+            if env.spec and env.spec.id != settings.id.rpartition(":")[2]:
+                raise ValueError(f"say which version, such as {env.spec.id}")
+            return simulator_of(env)
         module: Any = import_module(settings.id.replace("/", "."))
         return simulator_of((getattr(module, "parallel_env", None) or module.env)(**options))
     except Exception as error:  # an environment may be anybody's

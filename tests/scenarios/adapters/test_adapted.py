@@ -13,6 +13,7 @@ from gymnasium.utils import EzPickle
 from pettingzoo import ParallelEnv
 
 from nested_agents.core.interface.scenario import can_draw
+from nested_agents.core.learners import check_prediction
 from nested_agents.scenarios.adapters.adapted import from_gymnasium, from_pettingzoo
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings, PettingZooSettings
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
@@ -267,6 +268,8 @@ IMAGE = Box(0, 255, (8, 8, 3), np.uint8)
     [
         (lambda: GymnasiumSettings(id="Pendulum-v99").build(), "scenario.id = 'Pendulum-v99'"),
         (lambda: GymnasiumSettings(id="Pendulum-v1", actions=1), "actions = 1"),
+        (lambda: GymnasiumSettings(id="CartPole").build(), "'CartPole': .* such as CartPole-v1"),
+        (lambda: GymnasiumSettings(id="CartPole-v1", centres={"o0": (1, 0)}).build(), "-v1': var"),
         (lambda: PettingZooSettings(id="no/module").build(), "extras of nested-agents are mpe"),
         (lambda: PettingZooSettings(id="json").build(), "scenario.id = 'json'"),
         (lambda: from_gymnasium(Odd(IMAGE)), r"images of shape \(8, 8, 3\)"),
@@ -340,7 +343,23 @@ def test_check_and_run_say_it_in_one_line(
         assert main(command) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert "learner.kind = 'batch-td': decides by predicted states" in line
+        assert "scenario.predictor = 'none' gives none ('copy' does); without it do" in line
     assert not (tmp_path / "out").exists()
+
+
+def test_what_presets_decide_by_is_learned_where_the_scenario_says_so() -> None:
+    table = {"scenario": {**PENDULUM, "kind": "gymnasium", "predictor": "learned"}}
+    kinds = {
+        preset: Spec.of({**table, "preset": preset}).conditions()[0].settings.learner
+        for preset in ("default", "own-value", "fitted-q", "planner")
+    }
+    learned = [learner.predictor.kind == "learned" for learner in kinds.values()]
+    assert learned == [True, True, False, False]
+    own = {"learner": {"predictor": {"kind": "static"}}}
+    (condition,) = Spec.of({**table, **own}).conditions()
+    assert condition.settings.learner.predictor.kind == "static"
+    with pytest.raises(ValueError, match=r"scenario\.predictor = 'learned' gives none"):
+        check_prediction(kinds["planner"], GymnasiumSettings(**table["scenario"]).build())
 
 
 @pytest.mark.parametrize("name", ["mpe2/simple_spread_v3", "mpe2/simple_speaker_listener_v4"])
