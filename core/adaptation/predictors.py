@@ -152,7 +152,7 @@ class Mirror:
         return np.tile(reward, 2) if isinstance(reward, np.ndarray) else reward
 
 
-class Bodies:
+class DrivenBodies:
     """Which variables there are to predict, by body, and who drives them.
 
     Bodies alike, in the roles of their agents, have the shared variables of their group each.
