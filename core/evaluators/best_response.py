@@ -51,7 +51,7 @@ class BestResponseSettings(EvaluatorSettings):
 
 
 class _Known(NamedTuple):
-    """What the joint actions of one body's agents were last found to be worth."""
+    """The values of the joint actions of one body's agents, as last computed."""
 
     concerned: IntArray
     plan: IntArray
@@ -66,7 +66,7 @@ class _Known(NamedTuple):
 
 
 class _Ahead(NamedTuple):
-    """What bodies, the next ones too, were found to be worth while a plan stands."""
+    """The values of the actions of several bodies in a row, while a plan stands."""
 
     concerned: IntArray
     plan: IntArray

@@ -1,4 +1,4 @@
-"""What an evaluator is and what it is asked, and what those share that try joint actions.
+"""Evaluators: their interface, and what those that try joint actions have in common.
 
 In the mean value of several agents each thing that they share is valued once. A rule base is a sum
 of terms. What a term of common variables is worth to all agents is what it is worth to one that has

@@ -32,7 +32,7 @@ ENV_ID = "NestedAgents/BoxPushing-v0"
 RENDER_MODES = ["rgb_array"]
 
 
-class Driver:
+class Player:
     """The wheels that one outside agent drives, and what it observes.
 
     Parameters
@@ -71,7 +71,7 @@ class Driver:
 
 
 class Environment(ABC):
-    """A scenario with drivers, a clock, a stream of seeds and pictures; inherit it beside an API.
+    """A scenario with players, a clock, a stream of seeds and pictures; inherit it beside an API.
 
     Parameters
     ----------
@@ -110,11 +110,11 @@ class Environment(ABC):
         self.scenario = BoxPushing(settings)
         self.steps, self.render_mode, self.sensors = steps, render_mode, sensors
         self._recorder: EpisodeRecorder | None = None
-        self.drivers = {
-            name: Driver(self.scenario, wheels, by_wheel=by_wheel)
+        self.players = {
+            name: Player(self.scenario, wheels, by_wheel=by_wheel)
             for name, wheels in self._teams().items()
         }
-        self.possible_agents = list(self.drivers)
+        self.possible_agents = list(self.players)
         self.agents: list[str] = []
         self._seeds = np.random.default_rng()
         self._episode, self._step = -1, 0
@@ -197,11 +197,11 @@ class WheelsEnv(Environment, ParallelEnv):
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an agent's observations."""
-        return self.drivers[agent].observation_space
+        return self.players[agent].observation_space
 
     def action_space(self, agent: str) -> Discrete | MultiDiscrete:
         """Return the space of an agent's actions."""
-        return self.drivers[agent].action_space
+        return self.players[agent].action_space
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -226,10 +226,10 @@ class WheelsEnv(Environment, ParallelEnv):
             raise ValueError(f"step: actions of {list(actions)}: {problem}; agents: {self.agents}")
         joint = np.empty(len(self.scenario.agents), dtype=np.int64)
         for name in self.agents:
-            joint[self.drivers[name].wheels] = actions[name]
+            joint[self.players[name].wheels] = actions[name]
         transition, truncated = self.advance(joint)
         observations, infos = self._observe(transition.states, transition.info)
-        rewards = {name: self.drivers[name].paid(transition.reward) for name in self.agents}
+        rewards = {name: self.players[name].paid(transition.reward) for name in self.agents}
         ends = dict.fromkeys(self.agents, transition.terminated)
         breaks = dict.fromkeys(self.agents, truncated)
         if transition.terminated or truncated:
@@ -240,7 +240,7 @@ class WheelsEnv(Environment, ParallelEnv):
         self, states: FloatArray, measured: Mapping[str, Any]
     ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
         return (
-            {name: self.drivers[name].observe(states) for name in self.agents},
+            {name: self.players[name].observe(states) for name in self.agents},
             {name: self.info(measured) for name in self.agents},
         )
 
@@ -279,12 +279,12 @@ class BoxPushingEnv(Environment, gymnasium.Env):
     @cached_property
     def observation_space(self) -> Box:  # type: ignore[override]
         """The space of observations."""
-        return self.drivers["single"].observation_space
+        return self.players["single"].observation_space
 
     @cached_property
     def action_space(self) -> Discrete | MultiDiscrete:  # type: ignore[override]
         """The space of actions."""
-        return self.drivers["single"].action_space
+        return self.players["single"].action_space
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -292,13 +292,13 @@ class BoxPushingEnv(Environment, gymnasium.Env):
         """Start an episode, see `Environment.begin`; return observation and info."""
         super().reset(seed=seed)
         states = self.begin(seed, options)
-        return self.drivers["single"].observe(states), self.info(self.scenario.measure())
+        return self.players["single"].observe(states), self.info(self.scenario.measure())
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
         transition, truncated = self.advance(np.asarray(action, dtype=np.int64))
-        driver, info = self.drivers["single"], self.info(transition.info)
-        seen, paid = driver.observe(transition.states), driver.paid(transition.reward)
+        player, info = self.players["single"], self.info(transition.info)
+        seen, paid = player.observe(transition.states), player.paid(transition.reward)
         return seen, paid, transition.terminated, truncated, info
 
 

@@ -40,7 +40,7 @@ FAR = 10
 
 
 class MetVariable(NamedTuple):
-    """What was met of a variable, or of the reward, beside what is said of it."""
+    """The values met of a variable, or of the reward, beside what the scenario declares."""
 
     name: str
     """Of the variable, or ``reward``."""

@@ -1,4 +1,4 @@
-"""Whether a prediction has the right shapes, claims what is so, and has tables that say the same.
+"""Whether a prediction has the right shapes, keeps its promises, and has tables that agree with it.
 
 Agents share the variables that they are said to share, and what is said to be an agent's own does
 not change with what others do.
