@@ -4,6 +4,7 @@ import importlib.util
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
@@ -57,6 +58,23 @@ def test_islands_send_what_no_neighbour_disturbs() -> None:
         *_, truncated, _ = env.step(dict.fromkeys(env.agents, 0))
     assert all(truncated.values())
     assert env.agents == []
+
+
+@pytest.mark.parametrize(("is_told", "reached"), [(True, 9.25), (False, 6.15)])
+def test_rules_of_thumb_send_messages(is_told: bool, reached: float) -> None:
+    """Islands send unless a neighbour listed before does; or those of one colour of a chessboard."""
+    env, returns = Aloha(), np.zeros(100)
+    before = np.tril(env.near)
+    for episode in range(len(returns)):
+        env.reset(seed=episode)
+        while env.agents:
+            sends = np.zeros(10, dtype=bool)
+            for i in range(10):
+                free = not sends[before[i]].any() if is_told else (i // 5 + i % 5) % 2 == 0
+                sends[i] = env.backlog[i] > 0 and free
+            _, rewards, *_ = env.step(dict(zip(env.agents, sends, strict=True)))
+            returns[episode] += rewards["island1"]
+    assert returns.mean() == pytest.approx(reached, abs=0.05)
 
 
 def test_a_spec_names_islands(capsys: pytest.CaptureFixture[str]) -> None:
