@@ -5,10 +5,10 @@ Islands that share a radio channel
 The task Aloha of the benchmark MACO (T. Wang et al. 2022) as a parallel environment of PettingZoo,
 written anew from its rules. The last function makes it a scenario of specs, see ``aloha.toml``.
 
-Islands stand in two rows. In every step each switches its radio on or leaves it off. A message is sent
-if no neighbour's radio is on; else it collides, stays in the backlog, and costs a hundred times what
-it would have brought. A radio disturbs the neighbours also where there is nothing to be sent. All
-islands receive the team's reward, and see their own backlog alone.
+Islands stand in two rows. In every step each switches its radio on or leaves it off. A message is
+sent if no neighbour's radio is on; else it collides, stays in the backlog, and costs a hundred
+times what it would have brought. A radio disturbs the neighbours also where there is nothing to be
+sent. All islands receive the team's reward, and see their own backlog alone.
 
 Departures. In the benchmark's public code islands 5 and 6, at opposite ends of the two rows, are
 neighbours, too; here they are not. An episode is truncated by its limit; there it is terminated.
@@ -25,12 +25,10 @@ import nested_agents as na
 class Aloha(ParallelEnv):
     """Islands that have messages to send; actions are 0, off, and 1, on."""
 
-    metadata = {"name": "aloha_v0", "render_modes": ()}
+    metadata = {"name": "aloha_v0", "render_modes": ()}  # noqa: RUF012 - as PettingZoo has it
 
-    def __init__(
-        self, rows=2, columns=5, steps=20, most=5, arrival=0.6, sent=0.1, collided=-10.0
-    ):
-        places = np.stack(np.meshgrid(range(rows), range(columns), indexing="ij"), -1).reshape(-1, 2)
+    def __init__(self, rows=2, columns=5, steps=20, most=5, arrival=0.6, sent=0.1, collided=-10.0):
+        places = np.array([(row, column) for row in range(rows) for column in range(columns)])
         self.near = np.abs(places[:, None] - places).sum(-1) == 1  # above, below, left, right
         self.steps, self.most, self.arrival = steps, most, arrival
         self.sent, self.collided = sent, collided

@@ -62,7 +62,7 @@ def test_islands_send_what_no_neighbour_disturbs() -> None:
 
 @pytest.mark.parametrize(("is_told", "reached"), [(True, 9.25), (False, 6.15)])
 def test_rules_of_thumb_send_messages(is_told: bool, reached: float) -> None:
-    """Islands send unless a neighbour listed before does; or those of one colour of a chessboard."""
+    """Islands send unless a neighbour listed before does; or those of one colour of a board."""
     env, returns = Aloha(), np.zeros(100)
     before = np.tril(env.near)
     for episode in range(len(returns)):
