@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 from published_tables import print_table
 
+from nested_agents.studies.claims.claims import PUBLISHED
+from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
@@ -30,6 +32,14 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
 
 
+def test_evaluated_rewards(capsys: pytest.CaptureFixture[str]) -> None:
+    path, by = str(PUBLISHED / "aloha.json"), ("--phase", "evaluation", "--reference", "none")
+    of = ("--measure", "total_reward", "--format", "markdown")
+    assert main(["compare", path, *of, *by]) == 0
+    table = capsys.readouterr().out
+    assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("spec", "extras", "agents"),
@@ -39,6 +49,9 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
         ("swimmer_transfer", ("mujoco",), 4),
         ("spread", ("mpe2",), 3),
         ("spread_ppo", ("mpe2", "stable_baselines3"), 3),
+        ("aloha", (), 10),
+        ("aloha_ppo", ("stable_baselines3",), 10),
+        ("aloha_copies", (), 10),
     ],
 )
 def test_specs_of_worlds_of_others_run(

@@ -1,4 +1,4 @@
-"""Predictors of box pushing by name: what they take the world for.
+"""Predictors of box pushing by name, and the model of the world behind each.
 
 push
     Compliant quasi-static pushing, see `box_pushing.prediction.push`; the default.
@@ -22,7 +22,8 @@ import numpy as np
 
 from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
-from ..world.bodies import BoxSpec, compliance
+from ..world.boxes import BoxSpec
+from ..world.robots import compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
 from .prediction import BoxPrediction, Premises, Situation
