@@ -69,7 +69,7 @@ TEAM = "na.load(...).team()"
 SLOW, BLOCKED = 10.0, 60.0
 """Seconds, of the processor and by the clock, after which an input counts as one that stalls."""
 
-Said = tuple[int, str, str]
+Answer = tuple[int, str, str]
 """Exit status, output and errors of a command."""
 
 
@@ -91,7 +91,7 @@ class Adversary:
         self.finish(self.sound)
         self.expected = self.content(self.sound)
         shutil.copytree(self.sound, self.study)
-        self.said = {line: self.command(line) for line in (*self.lines(), EXPLAIN)}
+        self.answers = {line: self.command(line) for line in (*self.lines(), EXPLAIN)}
         self.files = [p for p in sorted(self.sound.rglob("*")) if p.is_file() and p.stat().st_size]
 
     def lines(self) -> list[str]:
@@ -101,7 +101,7 @@ class Adversary:
             "compare --statistics", "watch --once", "report", "export", TEAM,
         ]  # fmt: skip
 
-    def command(self, line: str) -> Said:
+    def command(self, line: str) -> Answer:
         """Run a command on the study in this process."""
         if line == TEAM:
             return self.team()
@@ -121,7 +121,7 @@ class Adversary:
             text += next(self.study.glob("explain/*/explanation.txt")).read_text()
         return status, text, error.getvalue()
 
-    def team(self) -> Said:
+    def team(self) -> Answer:
         """Load the team that was trained first, as a user's script does."""
         try:
             with contextlib.redirect_stderr(error := io.StringIO()):
@@ -344,16 +344,18 @@ def every_byte(rng: random.Random, folder: Path) -> Counter[str]:
 
 def _read(adversary: Adversary, line: str, path: Path) -> str:
     try:
-        said = adversary.command(line)
+        answer = adversary.command(line)
     except BaseException:
         print(f"{line}, {path.name}:\n{traceback.format_exc()}", file=sys.stderr)
         return "traceback"
-    if said == adversary.said[line]:
+    if answer == adversary.answers[line]:
         return "equal"
-    is_told = path.name in said[1] + said[2] or "recording is missing or damaged" in said[1]
-    if is_told:
+    is_reported = (
+        path.name in answer[1] + answer[2] or "recording is missing or damaged" in answer[1]
+    )
+    if is_reported:
         return "told"
-    print(f"{line}, {path.name}: silence: {said[2]}", file=sys.stderr)
+    print(f"{line}, {path.name}: silence: {answer[2]}", file=sys.stderr)
     return "silence"
 
 
@@ -510,10 +512,12 @@ def _topologies(rng: random.Random) -> Iterator[Attack]:
             out, error = io.StringIO(), io.StringIO()
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
                 status = command_line(["topology", "show", str(path)])
-            said = error.getvalue()
+            message = error.getvalue()
             if status == 0:
                 return "accepted" if out.getvalue().replace("\n", "").isprintable() else "raw"
-            one_line = said.count("\n") == 1 and said[:-1].isprintable() and path.name in said
+            one_line = (
+                message.count("\n") == 1 and message[:-1].isprintable() and path.name in message
+            )
             return "refused in one line" if one_line else "refused at length"
 
         yield attack

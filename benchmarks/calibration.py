@@ -42,9 +42,9 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
     hierarchy = build(parse("chain"), scenario.agents, scenario.groups)
     team = Team(settings, scenario, hierarchy, policy_seed(SEED))
     assert team.calibration is not None
-    slip = belief["load"] / belief["stiffness"]
-    right = -np.log([slip, slip, belief["contact_friction"]])
-    found, errors = [], []
+    load_per_stiffness = belief["load"] / belief["stiffness"]
+    right = -np.log([load_per_stiffness, load_per_stiffness, belief["contact_friction"]])
+    beliefs, errors = [], []
     for episode in range(episodes):
         scenario.reset(world_seed(SEED, episode), episode)
         team.begin_episode()
@@ -59,13 +59,13 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
             if len(bodies) == len(scenario.groups) and np.hypot(*box[:2]) > 0.002:
                 off = np.hypot(*(predicted[:, 0] - box)[:, :2].T)
                 errors.append(1000 * off * scenario.settings.action_repeat * 0.064)
-                found.append(np.exp(team.calibration.constants - right))
+                beliefs.append(np.exp(team.calibration.constants - right))
             prediction = team.predict(scenario)
             team.learn(transition)
             if transition.terminated or transition.truncated or step == STEPS - 1:
                 break
         team.end_episode()
-    return np.array(found), np.array(errors)
+    return np.array(beliefs), np.array(errors)
 
 
 def main() -> None:
@@ -75,11 +75,11 @@ def main() -> None:
     print("|---" * (len(AFTER) + 6) + "|")
     for robot, episodes in (("e-puck", 6), ("four-wheel", 4)):
         for believed in BELIEFS:
-            found, errors = calibrated(robot, believed, episodes)
-            told = [found[min(k, len(found)) - 1] for k in (*AFTER, len(found))]
-            cells = [", ".join(f"{factor:.2f}" for factor in factors) for factors in told]
+            beliefs, errors = calibrated(robot, believed, episodes)
+            shown = [beliefs[min(k, len(beliefs)) - 1] for k in (*AFTER, len(beliefs))]
+            cells = [", ".join(f"{factor:.2f}" for factor in factors) for factors in shown]
             means = " | ".join(f"{mean:.1f}" for mean in errors.mean(axis=0))
-            print(f"| {robot}, {believed} | {' | '.join(cells)} | {len(found)} | {means} |")
+            print(f"| {robot}, {believed} | {' | '.join(cells)} | {len(beliefs)} | {means} |")
             sys.stdout.flush()
 
 

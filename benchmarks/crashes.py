@@ -147,15 +147,15 @@ def _kill(process: subprocess.Popen[bytes], victim: str, backend: str, rng: rand
 
 
 def _children(parent: int) -> list[int]:
-    found = []
+    children = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = path.read_text().rpartition(")")[2].split()
         except OSError:
             continue
         if int(fields[1]) == parent:
-            found.append(int(path.parent.name))
-    return sorted(found)
+            children.append(int(path.parent.name))
+    return sorted(children)
 
 
 def _line(pid: int) -> bytes:

@@ -66,7 +66,7 @@ def errors(
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
     n, neutral = len(scenario.agents), scenario.action_set.neutral
     decision = Decision(evaluator=SamplingSettings(samples=8), teammates=teammates)
-    found: dict[str, list[tuple[float, float]]] = {}
+    samples: dict[str, list[tuple[float, float]]] = {}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         team = Team(BatchTDSettings(decision=decision), scenario, hierarchy, policy_seed(seed))
         rules = team.learner.rules  # type: ignore[attr-defined]
@@ -84,8 +84,10 @@ def errors(
             for agent in range(n):
                 known = np.full(n, neutral)
                 known[:agent] = record.joint_action[:agent]
-                asked = Deliberation(agent, known, prediction, team.learner.theta, frequencies, rng)
-                drawn = np.array([reference.values(asked) for reference in references])
+                deliberation = Deliberation(
+                    agent, known, prediction, team.learner.theta, frequencies, rng
+                )
+                drawn = np.array([reference.values(deliberation) for reference in references])
                 exact = drawn.mean(axis=0)
                 spread = np.ptp(exact)
                 if spread < NEGLIGIBLE_SPREAD:
@@ -93,13 +95,13 @@ def errors(
                 if len(drawn) > 1:
                     drawn -= drawn.mean(axis=1, keepdims=True)
                     off = drawn.std(axis=0, ddof=1).max() / np.sqrt(len(drawn))
-                    found.setdefault("reference", []).append((off / spread, 0.0))
-                approximate = evaluator.values(asked)
+                    samples.setdefault("reference", []).append((off / spread, 0.0))
+                approximate = evaluator.values(deliberation)
                 off = approximate - exact
                 error = np.abs(off - off.mean()).max()
                 regret = exact.max() - exact[approximate.argmax()]
-                found.setdefault("sampling", []).append((error / spread, regret / spread))
-    return {name: np.array(rows) for name, rows in found.items()}
+                samples.setdefault("sampling", []).append((error / spread, regret / spread))
+    return {name: np.array(rows) for name, rows in samples.items()}
 
 
 def _references(problem: DecisionProblem) -> list[Evaluator]:
@@ -135,9 +137,9 @@ def main() -> None:
             for teammates in TEAMMATES:
                 if 2 * robots > LARGEST_EXACT and (settings or teammates == "best-response"):
                     continue
-                asked = {**settings, "robots": robots}
-                found = errors(teammates, asked, options.steps, options.seeds)
-                for evaluator, rows in found.items():
+                own = {**settings, "robots": robots}
+                rows_by_evaluator = errors(teammates, own, options.steps, options.seeds)
+                for evaluator, rows in rows_by_evaluator.items():
                     quantiles = [f"{np.quantile(rows[:, 0], q):.1g}" for q in (0.5, 0.9, 0.99)]
                     table.add_row(
                         name, str(2 * robots), teammates, evaluator, *quantiles,

@@ -27,15 +27,15 @@ COLUMN = {"none": 1.0, "seized": 0.0, "weak": 0.3, "reversed": -1.0, "stuck": 0.
 NOISY_SEEDS, NOISY_PERIODS = 1000, 10
 
 
-def told(robot: RobotSettings) -> Any:
+def commands_of(robot: RobotSettings) -> Any:
     """Return the commanded wheel speeds [m/s]."""
     return np.linspace(0.75, 1.0, len(robot.wheels)) * SPEED
 
 
-def found(robot: RobotSettings, failure: dict[str, Any] | None) -> Any:
+def driven(robot: RobotSettings, failure: dict[str, Any] | None) -> Any:
     """Return the twist, in the robot's frame, that the world shows [m/s, m/s, rad/s]."""
     world, ill = start(robot, failure)
-    for held in ill.driven(told(robot), PERIODS):
+    for held in ill.driven(commands_of(robot), PERIODS):
         world.advance(held, 1)
     (vx, vy, omega), heading = world.twists[1], world.robot_poses[0, 2]
     cos, sin = np.cos(heading), np.sin(heading)
@@ -61,7 +61,7 @@ def expected(robot: RobotSettings, kind: str) -> Any:
     if kind == "stuck":
         effect[:, -1] = 0.5 * robot.max_speed * effect[:, 0]
     effect[:, 0] *= COLUMN[kind]
-    return effect @ np.append(told(robot), 1.0)
+    return effect @ np.append(commands_of(robot), 1.0)
 
 
 def freely(robot: RobotSettings) -> Any:
@@ -75,7 +75,7 @@ def freely(robot: RobotSettings) -> Any:
     mass = np.diag([robot.mass, robot.mass, robot.inertia])
     system = np.zeros((6, 6))
     system[:3, :3] = -np.linalg.solve(mass, resistance)
-    system[:3, 3:] = np.diag(np.linalg.solve(mass, drive @ told(robot)))
+    system[:3, 3:] = np.diag(np.linalg.solve(mass, drive @ commands_of(robot)))
     return expm(system * PERIODS * CONTROL_PERIOD)[:3, 3:].sum(axis=1)
 
 
@@ -99,7 +99,7 @@ def table(robot: RobotSettings) -> None:
     for kind in (*COLUMN, "free"):
         wheel = f"robot1.{robot.wheel_names[0]}"
         failure = None if kind == "none" else {"kind": kind, "wheels": wheel}
-        seen, theory = found(robot, failure), expected(robot, kind)
+        seen, theory = driven(robot, failure), expected(robot, kind)
         print(
             f"| {kind} | {1000 * seen[0]:.1f} | {1000 * theory[0]:.1f} "
             f"| {round(seen[2], 3) + 0.0:.3f} | {round(theory[2], 3) + 0.0:.3f} |"

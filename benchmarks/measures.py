@@ -174,6 +174,6 @@ def trial_seconds(episodes: int, *, compiled: bool) -> Row:
     with tempfile.TemporaryDirectory() as empty:
         environment = os.environ if compiled else os.environ | {"NUMBA_CACHE_DIR": empty}
         line = [sys.executable, "-c", TRIAL, str(episodes)]
-        said = subprocess.run(line, check=True, capture_output=True, text=True, env=environment)
-    row: Row = json.loads(said.stdout)
+        run = subprocess.run(line, check=True, capture_output=True, text=True, env=environment)
+    row: Row = json.loads(run.stdout)
     return row

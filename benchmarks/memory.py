@@ -67,11 +67,11 @@ def worker() -> list[Row]:
     rows: list[Row] = []
     for _ in range(2):
         line = [sys.executable, "-c", RESIDENT, *STAGES.values()]
-        said = subprocess.run(line, capture_output=True, text=True, check=True).stdout
-        found = [map(float, told.split()) for told in said.splitlines()]
+        output = subprocess.run(line, capture_output=True, text=True, check=True).stdout
+        sizes = [map(float, line.split()) for line in output.splitlines()]
         rows = [
             {"after": name, "resident": round(resident), "private": round(private)}
-            for name, (resident, private) in zip(STAGES, found, strict=True)
+            for name, (resident, private) in zip(STAGES, sizes, strict=True)
         ]
     return rows
 

@@ -148,16 +148,18 @@ def _scenario(place: Path) -> str:
     except BaseException:
         print(traceback.format_exc(), file=sys.stderr)
         return "traceback"
-    said = error.getvalue()
+    message = error.getvalue()
     if status == 2:
-        return "refused in one line" if said.count("\n") == 1 else "refused at length"
+        return "refused in one line" if message.count("\n") == 1 else "refused at length"
     with Store.open(place / "out") as store:
         done = store.counts()["done"]
     if FIRED not in os.environ:
         return "not reached" if (status, done) == (0, 2) else "failed without a fault"
     if status == 0:
         return "silence"
-    return "told" if (status, done) == (1, 1) and "Traceback" not in said else "other trials lost"
+    return (
+        "told" if (status, done) == (1, 1) and "Traceback" not in message else "other trials lost"
+    )
 
 
 def topologies(rng: random.Random) -> Iterator[Callable[[Path], str]]:
@@ -171,10 +173,12 @@ def topologies(rng: random.Random) -> Iterator[Callable[[Path], str]]:
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
                 line = ["topology", "show", f"{folder / 'graph.py'}:f", "--agents", str(agents)]
                 status = command_line(line)
-            said = error.getvalue()
+            message = error.getvalue()
             if status == 0:
                 return "accepted" if out.getvalue() else "silence"
-            one_line = said.count("\n") == 1 and said[:-1].isprintable() and len(said) < 2000
+            one_line = (
+                message.count("\n") == 1 and message[:-1].isprintable() and len(message) < 2000
+            )
             return "refused in one line" if one_line else "refused at length"
 
         yield attack

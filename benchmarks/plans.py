@@ -106,7 +106,7 @@ PLAN = (
 def measure(spec: Path, jobs: int) -> tuple[float, float, float, float, float]:
     """Return from and to, how long planning and the study took, the latter's processor time [s]."""
     begin = time.monotonic()
-    told = subprocess.run(
+    run = subprocess.run(
         [sys.executable, "-c", PLAN, spec, str(jobs)], check=True, capture_output=True, text=True
     )
     planned = time.monotonic()
@@ -114,7 +114,7 @@ def measure(spec: Path, jobs: int) -> tuple[float, float, float, float, float]:
     command = [sys.executable, "-m", "nested_agents", "run", spec, "--jobs", str(jobs)]
     subprocess.run([*command, "--out", spec.with_suffix("")], check=True, capture_output=True)
     took, now = time.monotonic() - planned, resource.getrusage(resource.RUSAGE_CHILDREN)
-    begun, end = map(float, told.stdout.split())
+    begun, end = map(float, run.stdout.split())
     processor = now.ru_utime + now.ru_stime - used.ru_utime - used.ru_stime
     return begun, end, planned - begin, took, processor
 

@@ -2,7 +2,7 @@
 
 Studies of known differences are simulated and tested by the permutation test itself, exact up to 12
 seeds and by 2,000 drawn patterns of signs beyond. Differences of single seeds are normal, as the
-promise has it, or those of two success rates of ten episodes, whose chances differ from seed to
+promise has it, or those of two success rates of ten episodes, whose means differ from seed to
 seed: these have ties and bounds. Then the same with the deviation that a study would estimate from
 its own seeds, averaged over the studies.
 """
@@ -34,10 +34,10 @@ CASES = (
     (6, 1, 1.2), (7, 2, 1.2), (8, 1, 1.0), (10, 5, 1.2), (12, 22, 1.5), (20, 1, 0.65),
     (30, 10, 0.7),
 )  # fmt: skip
-CHANCES = ((8, 1, 0.3, 0.8), (12, 2, 0.4, 0.8), (20, 1, 0.6, 0.8), (30, 10, 0.6, 0.85))
-"""Seeds, comparisons, mean chances of success that are compared; `RATES` was chosen on these."""
+SUCCESS_RATES = ((8, 1, 0.3, 0.8), (12, 2, 0.4, 0.8), (20, 1, 0.6, 0.8), (30, 10, 0.6, 0.85))
+"""Seeds, comparisons, mean success rates that are compared; `RATES` was chosen on these."""
 EPISODES, SPREAD = 10, 6.0
-"""Of each seed, and of the Beta distribution of chances over seeds: the sum of its parameters."""
+"""Of each seed, and of the Beta distribution of success over seeds: the sum of its parameters."""
 OTHERS = (
     (9, 1, 0.2, 0.7, 10, 6.0), (10, 3, 0.5, 0.95, 20, 3.0), (16, 1, 0.5, 0.75, 5, 12.0),
     (15, 4, 0.1, 0.45, 20, 6.0), (24, 2, 0.7, 0.9, 10, 3.0), (30, 1, 0.4, 0.55, 20, 12.0),
@@ -52,19 +52,19 @@ def normal(effect: float) -> Draw:
 
 
 def rates(first: float, second: float, episodes: int, spread: float) -> Draw:
-    """Return what draws differences of two success rates of mean chances `first` and `second`."""
+    """Return what draws differences of two success rates, `first` and `second` in the mean."""
 
     def draw(rng: np.random.Generator, studies: int, seeds: int) -> np.ndarray:
-        found = [
+        draws = [
             rng.binomial(episodes, rng.beta(p * spread, (1 - p) * spread, (studies, seeds)))
             for p in (first, second)
         ]
-        return np.asarray((found[1] - found[0]) / episodes)
+        return np.asarray((draws[1] - draws[0]) / episodes)
 
     return draw
 
 
-def found(differences: np.ndarray, comparisons: int) -> float:
+def share_of_significant(differences: np.ndarray, comparisons: int) -> float:
     """Return the share of studies ``(n_studies, n_seeds)`` that find their difference."""
     n = differences.shape[1]
     nothing, flips = np.zeros(n), 2**n if n <= EXACT_SEEDS else DRAWN
@@ -84,22 +84,22 @@ def main() -> None:
     cases: list[tuple[str, int, int, Draw, bool]] = [
         (f"normal, {effect:g} deviations", n, m, normal(effect), False) for n, m, effect in CASES
     ]
-    chances = [(*case, EPISODES, SPREAD) for case in CHANCES]
+    rates_compared = [(*case, EPISODES, SPREAD) for case in SUCCESS_RATES]
     cases += [
         (f"rates of {p:g}, {q:g} ({k})", n, m, rates(p, q, k, spread), True)
-        for n, m, p, q, k, spread in [*chances, *OTHERS]
+        for n, m, p, q, k, spread in [*rates_compared, *OTHERS]
     ]
     for name, seeds, comparisons, draw, of_rates in cases:
         rng = np.random.default_rng([seeds, comparisons])
         many = draw(rng, 100_000, 1)
         effect, deviation = float(many.mean()), float(many.std()) * (RATES if of_rates else 1.0)
         differences = draw(rng, options.studies, seeds)
-        share = found(differences, comparisons)
+        share = share_of_significant(differences, comparisons)
         promises = {"": power(effect, deviation, seeds, comparisons)}
         if of_rates:
             own = [deviation_of([d], of_rates=True) or 0.0 for d in differences[:200]]
-            told = [power(effect, round(d, 3), seeds, comparisons) for d in own]
-            promises[", own"] = float(np.mean(told))
+            promised = [power(effect, round(d, 3), seeds, comparisons) for d in own]
+            promises[", own"] = float(np.mean(promised))
         for how, promised in promises.items():
             off = share - promised
             worst = max(worst, abs(off))

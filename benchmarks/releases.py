@@ -48,14 +48,14 @@ def markdown(folder: Path) -> str:
         for path in sorted(folder.glob("*.json"))
     }
     lines = [f"| | {' | '.join(runs)} |", f"|---{'|---' * len(runs)}|"]
-    for label, told in FIGURES.items():
-        first, *later = [told(run) for run in runs.values()]
-        cells = [_told(first), *(f"{_told(value)} ({value / first:.2f})" for value in later)]
+    for label, figure in FIGURES.items():
+        first, *later = [figure(run) for run in runs.values()]
+        cells = [_text(first), *(f"{_text(value)} ({value / first:.2f})" for value in later)]
         lines.append(f"| {label} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def _told(value: float) -> str:
+def _text(value: float) -> str:
     return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 

@@ -111,8 +111,11 @@ def main() -> None:
             f"jobs {jobs}: {trial:.2f} processor seconds a trial, overhead {median(share):.2f} % "
             f"({min(share):.2f} to {max(share):.2f}), busy {busy:.3f}"
         )
-    found = [two.busy * one.trials / two.trials for one, two in rounds]
-    print(f"efficiency of 2 jobs: {median(found):.3f} ({min(found):.3f} to {max(found):.3f})")
+    efficiencies = [two.busy * one.trials / two.trials for one, two in rounds]
+    print(
+        f"efficiency of 2 jobs: {median(efficiencies):.3f} "
+        f"({min(efficiencies):.3f} to {max(efficiencies):.3f})"
+    )
     print(
         f"{options.rounds} rounds of {options.trials} trials in turns, load {load:.1f} before and "
         f"{os.getloadavg()[0]:.1f} after on {os.cpu_count()} cores"

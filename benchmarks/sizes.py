@@ -38,10 +38,10 @@ def solved(settings: BoxPushingSettings, seeds: int) -> str:
     if settings.scaling == "similar":
         steps = max(STEPS, STEPS_PER_ROBOT * settings.robots)
     taken = [decisions_to_goal(scenario, seed, steps) for seed in range(seeds)]
-    found = rate([[steps is not None] for steps in taken])
+    success = rate([[steps is not None] for steps in taken])
     decisions = [steps for steps in taken if steps is not None]
     typical = f", {median(decisions):.0f}" if decisions else ""
-    return f"{found.value:.2f} ({found.low:.2f} to {found.high:.2f}){typical}"
+    return f"{success.value:.2f} ({success.low:.2f} to {success.high:.2f}){typical}"
 
 
 def main() -> None:

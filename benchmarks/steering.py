@@ -16,9 +16,8 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.core.numerics import FloatArray
+from nested_agents.core.numerics import FloatArray, wrap
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.world.geometry import wrap
 from nested_agents.studies.claims import claims
 from nested_agents.studies.results import published
 from nested_agents.studies.trials.session import EVALUATION_WORLDS

@@ -42,7 +42,7 @@ def tables_of(
     session: Session, prediction: Prediction, scopes: Sequence[Scope]
 ) -> list[FloatArray]:
     """Return what each agent's value makes of the joint actions of its scope."""
-    team, found = session.team, []
+    team, tables = session.team, []
     a = len(team.action_set)
     for i, scope in enumerate(scopes):
         tried = np.indices((a,) * len(scope)).reshape(len(scope), -1).T
@@ -50,8 +50,8 @@ def tables_of(
         joint[:, list(scope)] = tried
         states = prediction.states(i, joint)
         theta = team.learner.theta[team.rows[i]]
-        found.append(team.evaluator.rules.values(theta, states).reshape((a,) * len(scope)))
-    return found
+        tables.append(team.evaluator.rules.values(theta, states).reshape((a,) * len(scope)))
+    return tables
 
 
 def best_responses(scopes: Sequence[Scope], tables: list[FloatArray], start: IntArray) -> IntArray:
@@ -118,7 +118,7 @@ def shares(robots: int, seed: int, episodes: int) -> dict[str, float]:
     """Return the mean share of the optimum that each way reaches with one trained team."""
     n = 2 * robots
     scopes = [tuple(j for j in (i - 1, i, i + 1) if 0 <= j < n) for i in range(n)]
-    found: dict[str, list[float]] = {}
+    by_way: dict[str, list[float]] = {}
     for session, prediction in situations(robots, seed, episodes):
         tables = tables_of(session, prediction, scopes)
         a, start = tables[0].shape[0], np.full(n, session.team.action_set.neutral)
@@ -137,9 +137,9 @@ def shares(robots: int, seed: int, episodes: int) -> dict[str, float]:
         }
         for name, joint in reached.items():
             share = (total(scopes, tables, joint) - mean) / (best - mean)
-            found.setdefault(name, []).append(share)
-    return {name: float(np.mean(each)) for name, each in found.items()} | {
-        "situations": float(len(next(iter(found.values()), [])))
+            by_way.setdefault(name, []).append(share)
+    return {name: float(np.mean(each)) for name, each in by_way.items()} | {
+        "situations": float(len(next(iter(by_way.values()), [])))
     }
 
 
@@ -154,8 +154,8 @@ def main() -> None:
         rows = []
         for seed in range(given.seeds):
             rows.append(shares(robots, seed, given.episodes))
-            told = ", ".join(f"{name} {value:.3g}" for name, value in rows[-1].items())
-            print(f"{robots} robots, seed {seed}: {told}", flush=True)
+            text = ", ".join(f"{name} {value:.3g}" for name, value in rows[-1].items())
+            print(f"{robots} robots, seed {seed}: {text}", flush=True)
         for name in rows[0]:
             values = [row[name] for row in rows]
             between = f"({min(values):.3g}-{max(values):.3g})"

@@ -199,8 +199,8 @@ def predictions() -> Figure:
         box(axes, 4.25, y, "next state", ORANGE, 1.1)
         arrow(axes, (4.85, y), (5.35, y), colour=GREEN)
         best = value == max(values)
-        told = f"f = {value}" + ", taken" * best
-        axes.text(5.45, y, told, va="center", color=GREEN, weight="bold" if best else "normal")
+        text = f"f = {value}" + ", taken" * best
+        axes.text(5.45, y, text, va="center", color=GREEN, weight="bold" if best else "normal")
     axes.text(2.5, 2.2, "own action, with those below", ha="center", color=GREY)
     axes.text(4.25, 2.2, "predictor", ha="center", color=ORANGE)
     axes.text(5.9, 2.2, "rule base", ha="center", color=GREEN)

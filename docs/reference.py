@@ -249,8 +249,8 @@ def api() -> Iterator[str]:
     rows = []
     for name, (module, attribute) in places.items():
         thing = getattr(nested_agents, name)
-        said = "" if isinstance(thing, Measure) else (thing.__doc__ or "")
-        first = prose(" ".join(said.strip().partition("\n\n")[0].split()))
+        text = "" if isinstance(thing, Measure) else (thing.__doc__ or "")
+        first = prose(" ".join(text.strip().partition("\n\n")[0].split()))
         home = getattr(thing, "__module__", f"nested_agents.{module}")
         role = f"{{py:obj}}`{name} <{home}.{attribute}>`"
         rows.append((role, first.replace("*", "\\*"), code(home.removeprefix("nested_agents."))))

@@ -13,7 +13,7 @@ from pathlib import Path
 from stable_baselines3 import PPO
 
 from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
-from nested_agents.studies.benchmark.push_n import LEAST_SEEDS, STEPS, Entry, Team, evaluate
+from nested_agents.studies.benchmark.push_n import LEAST_SEEDS, STEPS, Entry, TeamScores, evaluate
 
 PATH, DECISIONS, ROBOTS = Path(sys.argv[1]), int(sys.argv[2]), 2
 success, steps, decisions = [], [], []
@@ -25,7 +25,9 @@ for seed in range(LEAST_SEEDS):
     success.append(played[0])
     steps.append(played[1])
     decisions.append(model.num_timesteps)
-team = Team(robots=ROBOTS, success=tuple(success), steps=tuple(steps), decisions=tuple(decisions))
+team = TeamScores(
+    robots=ROBOTS, success=tuple(success), steps=tuple(steps), decisions=tuple(decisions)
+)
 about = "stable-baselines3's PPO for the whole team, its own settings but for discount and rollout"
 entry = Entry(name="PPO of examples", about=about, given="nothing", teams=(team,))
 PATH.write_text(entry.model_dump_json(indent=1) + "\n")

@@ -15,7 +15,7 @@ MOVES = 0.1 * np.array([(1, 0), (0, 1), (-1, 0), (0, -1), (0, 0)])
 """How far an action moves a robot [m]: east, north, west, south, or not at all."""
 FLIGHT = 0.08
 """How far the target flees in a step [m]."""
-ARENA = 2.0
+RADIUS = 2.0
 """Radius beyond which the target cannot flee [m]."""
 REACH = 0.5
 """Distance within which all robots must be [m]."""
@@ -42,7 +42,9 @@ class Pursuit:
             self.roles = ("robot",) * settings.robots
         names = ("east", "north", "west", "south", "wait")
         self.action_set = na.ActionSet(names, (0,) * 5, (0,) * 5, neutral=4)
-        east, north = (na.Variable(name, "m", -2 * ARENA, 2 * ARENA) for name in ("east", "north"))
+        east, north = (
+            na.Variable(name, "m", -2 * RADIUS, 2 * RADIUS) for name in ("east", "north")
+        )
         left, right = (na.Variable(f"gap_{s}", "rad", 0.0, 2 * np.pi) for s in ("left", "right"))
         self.state_space = na.StateSpace("pursuit", (east, north, left, right), n_own=2)
 
@@ -82,7 +84,7 @@ class Pursuit:
         off = self.target - self.places
         away = (off / np.maximum((off**2).sum(-1, keepdims=True), 0.01)).sum(0)
         target = self.target + FLIGHT * away / max(np.linalg.norm(away), 1e-9)
-        target *= min(1.0, ARENA / max(np.linalg.norm(target), 1e-9))
+        target *= min(1.0, RADIUS / max(np.linalg.norm(target), 1e-9))
         return self.places + MOVES[actions], target
 
     def seen(self, places, target):
@@ -94,7 +96,7 @@ class Pursuit:
         others = ~np.eye(len(self.agents), dtype=bool)
         left = turns.min(-1, where=others, initial=2 * np.pi)
         right = (2 * np.pi - turns).min(-1, where=others, initial=2 * np.pi)
-        off = np.clip(off, -2 * ARENA, 2 * ARENA)
+        off = np.clip(off, -2 * RADIUS, 2 * RADIUS)
         return np.concatenate([off, left[..., None], right[..., None]], -1)
 
     def paid(self, states):

@@ -69,17 +69,17 @@ def entry(name: str, robots: int) -> str:
 
 def orders() -> dict[str, str]:
     """Return what is tested of all orders of a chain: their number, seeds, and p by measure."""
-    found = order_tests(rows("chain-order").results)
-    return {"orders": str(found[0].orders), "seeds": str(found[0].seeds)} | {
-        f"p{k}": two_figures(test.p) for k, test in enumerate(found)
+    tests = order_tests(rows("chain-order").results)
+    return {"orders": str(tests[0].orders), "seeds": str(tests[0].seeds)} | {
+        f"p{k}": two_figures(test.p) for k, test in enumerate(tests)
     }
 
 
 def verdicts() -> Counter[str]:
     """Return how many claims of the paper have each verdict."""
     results = published.read(claims.PUBLISHED, claims.studies_of(claims.OWN))
-    found = claims.judge({name: study.results for name, study in results.items()})
-    return Counter(finding.verdict for finding in found)
+    findings = claims.judge({name: study.results for name, study in results.items()})
+    return Counter(finding.verdict for finding in findings)
 
 
 def build() -> str:

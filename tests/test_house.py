@@ -231,6 +231,41 @@ def test_a_circle_and_a_wrong_arrow_are_named() -> None:
     ]
 
 
+PRIVATE_WORDS = {
+    "found", "said", "meant", "doubts", "suited", "slip", "deaf", "bereft", "take_over",
+    "elsewhere", "arena", "foresee", "conduct", "hire",
+}  # fmt: skip
+"""What nothing is called; a method ``slips`` is of friction, ``told`` of messages."""
+
+
+def definitions(folder: str) -> Iterator[tuple[str, str, bool]]:
+    """Yield place and name of what is defined or assigned below a folder, and whether a class."""
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef | ast.FunctionDef):
+                name, is_class = node.name, isinstance(node, ast.ClassDef)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                name, is_class = node.id, False
+            elif isinstance(node, ast.arg):
+                name, is_class = node.arg, False
+            else:
+                continue
+            yield f"{path.relative_to(ROOT)}:{node.lineno}", name, is_class
+
+
+def test_words_are_the_fields_and_a_class_name_has_one_meaning() -> None:
+    classes: dict[str, list[str]] = {}
+    private = []
+    for folder in (*ALLOWED, "benchmarks", "examples", "docs", "paper"):
+        for place, name, is_class in definitions(folder):
+            if is_class and name != "Settings":  # that of a part, nested in its class
+                classes.setdefault(name, []).append(place)
+            if name.strip("_").lower() in PRIVATE_WORDS:
+                private.append(f"{place} {name}")
+    assert {name: places for name, places in classes.items() if len(places) > 1} == {}
+    assert private == []
+
+
 @pytest.mark.parametrize("package", ALLOWED)
 def test_symlinks_are_relative_and_resolve(package: str) -> None:
     link = ROOT / "nested_agents" / package

@@ -75,7 +75,7 @@ class TopologySettings(Settings):
     """What fails of the messages down the hierarchy, from when to when."""
 
     @model_validator(mode="after")
-    def _told_what_fails(self) -> Self:
+    def _check_relations(self) -> Self:
         if self.told == "none" and not all(isinstance(f, AbsentAgents) for f in self.failures):
             raise ValueError(
                 "told = 'none': there are no messages to fail, failures must be absent"

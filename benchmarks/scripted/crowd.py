@@ -23,10 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from nested_agents.core.numerics import BoolArray, FloatArray, IntArray
+from nested_agents.core.numerics import BoolArray, FloatArray, IntArray, wrap
 from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.pushing_points import CLEARANCE, Drivers, paths
-from nested_agents.scenarios.box_pushing.world.geometry import wrap
 
 from .sides import SPREAD, Side
 
@@ -144,8 +143,8 @@ class Crowd:
     def _other(self, side: Side, error: float) -> Side | None:
         """Return the side that pushes to where `side` cannot; None if there is none such."""
         turns = {float(wrap(s.direction - side.direction)): s for s in self.sides}
-        found = [t for t in turns if t * error > 0 and abs(error) < abs(t) < 2.4]
-        return turns[min(found, key=abs)] if found else None
+        possible = [t for t in turns if t * error > 0 and abs(error) < abs(t) < 2.4]
+        return turns[min(possible, key=abs)] if possible else None
 
     def _both(
         self,
@@ -225,8 +224,8 @@ class Crowd:
                 robots, box, twists, options, self._drivers.seconds, self._model
             )
             costs = self._cost(after, boxes, gaps, box, goal, plan)
-            found: IntArray = options[int(costs.argmin())]
-            return found
+            best: IntArray = options[int(costs.argmin())]
+            return best
 
         patterns = self._patterns(robots, box, plan, twists)
         patterns[:, ~free] = driven[~free]

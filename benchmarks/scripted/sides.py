@@ -95,8 +95,8 @@ def sides_of(box: BoxSpec, robots: int, span: float) -> list[Side]:
     if robots == 1 or not is_concave(box):
         return solid  # one robot steers by where it pushes, and needs a whole side
     directions = {round(side.direction, 9): side for side in _edges(Polygon(box.polygon.exterior))}
-    found = [_stand(box, direction, robots, span) for direction in directions]
-    return [side for side in found if side is not None] or solid
+    sides = [_stand(box, direction, robots, span) for direction in directions]
+    return [side for side in sides if side is not None] or solid
 
 
 def _edges(polygon: Polygon) -> Iterator[Side]:
@@ -121,11 +121,11 @@ def _stand(box: BoxSpec, direction: float, robots: int, span: float) -> Side | N
         np.minimum(places - low, high - places) >= MARGIN * span
     )
     least = (robots - 1) * span
-    best, found = -np.inf, None
+    best, stand = -np.inf, None
     for middle, spread in product(places, np.linspace(least, max(least, (high - low) / 2), 9)):
         stands = middle + spread * np.linspace(-1, 1, robots)
         nearest = np.abs(places[:, None] - stands).argmin(axis=0)
         off = abs(float(middle))
         if square[nearest].all() and off < 0.5 * spread and spread - 2 * off > best:
-            best, found = spread - 2 * off, (float(middle), float(spread))
-    return None if found is None else Side(direction, -low, found[0], found[1] / SPREAD)
+            best, stand = spread - 2 * off, (float(middle), float(spread))
+    return None if stand is None else Side(direction, -low, stand[0], stand[1] / SPREAD)

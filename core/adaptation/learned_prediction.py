@@ -1,4 +1,4 @@
-"""What a learned predictor makes of one situation, at once for many joint actions."""
+"""Predictions of a learned predictor: one situation, and many joint actions at once."""
 
 from functools import cached_property
 from typing import Any

@@ -25,7 +25,7 @@ from ..numerics import BoolArray, FloatArray, IntArray
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
 from .learned_prediction import LearnedPrediction, TabulatedPrediction
-from .predictors import Bodies, LearnedPredictorSettings, Mirror, driven_states
+from .predictors import DrivenBodies, LearnedPredictorSettings, Mirror, driven_states
 
 INTERVAL = 100
 """Decisions of an episode after which is regressed without waiting for its end."""
@@ -72,7 +72,9 @@ class LearnedPredictor:
             raise ValueError("learner.predictor.mirrored: without own variables there is no mirror")
         mirrored = known if settings.mirrored is None else settings.mirrored
         self.mirror = Mirror.of(scenario) if mirrored else None
-        self.bodies = Bodies(scenario, products=settings.products, memberships=settings.memberships)
+        self.bodies = DrivenBodies(
+            scenario, products=settings.products, memberships=settings.memberships
+        )
         self.kinds = rows_of(scenario, shared=True)
         """``(n,)`` agents of one kind have own variables that change alike."""
         own = [Partition.of(variable) for variable in space.own]

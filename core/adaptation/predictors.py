@@ -1,10 +1,10 @@
-"""What predicts, as it stands in ``[learner] predictor`` of a spec; what learned ones rest on.
+"""Settings of predictors, ``[learner] predictor`` of a spec, and what learned predictors rest on.
 
-Mirrored experience is what the image of a team would have met in the mirror image of its world.
-Whoever learns which way to turn with the goal on the left has learned it for the right, if it is
-told that the two are alike. In a mirror every agent stands where its partner stood (the left wheel
-of a robot where the right one was), some state variables change their sign, and rewards stay. So a
-step is two steps of experience, to learners that regress on after-states.
+Mirrored experience is what the image of a team would have met in the mirror image of its world. An
+agent that learns which way to turn with the goal on the left has learned it for the right, too, if
+it is told that the two are mirror images. In a mirror every agent stands where its partner stood
+(the left wheel of a robot where the right one was), some state variables change their sign, and
+rewards stay. So a step is two steps of experience, to learners that regress on after-states.
 
 Bodies are driven: how much a driver moves what is a function of the present state of its body: a
 sum over the active rules of a rule base. It moves the variables of its own body and those of all
@@ -152,7 +152,7 @@ class Mirror:
         return np.tile(reward, 2) if isinstance(reward, np.ndarray) else reward
 
 
-class Bodies:
+class DrivenBodies:
     """Which variables there are to predict, by body, and who drives them.
 
     Bodies alike, in the roles of their agents, have the shared variables of their group each.

@@ -1,6 +1,7 @@
-"""A robot's model of itself: what each of its wheels does to its motion, learned while moving.
+"""What bodies learn of themselves and of what they push, from how they were seen to move.
 
-The twist of a robot in its own frame is taken as linear in its commanded wheel speeds::
+A *self-model* says what each wheel of a body does to its motion. The twist of a body in its own
+frame is taken as linear in its commanded wheel speeds::
 
     twist = effect @ [u_1, ..., u_w, 1] + noise
 
@@ -15,7 +16,7 @@ keeps count of how large its innovations have been, in units of what it expected
 covariance, which decides how fast it learns, stays as it is; the deviations that it reports are
 multiplied by that ratio (Birge 1932).
 
-What a team holds of its predictor's constants: estimated while bodies push, from what happened.
+*Calibration* estimates the constants of a team's predictor while bodies push.
 
 Positive constants are known up to factors, whose logarithms x are estimated by a Kalman filter;
 0 is what was believed at first. What a decision led to is a vector of speeds z = h(x) + noise, h
@@ -27,7 +28,7 @@ x = m + L u, L L' = P, and z+, z- predicted at u = +-sqrt(n) e_j::
     P <- L (I + G' W / N G)^-1 L',       m <- m + L (I + G' W / N G)^-1 G' W / N (z - mean z)
 
 N holds what is not linear, too. The weight W of a body falls below 1 when it did what the filter
-does not believe possible: a jam, a wheel that fails, a robot that gets in the way. Of such a
+does not believe possible: a jam, a wheel that fails, a body that gets in the way. Of such a
 decision little is learned. What drifts is added to P, so that it never falls to nothing.
 """
 
@@ -47,10 +48,10 @@ MEMORY = 100
 
 
 class SelfModelSettings(Settings):
-    """Whether and how fast a robot revises what it believes its wheels to do."""
+    """Whether and how fast a body revises what it believes its wheels to do."""
 
     enabled: bool = False
-    """Whether robots learn it; otherwise prediction takes every robot as nominal."""
+    """Whether bodies learn it; otherwise prediction takes every body as nominal."""
     prior_effect: Positive = 0.3
     """Standard deviation of a wheel's effect around the nominal one [m/s per m/s]."""
     prior_constant: Positive = 0.003
@@ -64,14 +65,14 @@ class SelfModelSettings(Settings):
 
 
 class SelfModel:
-    """Kalman filters on the wheel effects of all robots.
+    """Kalman filters on the wheel effects of all bodies.
 
     Parameters
     ----------
     settings
         Uncertainties of prior and measurement.
     nominal
-        Per robot the ``(3, w + 1)`` effect of its nominal geometry: rows are the speed ahead and
+        Per body the ``(3, w + 1)`` effect of its nominal geometry: rows are the speed ahead and
         to the left [m/s] and the turning rate [rad/s], columns the wheel speeds [m/s] and 1.
 
     Examples
@@ -90,8 +91,8 @@ class SelfModel:
         self._settings = settings
         self._nominal = [np.array(effect, dtype=float) for effect in nominal]
         self.effects = tuple(effect.copy() for effect in self._nominal)
-        """Per robot the ``(3, w + 1)`` effect of its wheels, as learned so far."""
-        # A turning rate is measured in units of the nominal robot's own turning per wheel speed.
+        """Per body the ``(3, w + 1)`` effect of its wheels, as learned so far."""
+        # A turning rate is measured in units of the nominal body's own turning per wheel speed.
         turning = [max(1.0, float(np.abs(effect[2]).max())) for effect in nominal]
         self._units = [np.array([1.0, 1.0, unit]) for unit in turning]
         of_effect, of_constant = settings.prior_effect**2, settings.prior_constant**2
@@ -103,7 +104,7 @@ class SelfModel:
 
     @property
     def deviations(self) -> tuple[FloatArray, ...]:
-        """Per robot the ``(3, w + 1)`` standard deviations of its effect.
+        """Per body the ``(3, w + 1)`` standard deviations of its effect.
 
         Those of its filters, times how much larger their innovations are than they expect.
         """
@@ -130,7 +131,7 @@ class SelfModel:
     def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
         """Revise all effects by how the bodies moved by a joint action.
 
-        What contact is predicted to take from the motion is given back: a robot that moves a load
+        What contact is predicted to take from the motion is given back: a body that moves a load
         is slow, not broken.
         """
         if transition.twists is None:
@@ -140,17 +141,17 @@ class SelfModel:
         for body, group in enumerate(prediction.groups):
             self.observe(body, speeds[list(group)], free[body])
 
-    def observe(self, robot: int, speeds: FloatArray, twist: FloatArray) -> None:
+    def observe(self, body: int, speeds: FloatArray, twist: FloatArray) -> None:
         """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
-        settings, regressor, ratio = self._settings, np.append(speeds, 1.0), self._ratios[robot]
-        noise, effect, covariance = settings.noise**2, self.effects[robot], self._covariances[robot]
-        for row, unit in enumerate(self._units[robot]):
+        settings, regressor, ratio = self._settings, np.append(speeds, 1.0), self._ratios[body]
+        noise, effect, covariance = settings.noise**2, self.effects[body], self._covariances[body]
+        for row, unit in enumerate(self._units[body]):
             innovation = float(twist[row] - effect[row] @ regressor) / unit
             carried = covariance[row] @ regressor
             expected = float(regressor @ carried) + noise
             ratio[row] += (innovation**2 / expected - ratio[row]) / MEMORY
             if innovation**2 > settings.surprise * expected:
-                covariance[row] += settings.inflation * self._priors[robot]
+                covariance[row] += settings.inflation * self._priors[body]
                 carried = covariance[row] @ regressor
                 expected = float(regressor @ carried) + noise
             gain = carried / expected

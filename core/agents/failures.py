@@ -95,7 +95,7 @@ LOST = -1
 
 
 class Sent(NamedTuple):
-    """What some agents say, of which something fails."""
+    """Messages of some agents before they fail."""
 
     actions: IntArray
     """``(k,)`` what they have decided."""
@@ -108,7 +108,7 @@ class Sent(NamedTuple):
 
 
 class MessageFailure(Scheduled):
-    """From when to when what agents say fails."""
+    """A failure of the messages of some agents, from when to when."""
 
     part: ClassVar[str] = "agents"
 
@@ -128,7 +128,7 @@ class MessageFailure(Scheduled):
 
 
 class LostMessages(MessageFailure):
-    """What the agents say is lost, each message with a probability."""
+    """Each message of the agents is lost with a probability."""
 
     kind: Literal["lost"] = "lost"
     probability: Fraction = 1.0
@@ -141,7 +141,7 @@ class LostMessages(MessageFailure):
 
 
 class DelayedMessages(MessageFailure):
-    """What the agents say is what they did some decisions before."""
+    """Each message of the agents arrives some decisions late."""
 
     kind: Literal["delayed"] = "delayed"
     decisions: Annotated[int, Field(ge=1, le=1000)] = 1
@@ -154,7 +154,7 @@ class DelayedMessages(MessageFailure):
 
 
 class NoisyMessages(MessageFailure):
-    """What the agents say is any action, each message with a probability."""
+    """Each message of the agents is replaced by a random action with a probability."""
 
     kind: Literal["noisy"] = "noisy"
     probability: Fraction = 0.3
@@ -168,7 +168,7 @@ class NoisyMessages(MessageFailure):
 
 
 class AbsentAgents(MessageFailure):
-    """The agents maintain and say nothing; nobody knows."""
+    """The agents perform the neutral action and send no messages; nobody knows."""
 
     kind: Literal["absent"] = "absent"
 
@@ -193,7 +193,7 @@ AnyMessageFailure = Annotated[
 
 
 class Messages:
-    """Who hears what in the decisions of a team.
+    """The messages of a team: which agent is told which actions in a decision.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 1. *Error observation*: the scenario turns the goal and what it senses into the agents' states.
 2. *Action selection*, coupled with learning: the team predicts, values and chooses a joint action.
-3. *Servo control*: the scenario turns it into wheel speeds and moves the robots.
+3. *Servo control*: the scenario turns it into commanded speeds and moves the bodies.
 
 Recording, progress and plotting consume the records; none of them enters the loop.
 
@@ -340,8 +340,8 @@ class JointPrediction:
         """Return what the scenario's own prediction can do, for the actions of those who act."""
         own, joint = self._prediction, self._joint
         if name in OF_JOINT_ACTIONS:
-            asked = getattr(own, name)
-            return lambda joint_actions, *rest: asked(joint.actions(joint_actions), *rest)
+            method = getattr(own, name)
+            return lambda joint_actions, *rest: method(joint.actions(joint_actions), *rest)
         if name == "reward_table" and joint.whole:
             return partial(self.rewards, joint.every())
         # The tables of next states are used with those of rewards.

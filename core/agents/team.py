@@ -51,7 +51,7 @@ class Team:
     evaluator
         Values actions; none: actions are drawn at random.
     self_model
-        What the wheels do, as learned; none: prediction takes every robot as nominal.
+        What the wheels do, as learned; none: prediction takes every body as nominal.
     calibration
         The predictor's constants, as learned; none: as the scenario believes them to be.
     predictor
@@ -104,7 +104,8 @@ class Team:
         self._n_told = max(map(len, self._senders), default=0)
         self.space, self.rules = settings.rules_over(space, self.action_set, self._n_told)
         self.learner: Learner = settings.build(self.rules, rows)
-        self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
+        parameters = signature(self.learner.observe).parameters
+        self._arguments = parameters.keys() & {"left", "joint_action"}
         self._states: FloatArray = np.zeros((n, space.n_variables))
         self._left: FloatArray = self._states
         self.evaluator: Evaluator | None = None
@@ -285,8 +286,8 @@ class Team:
             states, reward = self.mirror.states(states), self.mirror.reward(reward)
             left, taken = self.mirror.states(left), np.tile(taken, 2)
         offered = {"left": left, "joint_action": taken}
-        asked: Any = {name: offered[name] for name in self._asked}
-        self._count(self.learner.observe(states, reward, transition.terminated, **asked))
+        arguments: Any = {name: offered[name] for name in self._arguments}
+        self._count(self.learner.observe(states, reward, transition.terminated, **arguments))
 
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""

@@ -51,7 +51,7 @@ class BestResponseSettings(EvaluatorSettings):
 
 
 class _Known(NamedTuple):
-    """What the joint actions of one body's agents were last found to be worth."""
+    """The values of the joint actions of one body's agents, as last computed."""
 
     concerned: IntArray
     plan: IntArray
@@ -66,7 +66,7 @@ class _Known(NamedTuple):
 
 
 class _Ahead(NamedTuple):
-    """What bodies, the next ones too, were found to be worth while a plan stands."""
+    """The values of the actions of several bodies in a row, while a plan stands."""
 
     concerned: IntArray
     plan: IntArray
@@ -231,24 +231,24 @@ class BestResponse(Aggregation):
         bodies = [free] if begun < 0 else self._bodies[begun : begun + depth]
         parts, changes = [], []
         for agents in bodies:
-            alike, distinct = self._told_apart(agents)
+            alike, distinct = self._distinct(agents)
             planned = alike[self._index(plan, agents)]
             predicted = distinct[distinct != planned]
             parts.append((agents, alike, planned, predicted))
             changes.append((agents, self._actions[len(agents)][predicted]))
         worths: dict[tuple[int, ...], FloatArray] = {}
         varied, at = _with(plan, changes), 0
-        found = self.predicted_worth(deliberation, varied) if len(varied) else np.empty(0)
+        varied_worths = self.predicted_worth(deliberation, varied) if len(varied) else np.empty(0)
         for agents, alike, planned, predicted in parts:
             each = np.empty(len(alike))
-            each[planned], each[predicted] = value, found[at : at + len(predicted)]
+            each[planned], each[predicted] = value, varied_worths[at : at + len(predicted)]
             worths[agents], at = each[alike], at + len(predicted)
         return _Ahead(self.concerned[deliberation.agent], plan.copy(), begun, worths)
 
-    def _told_apart(self, agents: tuple[int, ...]) -> tuple[IntArray, IntArray]:
+    def _distinct(self, agents: tuple[int, ...]) -> tuple[IntArray, IntArray]:
         """Return what each action of a body's agents comes to the same as, and the distinct ones.
 
-        Told apart in agent order, even where the agents of a body decide in another.
+        They are compared in agent order, even where the agents of a body decide in another.
         """
         body, every = self._body_of[agents[0]], self._numbers[: len(self._actions[len(agents)])]
         return self._alike[body] if agents == self.problem.groups[body] else (every, every)
@@ -266,7 +266,7 @@ class BestResponse(Aggregation):
         plan, value = self._started(deliberation, free), None
         for members in self._sweeps * list(bodies.values()):
             worths = self._valued(deliberation, plan, tuple(members), value).ravel()
-            distinct = self._told_apart(tuple(sorted(members)))[1]
+            distinct = self._distinct(tuple(sorted(members)))[1]
             self.count(agent, len(distinct))
             best = distinct[greatest(worths[distinct], rng)]
             plan[members], value = self._actions[len(members)][best], worths[best]

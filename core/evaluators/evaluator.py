@@ -1,4 +1,4 @@
-"""What an evaluator is and what it is asked, and what those share that try joint actions.
+"""Evaluators: their interface, and what those that try joint actions have in common.
 
 In the mean value of several agents each thing that they share is valued once. A rule base is a sum
 of terms. What a term of common variables is worth to all agents is what it is worth to one that has
@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from ..interface.hierarchy import Hierarchy
-from ..interface.spaces import Prediction, states_by_group
+from ..interface.spaces import Prediction, has_tables, states_by_group
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import PartSettings
@@ -247,7 +247,7 @@ class Aggregation:
         return self.predicted_worth(deliberation, joint_actions)
 
     def predicted_worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
-        """Return the same of joint actions that are counted elsewhere."""
+        """Return the same of joint actions, which the caller counts."""
         prediction: Any = deliberation.prediction
         concerned = self.concerned[deliberation.agent]
 
@@ -288,9 +288,9 @@ class Aggregation:
         joint[:, list(self.hierarchy.below(agent))] = np.tile(tried, (a, 1))
         return self.worth(deliberation, joint).reshape(a, -1)
 
-    def drawn(self, chances: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:
+    def drawn(self, probabilities: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:
         """Return actions ``(samples, ...)`` drawn by their probabilities ``(..., A)``."""
-        ladder = chances.cumsum(axis=-1)[..., :-1]
+        ladder = probabilities.cumsum(axis=-1)[..., :-1]
         return (rng.random((samples, *ladder.shape[:-1], 1)) >= ladder).sum(axis=-1)
 
     def combine(self, rewards: Predicted, values: Predicted) -> FloatArray:
@@ -392,8 +392,7 @@ class ExactEnumeration(Aggregation):
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value each own action with each of the joint actions below, from tables if there are."""
         prediction: Any = deliberation.prediction
-        tabulated = hasattr(prediction, "blocks") and hasattr(prediction, "reward_table")
-        if not (self._tried and tabulated):
+        if not (self._tried and has_tables(prediction)):
             return super().worths(deliberation, tried)
         known, places, _ = self._tried[deliberation.agent]
         indices = (known + int(deliberation.joint_action @ places)).ravel()

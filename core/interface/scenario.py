@@ -134,8 +134,8 @@ class EpisodeRecorder:
     Parameters
     ----------
     scenario
-        As it is before the first step, which no transition tells; it may be a like of the one that
-        steps.
+        As it is before the first step, which no transition describes; another instance than the one
+        that steps may be given, if it is in the same state.
     """
 
     def __init__(self, scenario: RecordedScenario) -> None:

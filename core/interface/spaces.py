@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
-from typing import Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -311,6 +311,11 @@ NOT_EXPLORING = Exploring(np.zeros(0), -1.0, 1.0)
 BestResponses = Callable[[FloatArray, IntArray, IntArray, Exploring, np.random.Generator], IntArray]
 """Returns the joint action ``(n,)`` by the agents' weights ``(n, n_rules)``, a plan ``(n,)`` to
 start from, the order of decision ``(n,)``, how they explore, and a source of randomness."""
+
+
+def has_tables(prediction: Any) -> bool:
+    """Return whether a prediction has tables of all joint actions: of states, and of rewards."""
+    return hasattr(prediction, "blocks") and hasattr(prediction, "reward_table")
 
 
 def first_alike(keys: IntArray | FloatArray) -> IntArray:

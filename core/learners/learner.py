@@ -129,7 +129,7 @@ class LearnerSettings(TeamSettings):
     decision: Decision = Decision()
     """How values become a joint action."""
     self_model: SelfModelSettings = SelfModelSettings()
-    """What robots learn of their own wheels."""
+    """What bodies learn of their own wheels."""
     calibration: CalibrationSettings = CalibrationSettings()
     """What the team learns of the constants of its predictor."""
     predictor: Annotated[Predictor, unwritten(GivenPredictor())] = GivenPredictor()

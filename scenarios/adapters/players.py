@@ -15,7 +15,7 @@ from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
 from gymnasium.spaces.utils import flatten, flatten_space
 
 from ...core.interface.spaces import ActionSet, Variable
-from ...core.numerics import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray, wrap
 from ..faults.wrappers import limits_of
 from .settings import AdaptedSettings, Direction
 
@@ -307,5 +307,5 @@ class Perception:
         bodies = np.arange(len(numbers))[:, None]
         states: FloatArray = numbers[bodies, self._first]
         turned = np.where(self._is_pair, np.arctan2(numbers[bodies, self._last], states), states)
-        wrapped = (turned + np.pi) % (2.0 * np.pi) - np.pi
-        return np.where(self._is_angle, np.where(self._is_pair, turned, wrapped), states)
+        angles = np.where(self._is_pair, turned, wrap(turned))
+        return np.where(self._is_angle, angles, states)

@@ -1,4 +1,4 @@
-"""Environments of Gymnasium and PettingZoo in one form: players, whom a step tells what it did.
+"""Environments of Gymnasium and PettingZoo in one form: players that act and observe.
 
 A player acts and observes: the one of Gymnasium, an agent of PettingZoo. Who has left an episode
 before its end observes what it last observed, and is paid nothing.

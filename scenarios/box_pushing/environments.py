@@ -32,7 +32,7 @@ ENV_ID = "NestedAgents/BoxPushing-v0"
 RENDER_MODES = ["rgb_array"]
 
 
-class Seat:
+class Player:
     """The wheels that one outside agent drives, and what it observes.
 
     Parameters
@@ -70,8 +70,8 @@ class Seat:
         return float(reward if np.ndim(reward) == 0 else np.mean(np.take(reward, self.wheels)))
 
 
-class Game(ABC):
-    """A scenario with seats, a clock, a stream of seeds and pictures; inherit it beside an API.
+class Environment(ABC):
+    """A scenario with players, a clock, a stream of seeds and pictures; inherit it beside an API.
 
     Parameters
     ----------
@@ -110,11 +110,11 @@ class Game(ABC):
         self.scenario = BoxPushing(settings)
         self.steps, self.render_mode, self.sensors = steps, render_mode, sensors
         self._recorder: EpisodeRecorder | None = None
-        self.seats = {
-            name: Seat(self.scenario, wheels, by_wheel=by_wheel)
+        self.players = {
+            name: Player(self.scenario, wheels, by_wheel=by_wheel)
             for name, wheels in self._teams().items()
         }
-        self.possible_agents = list(self.seats)
+        self.possible_agents = list(self.players)
         self.agents: list[str] = []
         self._seeds = np.random.default_rng()
         self._episode, self._step = -1, 0
@@ -174,8 +174,8 @@ class Game(ABC):
         return picture(recording, len(recording["box_pose"]) - 1, sensors=self.sensors)
 
 
-class WheelsEnv(Game, ParallelEnv):
-    """Box pushing as a PettingZoo environment whose agents are the wheels; see `Game`.
+class WheelsEnv(Environment, ParallelEnv):
+    """Box pushing as a PettingZoo environment whose agents are the wheels; see `Environment`.
 
     Examples
     --------
@@ -197,16 +197,16 @@ class WheelsEnv(Game, ParallelEnv):
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an agent's observations."""
-        return self.seats[agent].observation_space
+        return self.players[agent].observation_space
 
     def action_space(self, agent: str) -> Discrete | MultiDiscrete:
         """Return the space of an agent's actions."""
-        return self.seats[agent].action_space
+        return self.players[agent].action_space
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
-        """Start an episode, see `Game.begin`; return observations and infos by agent."""
+        """Start an episode, see `Environment.begin`; return observations and infos by agent."""
         return self._observe(self.begin(seed, options), self.scenario.measure())
 
     def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
@@ -226,10 +226,10 @@ class WheelsEnv(Game, ParallelEnv):
             raise ValueError(f"step: actions of {list(actions)}: {problem}; agents: {self.agents}")
         joint = np.empty(len(self.scenario.agents), dtype=np.int64)
         for name in self.agents:
-            joint[self.seats[name].wheels] = actions[name]
+            joint[self.players[name].wheels] = actions[name]
         transition, truncated = self.advance(joint)
         observations, infos = self._observe(transition.states, transition.info)
-        rewards = {name: self.seats[name].paid(transition.reward) for name in self.agents}
+        rewards = {name: self.players[name].paid(transition.reward) for name in self.agents}
         ends = dict.fromkeys(self.agents, transition.terminated)
         breaks = dict.fromkeys(self.agents, truncated)
         if transition.terminated or truncated:
@@ -240,13 +240,13 @@ class WheelsEnv(Game, ParallelEnv):
         self, states: FloatArray, measured: Mapping[str, Any]
     ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
         return (
-            {name: self.seats[name].observe(states) for name in self.agents},
+            {name: self.players[name].observe(states) for name in self.agents},
             {name: self.info(measured) for name in self.agents},
         )
 
 
 class RobotsEnv(WheelsEnv):
-    """Box pushing as a PettingZoo environment whose agents are the robots; see `Game`.
+    """Box pushing as a PettingZoo environment whose agents are the robots; see `Environment`.
 
     Examples
     --------
@@ -261,8 +261,8 @@ class RobotsEnv(WheelsEnv):
         return {f"robot{r + 1}": group for r, group in enumerate(self.scenario.groups)}
 
 
-class BoxPushingEnv(Game, gymnasium.Env):
-    """Box pushing as a Gymnasium environment: one agent drives all wheels; see `Game`.
+class BoxPushingEnv(Environment, gymnasium.Env):
+    """Box pushing as a Gymnasium environment: one agent drives all wheels; see `Environment`.
 
     Examples
     --------
@@ -279,26 +279,26 @@ class BoxPushingEnv(Game, gymnasium.Env):
     @cached_property
     def observation_space(self) -> Box:  # type: ignore[override]
         """The space of observations."""
-        return self.seats["single"].observation_space
+        return self.players["single"].observation_space
 
     @cached_property
     def action_space(self) -> Discrete | MultiDiscrete:  # type: ignore[override]
         """The space of actions."""
-        return self.seats["single"].action_space
+        return self.players["single"].action_space
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
-        """Start an episode, see `Game.begin`; return observation and info."""
+        """Start an episode, see `Environment.begin`; return observation and info."""
         super().reset(seed=seed)
         states = self.begin(seed, options)
-        return self.seats["single"].observe(states), self.info(self.scenario.measure())
+        return self.players["single"].observe(states), self.info(self.scenario.measure())
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
         transition, truncated = self.advance(np.asarray(action, dtype=np.int64))
-        seat, info = self.seats["single"], self.info(transition.info)
-        seen, paid = seat.observe(transition.states), seat.paid(transition.reward)
+        player, info = self.players["single"], self.info(transition.info)
+        seen, paid = player.observe(transition.states), player.paid(transition.reward)
         return seen, paid, transition.terminated, truncated, info
 
 

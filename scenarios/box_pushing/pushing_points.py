@@ -35,12 +35,12 @@ from shapely.geometry.polygon import orient
 
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ...core.numerics import FloatArray, IntArray, njit
+from ...core.numerics import FloatArray, IntArray, njit, wrap
 from .config import BoxPushingSettings, BoxTaskSettings, PushingPointsSettings
 from .prediction.predictors import push_model
 from .scenario import MEASURES, BoxPushing
 from .world.bodies import BoxSpec, nominal_effect
-from .world.geometry import surface, wrap
+from .world.geometry import surface
 from .world.settings import RobotSettings
 
 CLEARANCE = 0.006

@@ -16,7 +16,7 @@ import numpy as np
 from ...core.agents.team import Team
 from ...core.interface.scenario import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet
-from ...core.numerics import FloatArray, IntArray, stream_of
+from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from .config import BoxPushingSettings
 from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
@@ -25,7 +25,6 @@ from .prediction.settings import BeliefSettings
 from .states.relational import View
 from .states.state_spaces import state_space_for
 from .world.bodies import box_for, growth, nominal_effect, robot_for
-from .world.geometry import wrap
 from .world.settings import CONTROL_PERIOD, Task, reward
 from .world.world import WheelFailures, World, place
 

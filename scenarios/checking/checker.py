@@ -26,9 +26,10 @@ import numpy as np
 
 from ...core.agents.loop import world_seed
 from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, lacking, roles_of
+from ...core.interface.spaces import has_tables
 from ...core.numerics import FloatArray, IntArray
 from .frames import Examination, Frame, at, bits, differences, fields, measured, opening
-from .predictions import apart, faults_of_prediction, faults_of_sharing, has_tables, too_many
+from .predictions import apart, faults_of_prediction, faults_of_sharing, too_many
 
 TOLERANCE = 1e-6
 """Difference of sensed and predicted variables that rounding may make, relative to their range."""
@@ -39,7 +40,7 @@ FAR = 10
 
 
 class MetVariable(NamedTuple):
-    """What was met of a variable, or of the reward, beside what is said of it."""
+    """The values met of a variable, or of the reward, beside what the scenario declares."""
 
     name: str
     """Of the variable, or ``reward``."""
@@ -274,7 +275,7 @@ def _measures(of: Examination) -> Iterator[str]:
     kept = scenario.recorded if isinstance(scenario, RecordedScenario) else ()
     for step, action in enumerate(of.actions(scenario, of.seeds[0])[:STEPS], 1):
         transition = scenario.step(action)
-        info, told = transition.info, measured(scenario)
+        info, measurements = transition.info, measured(scenario)
         for measure in measures:
             source = measure.source
             if source != "terminated" and source not in info:
@@ -282,10 +283,10 @@ def _measures(of: Examination) -> Iterator[str]:
             if source != "terminated" and np.ndim(info[source]):
                 yield f"{measure.name}: info[{source!r}] must be one number"
         for name in kept:
-            if name not in info or name not in told:
+            if name not in info or name not in measurements:
                 lacking_it = "measure" if name in info else "info"
                 yield f"recorded is {name!r}, which {lacking_it} has not"
-            if bits(info[name]) != bits(told[name]):
+            if bits(info[name]) != bits(measurements[name]):
                 yield f"recorded is {name!r}, of which info and measure differ {at(step)}"
         if transition.terminated or transition.truncated:
             break
@@ -352,9 +353,9 @@ def _only_looks(of: Examination) -> Iterator[str]:
     """Check that predicting and measuring change nothing."""
     for seed, episode in product(of.seeds, of.episodes):
         silent = of.play(of.factory(), seed, episode)
-        asked = of.play(of.factory(), seed, episode, predicting=True)
+        predicting = of.play(of.factory(), seed, episode, predicting=True)
         words = "an episode in which predictions are asked for differs"
-        yield from differences(list(silent), asked, words)
+        yield from differences(list(silent), predicting, words)
 
 
 def _predicts(of: Examination) -> Iterator[str]:

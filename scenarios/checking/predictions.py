@@ -1,4 +1,4 @@
-"""Whether a prediction has the right shapes, claims what is so, and has tables that say the same.
+"""Whether a prediction has the right shapes, keeps its promises, and has tables that agree with it.
 
 Agents share the variables that they are said to share, and what is said to be an agent's own does
 not change with what others do.
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...core.interface.scenario import Scenario, groups_of
-from ...core.interface.spaces import Blocks, states_by_group
+from ...core.interface.spaces import Blocks, has_tables, states_by_group
 from ...core.numerics import BoolArray, FloatArray, IntArray
 
 MOST_JOINT_ACTIONS = 4**8
@@ -54,11 +54,6 @@ def faults_of_prediction(
         yield from _wrong_tables(scenario, prediction, rng)
     else:
         yield from _own_variable_moved(scenario, prediction, given, rng)
-
-
-def has_tables(prediction: Any) -> bool:
-    """Return whether a prediction has tables of all joint actions, too many to ask for or not."""
-    return hasattr(prediction, "blocks") and hasattr(prediction, "reward_table")
 
 
 def too_many(scenario: Scenario) -> str:

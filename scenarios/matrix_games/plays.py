@@ -43,7 +43,7 @@ class Deciding(NamedTuple):
     cells: IntArray  # (n, A ** n) the rule that each agent's state fires after a joint action
 
 
-class Exploring(NamedTuple):
+class ExplorationParameters(NamedTuple):
     """How it explores; meanings of the fields are those of `PaperExploration`."""
 
     kind: int
@@ -68,7 +68,7 @@ class Learning(NamedTuple):
 @njit(cache=True)
 def play(  # type: ignore[no-untyped-def]
     rng, world, plays: int, payoffs: FloatArray, optimal: FloatArray, theta: FloatArray,
-    rows: IntArray, deciding: Deciding, exploring: Exploring, clock: FloatArray,
+    rows: IntArray, deciding: Deciding, exploring: ExplorationParameters, clock: FloatArray,
     learning: Learning, seen: FloatArray, given: FloatArray, joints: IntArray, paid: FloatArray,
 ):  # fmt: skip
     """Play, and learn from all plays but the last two.
@@ -209,10 +209,10 @@ TEAMMATES = ("best-response", "uniform", "empirical", "conditional")
 """Teammate models in the order of the kernel."""
 NONE: FloatArray = np.zeros((0, 0))
 STILL = Learning(False, 0.0, 1.0, 0.0, NONE, NONE, NONE, NONE)
-NO_EXPLORATION = Exploring(GREEDY, 0.0, 0.0, 0.0)
+NO_EXPLORATION = ExplorationParameters(GREEDY, 0.0, 0.0, 0.0)
 
 
-Parts = tuple[Deciding, Exploring, Learning]
+Parts = tuple[Deciding, ExplorationParameters, Learning]
 """A team as the kernel knows it."""
 
 
@@ -265,8 +265,8 @@ def _is_table(evaluator: ExactEnumeration) -> bool:
     whole = tuple(range(len(rules.partitions)))
     actions = tuple(float(a) for a in range(evaluator.n_actions))
     at_actions = all(partition.centres == actions for partition in rules.partitions)
-    asked = problem.rule, problem.value_of, problem.unseen
-    own = asked == ("value", "own", "maintain")
+    requested = problem.rule, problem.value_of, problem.unseen
+    own = requested == ("value", "own", "maintain")
     return own and rules.compact and at_actions and rules.terms == (whole,)
 
 
@@ -303,12 +303,12 @@ def _learning(learner: Any) -> Learning | None:
     return None
 
 
-def _exploring(explorer: Any) -> Exploring | None:
+def _exploring(explorer: Any) -> ExplorationParameters | None:
     """Return how an explorer explores; None if it is not known."""
     s: Any = getattr(explorer, "settings", None)
     if type(explorer) is Boltzmann:
-        return Exploring(SAMPLED, s.max_temperature, s.decay, 0.0)
+        return ExplorationParameters(SAMPLED, s.max_temperature, s.decay, 0.0)
     is_known = type(explorer) is EpsilonDecreasingBoltzmann
     if is_known and (s.explore, s.exploit) == ("uniform", "greatest"):
-        return Exploring(DECREASING, s.max_temperature, s.decay, s.epsilon)
+        return ExplorationParameters(DECREASING, s.max_temperature, s.decay, s.epsilon)
     return None

@@ -378,8 +378,8 @@ def _entries(topology: Sequence[Any], decision: Sequence[Any]) -> dict[str, dict
     given = {"topology": topology, "decision": decision}
     lists = {key: plain(values, key) for key, values in given.items() if values}
     if not lists or not all(isinstance(values, list | tuple) for values in lists.values()):
-        asked = ", ".join(f"{key} = {show(values)}" for key, values in given.items())
-        raise SpecError(f"{asked}: must be lists, one of them not empty")
+        requested = ", ".join(f"{key} = {show(values)}" for key, values in given.items())
+        raise SpecError(f"{requested}: must be lists, one of them not empty")
     entries = {}
     for values in product(*lists.values()):
         point: dict[str, Any] = dict(zip(lists, values, strict=True))

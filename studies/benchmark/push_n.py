@@ -45,7 +45,7 @@ Outcomes = Annotated[str, Field(pattern=f"^[01]{{{EPISODES}}}$")]
 Steps = Annotated[int, Field(ge=1, le=STEPS)]
 
 
-class Team(Settings):
+class TeamScores(Settings):
     """What teams of one size did, by seed; seeds count from 0."""
 
     robots: Literal[SIZES]  # type: ignore[valid-type]
@@ -79,7 +79,7 @@ class Entry(Settings):
     """How it learns, in a line."""
     given: Literal["nothing", "predictor", "predictor and reward"]
     """What it is given of the world, beside what its agents perceive."""
-    teams: Annotated[tuple[Team, ...], Field(min_length=1)]
+    teams: Annotated[tuple[TeamScores, ...], Field(min_length=1)]
     """Its results, by number of robots."""
 
 
@@ -117,7 +117,7 @@ def team_of(results: Results, robots: int, condition: str, phase: str = "evaluat
     outcomes = results.success(condition, phase).astype(int)
     stages = [p for p in results.phases if p.startswith("training") and results.has(condition, p)]
     training = np.hstack([results.values(condition, "steps", stage) for stage in stages])
-    return Team(
+    return TeamScores(
         robots=robots,
         success=tuple("".join(map(str, row)) for row in outcomes),
         steps=tuples(results.values(condition, "steps", phase).tolist()),
@@ -153,7 +153,7 @@ def run_spec(path: Path, out: Path, robots: Sequence[int], seeds: int, jobs: int
 
 
 def evaluate(policy: Callable[[Any], Any], env: Any, seed: int) -> tuple[str, tuple[int, ...]]:
-    """Return success and steps of a seed, as `Team` has them.
+    """Return success and steps of a seed, as `TeamScores` has them.
 
     Parameters
     ----------

@@ -198,7 +198,7 @@ Effects = tuple[FloatArray, ...]
 
 
 @dataclass
-class Bodies:
+class BodyEffects:
     """What the bodies were believed to be at some moments."""
 
     moments: dict[str, Effects]
@@ -232,7 +232,7 @@ class Explanation:
     policy: Any
     """What its scenario shows of what it does: text by ``lines()``, a drawing by ``figure()``; or
     why there is none."""
-    bodies: Bodies | None
+    bodies: BodyEffects | None
     """What bodies believed their actuators to do; none: they have no self-model."""
     errors: pd.DataFrame | None
     """By how much predictions are wrong, see `errors_of`; none: the team has not learned them."""
@@ -277,12 +277,12 @@ def _policy(trial: Trial, team: Team, scenario: Any) -> Any:
         return str(error)
 
 
-def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
+def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, BodyEffects | None]:
     arrays = store.recording(trial.identity, TEAM) if trial.keep_teams else None
     with refused(f"{store.directory}: "):  # a file that settings name may not be what it was
         session = Session(trial)
         team = of_fuzzy_agents(session.team)
-    model, bodies = team.self_model, Bodies({}, ())
+    model, bodies = team.self_model, BodyEffects({}, ())
     if model:
         bodies.note("built", model)
     if arrays is None:
@@ -294,7 +294,7 @@ def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]
     return team, session.scenario, bodies if model else None
 
 
-def _train(store: Store, session: Session, bodies: Bodies) -> None:
+def _train(store: Store, session: Session, bodies: BodyEffects) -> None:
     trial, model = session.trial, of_fuzzy_agents(session.team).self_model
     episodes = track(
         range(trial.episodes),

@@ -14,7 +14,7 @@ from ...core.numerics import pd
 from ..errors import WIDTH
 from ..presentation import figures
 from ..presentation.figures import add_legend, look, marker
-from .team import Bodies, Explanation, exponent, mean_shares, percent, rules_table
+from .team import BodyEffects, Explanation, exponent, mean_shares, percent, rules_table
 
 MOST_AGENTS = 8
 """Agents whose rules are printed; the file holds those of all."""
@@ -65,7 +65,7 @@ LEAST_CHANGE = 0.25
 """A smaller change of an actuator's drive is not spoken of."""
 
 
-def effects_table(bodies: Bodies, actuators: Sequence[str]) -> str:
+def effects_table(bodies: BodyEffects, actuators: Sequence[str]) -> str:
     """Return the effects of every body's actuators, row by row and moment by moment."""
     rows = {}
     for r, own in enumerate(by_body(bodies, actuators)):
@@ -79,7 +79,7 @@ def effects_table(bodies: Bodies, actuators: Sequence[str]) -> str:
     return text
 
 
-def verdicts(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:
+def verdicts(bodies: BodyEffects, actuators: Sequence[str]) -> Iterator[str]:
     """Yield, for every actuator whose drive is not what it was built with, what it is taken for.
 
     Its drive is the part of its effect that is along the one it was built with; a change within
@@ -95,12 +95,12 @@ def verdicts(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:
             left = float(own @ last[r][:, actuator]) / length
             around = float(np.sqrt(own**2 @ bodies.deviations[r][:, actuator] ** 2)) / length
             if abs(left - 1.0) > LEAST_CHANGE:
-                doubt = "" if abs(left - 1.0) > 2.0 * around else "; uncertain"
+                caveat = "" if abs(left - 1.0) > 2.0 * around else "; uncertain"
                 share = f"{left:+.2f} ± {around:.2f} of its drive"
-                yield f"{name}: {share}, {_like(left)}{doubt}"
+                yield f"{name}: {share}, {_like(left)}{caveat}"
 
 
-def by_body(bodies: Bodies, actuators: Sequence[str]) -> Iterator[Sequence[str]]:
+def by_body(bodies: BodyEffects, actuators: Sequence[str]) -> Iterator[Sequence[str]]:
     """Yield the names of every body's actuators."""
     first = 0
     for effect in bodies.moments["built"]:

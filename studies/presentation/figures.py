@@ -193,7 +193,7 @@ def check_suffix(path: Path) -> None:
 CHARACTERS = 15
 """Of a legend that have room in an inch."""
 APART = 0.06
-"""How far neighbouring lines stand apart, in doublings of the number of robots."""
+"""How far neighbouring lines stand apart, in doublings of the horizontal axis."""
 
 
 def style(index: int) -> dict[str, Any]:
@@ -202,20 +202,20 @@ def style(index: int) -> dict[str, Any]:
 
 
 def draw_line(
-    axes: Axes, robots: Sequence[int], estimates: Sequence[Estimate], index: int, lines: int
+    axes: Axes, sizes: Sequence[int], estimates: Sequence[Estimate], index: int, lines: int
 ) -> None:
     """Draw estimates with their intervals: line `index` of so many lines, beside the others."""
     beside = 2.0 ** (APART * (index - (lines - 1) / 2))
-    places = [beside * n for n in robots]
+    places = [beside * n for n in sizes]
     all_of_them = stacked(estimates)
     axes.vlines(places, all_of_them.low, all_of_them.high, color=look(index)["color"], lw=1.2)
     axes.plot(places, all_of_them.value, **style(index))
 
 
-def scale_axis(axes: Axes, robots: Sequence[int]) -> None:
-    """Let the horizontal axis be the logarithm of the number of robots."""
+def scale_axis(axes: Axes, sizes: Sequence[int]) -> None:
+    """Let the horizontal axis be the logarithm of the size of teams."""
     axes.set_xscale("log", base=2)
-    axes.set_xticks(robots, [str(n) for n in robots])
+    axes.set_xticks(sizes, [str(n) for n in sizes])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.grid(alpha=0.25)
 

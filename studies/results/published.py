@@ -200,7 +200,8 @@ def dumps_marl_eval(results: Results, environments: Mapping[str, str], task: str
     table: dict[str, Any] = {}
     for condition in results.conditions:
         runs = table.setdefault(environments[condition], {}).setdefault(task, {})
-        runs[condition] = dict(_runs(results, condition))
+        name = condition.replace(",", ";")  # marl-eval refuses commas in names of algorithms
+        runs[name] = dict(_runs(results, condition))
     return json.dumps(table) + "\n"
 
 

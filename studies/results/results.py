@@ -394,7 +394,7 @@ def together(
 ) -> tuple[Results, list[dict[str, str]]]:
     """Return the results of several studies as those of one, and the new labels of each.
 
-    Conditions whose label occurs more than once are told apart by their `settings`, where one or
+    Conditions whose label occurs more than once are distinguished by their `settings`, where one or
     two of these differ, else by the name of their study. Their columns tell it, too, as
     `DIRECTORY`.
 

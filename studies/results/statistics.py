@@ -467,8 +467,8 @@ def detectable(deviation: float, seeds: int, comparisons: int = 1, wanted: float
         low, high = high, 2.0 * high
     while high - low > 0.002 * high:
         middle = (low + high) / 2.0
-        is_found = power(middle, 1.0, seeds, comparisons) >= wanted
-        low, high = (low, middle) if is_found else (middle, high)
+        is_enough = power(middle, 1.0, seeds, comparisons) >= wanted
+        low, high = (low, middle) if is_enough else (middle, high)
     return deviation * high
 
 

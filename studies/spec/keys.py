@@ -26,7 +26,7 @@ from .tables import models_of, registry_of
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 """How the text beside a field names its unit."""
 TYPES = {bool: "true or false", int: "whole number", float: "number", str: "text", Any: "any"}
-MOST_TOLD = 10**9
+GREATEST_BOUND = 10**9
 """A bound beyond it is that of a machine's integers, and no help to anybody."""
 SIGNS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
 """By the attribute of a field's metadata that holds the bound."""
@@ -259,7 +259,7 @@ def _bounds(metadata: Any) -> Iterator[str]:
     for item in metadata:
         for attribute, sign in SIGNS.items():
             bound = getattr(item, attribute, math.inf)
-            if bound <= MOST_TOLD:
+            if bound <= GREATEST_BOUND:
                 yield f"{sign} {bound:,}"
         if isinstance(item, MinLen):
             yield f"at least {item.min_length} of them"

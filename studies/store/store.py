@@ -408,7 +408,7 @@ MARK = "running.json"
 
 
 class Running(contextlib.AbstractContextManager["Running"]):
-    """Keeps the mark while its context lasts.
+    """Marks a study as running for as long as its context lasts.
 
     Parameters
     ----------

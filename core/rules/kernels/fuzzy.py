@@ -10,8 +10,9 @@ Two shapes, on a line or on a circle, with any number of membership functions an
   most two functions are active at a time.
 
 On a circle the partition repeats with the period; sigmoids reach as many periods to either side as
-their tails need to fall below 1e-11. The NumPy code here is the readable definition;
-`core.rules.kernels` computes the same, fast.
+their tails need to fall below 1e-11. The NumPy code here is the readable definition, and the oracle
+of the tests. `core.rules.kernels` computes the same: 256 values in a 13th of the time by rules over
+single variables, in a 60th by 5^7 rules.
 
 The kernels read the partitions and terms of a rule base from a `Layout` of arrays. Within a term
 the own variables lead, so that its slice of theta is a matrix (own rules, shared rules). Python

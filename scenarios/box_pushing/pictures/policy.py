@@ -18,10 +18,10 @@ from matplotlib.patches import Circle, PathPatch
 from shapely.geometry import Point, Polygon
 
 from ....core.agents.team import Team
-from ....core.numerics import FloatArray
+from ....core.numerics import FloatArray, wrap
 from ..prediction.prediction import BoxPrediction
 from ..world.bodies import BoxSpec
-from ..world.geometry import surface, wrap
+from ..world.geometry import surface
 from ..world.settings import RobotSettings
 from ..world.world import place
 from .rendering import BOX_COLOUR, curve

@@ -1,4 +1,4 @@
-"""Predictors of box pushing by name: what they take the world for.
+"""Predictors of box pushing by name, and the model of the world behind each.
 
 push
     Compliant quasi-static pushing, see `box_pushing.prediction.push`; the default.

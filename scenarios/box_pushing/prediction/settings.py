@@ -4,7 +4,7 @@ from ....core.plugins.settings import Positive, Settings
 
 
 class BeliefSettings(Settings):
-    """By what factors the push predictor takes constants for other than the world has them."""
+    """Factors by which the constants of the push predictor differ from those of the world."""
 
     stiffness: Positive = 1.0
     """Factor on the stiffness of the wheels, ahead and sideways."""

@@ -26,10 +26,10 @@ from math import pi
 
 import numpy as np
 
-from ....core.numerics import FloatArray, njit
+from ....core.numerics import FloatArray, njit, wrap
 from ....core.plugins.registry import Registry
 from ...state_variables import StateFunction, StateVariable, fixed, state_variable
-from ..world.geometry import Outline, surface, wrap
+from ..world.geometry import Outline, surface
 
 CLOSE = 0.02
 """Gap [m] over which the weight of a robot's contact falls to 1/e."""

@@ -6,15 +6,15 @@ by a margin all around, so that a single degenerate edge with rounding R is a ci
 Everything is in the frame of the body, metres, centre of mass at the origin.
 
 All are compiled and may be called from other compiled kernels. `nearest_points` is what `surface`
-computes first, once more: for `LANES` points side by side, without a branch.
+computes first, once more: for `LANES` points side by side, without a branch. That takes a fifth of
+the time of `surface`, point by point; a test compares them.
 
 An infrared sensor looks along one ray from the rim of its robot and reads a number in [0, 1]: 1
 when touching, 0 when nothing is within its reach, and between them as `InfraredSettings` say.
 """
 
 from dataclasses import dataclass
-from math import exp, hypot, pi, sqrt
-from typing import Any
+from math import exp, hypot, sqrt
 
 import numpy as np
 
@@ -27,11 +27,6 @@ LANES = 32
 LOCAL_X, LOCAL_Y, SQUARE, NEAR_X, NEAR_Y, SIDE, EDGE_X, EDGE_Y = range(0, 8 * LANES, LANES)
 """Where the rows of `nearest_points` begin."""
 NEAREST_SIZE = EDGE_Y + LANES
-
-_TURN = 2.0 * pi
-_TURN_HIGH = 6.283185243606567
-"""The leading 26 bits of a turn: products with a few thousand turns are exact."""
-_TURN_LOW = _TURN - _TURN_HIGH
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +56,6 @@ class Outline:
 def ring_edges(vertices: FloatArray) -> FloatArray:
     """Return the edges ``(n, 4)`` of a closed ring of vertices ``(n, 2)``."""
     return np.hstack([vertices, np.roll(vertices, -1, axis=0)])
-
-
-def wrap(angle: Any) -> Any:
-    """Map angles [rad] to [-pi, pi): ``(angle + pi) % (2 pi) - pi`` to the last bit, but faster."""
-    shifted = angle + pi
-    turns = np.floor(shifted / _TURN)
-    return shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi
 
 
 @njit(cache=True)

@@ -34,10 +34,10 @@ import Box2D
 import numpy as np
 from Box2D import _Box2D
 
-from ....core.numerics import FloatArray
+from ....core.numerics import FloatArray, wrap
 from ...faults.settings import Failures, Free
 from .bodies import BoxSpec, sensor_directions, wheel_model, wheel_wrenches
-from .geometry import gaps, infrared_readings, surface, wrap
+from .geometry import gaps, infrared_readings, surface
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
 
 GOAL = (1.0, 0.0, 0.0)

@@ -49,7 +49,7 @@ def measure(trial: Trial) -> TrialResult:
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     sizes, cases = Sizes.of(results, results.of_phase("evaluation")), []
-    if not sizes.keys:  # games of several sizes are told apart by other columns
+    if not sizes.keys:  # games of several sizes differ in other columns
         sizes = Sizes(dict.fromkeys(sizes.counts, 1))
     for condition, agents in sizes.counts.items():
         columns = results.columns.get(condition, {"name": condition})

@@ -112,7 +112,7 @@ def _keeping_weights(session: Session) -> Team:
 
 
 class Course(NamedTuple):
-    """One case: what happened to a fault, given what adapts."""
+    """One case: the course of a fault, given what adapts."""
 
     fault: str
     """Label of the condition but for `SWEPT`."""

@@ -111,7 +111,7 @@ def test_worlds_are_those_of_evaluations_in_studies() -> None:
     assert steps == (2,) * 10
     scenario = BoxPushingSettings(robots=2).build()
     states = scenario.reset(world_seed(3, EVALUATION_WORLDS + 9), 0)
-    np.testing.assert_array_equal(worlds[18], env.seats["single"].observe(states))
+    np.testing.assert_array_equal(worlds[18], env.players["single"].observe(states))
 
 
 @pytest.mark.slow

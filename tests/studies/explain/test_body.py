@@ -2,7 +2,7 @@ import numpy as np
 
 from nested_agents.core.adaptation.self_model import SelfModel, SelfModelSettings
 from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS, nominal_effect
-from nested_agents.studies.explain.team import Bodies
+from nested_agents.studies.explain.team import BodyEffects
 from nested_agents.studies.explain.text import effects_table, verdicts
 
 FOUR = nominal_effect(ROBOTS["four-wheel"])
@@ -14,7 +14,7 @@ def bodies_of(*factors):
     changed = FOUR.copy()
     changed[:, :4] *= factors
     small = 0.01 * np.abs(FOUR)
-    return Bodies({"built": (FOUR, FOUR), "after": (changed, FOUR)}, (small, small))
+    return BodyEffects({"built": (FOUR, FOUR), "after": (changed, FOUR)}, (small, small))
 
 
 def test_wheels_are_taken_for_what_they_do():
@@ -35,7 +35,7 @@ def test_healthy_wheels_are_passed_over_and_doubt_is_said():
 
 def test_a_seized_wheel_is_found_by_its_self_model():
     model = SelfModel(SelfModelSettings(enabled=True), [FOUR])
-    bodies = Bodies({}, ())
+    bodies = BodyEffects({}, ())
     bodies.note("built", model)
     rng = np.random.default_rng(0)
     seized = FOUR.copy()
@@ -52,7 +52,7 @@ def test_a_seized_wheel_is_found_by_its_self_model():
 def test_the_table_fits_80_columns_with_six_wheels():
     six = ROBOTS["six-wheel"]
     effect = nominal_effect(six)
-    bodies = Bodies({m: (effect,) for m in ("built", "before", "after")}, (0 * effect,))
+    bodies = BodyEffects({m: (effect,) for m in ("built", "before", "after")}, (0 * effect,))
     lines = effects_table(bodies, [f"robot1.{name}" for name in six.wheel_names]).splitlines()
     assert max(len(line.rstrip()) for line in lines) <= 80
     assert lines[0].split()[:2] == ["front-left", "front-right"]

@@ -9,6 +9,7 @@ from nested_agents.studies.catalogue.study import analysed
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import draw_profiles
 from nested_agents.studies.results.contrasts import (
+    _curve,
     _profile,
     aggregate,
     contrasts,
@@ -167,6 +168,11 @@ def test_estimates_and_intervals_are_those_of_rliable() -> None:
     assert profile.value == pytest.approx([0.86111111, 0.77777778, 0.52777778, 0.22222222])
     assert profile.low == pytest.approx([0.75, 0.63888889, 0.36111111, 0.11111111], abs=0.03)
     assert profile.high == pytest.approx([0.94444444, 0.88888889, 0.69444444, 0.36111111], abs=0.03)
+    # Two episodes of training: sample efficiency.
+    curve = _curve([np.stack([own, base], axis=1) for own, base in zip(OWN, BASE, strict=True)])
+    assert curve.value == pytest.approx([0.55, 0.39444444])
+    assert curve.low == pytest.approx([0.41111111, 0.28888889], abs=0.02)
+    assert curve.high == pytest.approx([0.66111111, 0.52222222], abs=0.02)
 
 
 TIME = Measure("time", "time", "s", better="lower")

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.numerics import FloatArray
+from nested_agents.core.numerics import FloatArray, wrap
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -22,7 +22,6 @@ from nested_agents.scenarios.box_pushing.states.state_spaces import (
     state_space_for,
 )
 from nested_agents.scenarios.box_pushing.world.bodies import BOXES
-from nested_agents.scenarios.box_pushing.world.geometry import wrap
 from nested_agents.scenarios.state_variables import StateVariable, find_variable, sensed
 
 GOAL = np.array([1.0, 0.0, 0.0])
