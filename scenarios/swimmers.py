@@ -51,7 +51,7 @@ def described(joints: int) -> str:
     return SWIMMER.format(torso=torso, hinges="".join(hinges) + "</body>" * joints, motors=motors)
 
 
-class Swimmer(SwimmerEnv):  # type: ignore[misc]  # Gymnasium is not typed here
+class Swimmer(SwimmerEnv):
     """A swimmer of so many joints, on the keywords of Gymnasium's."""
 
     def __init__(self, joints: int = 2, **options: Any) -> None:
