@@ -41,7 +41,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
-from nested_agents.scenarios.box_pushing.world.bodies import BoxSpec
+from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.api.study import load
 from nested_agents.studies.catalogue import learning_curve

@@ -25,13 +25,11 @@ from rich.table import Table
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
     Deliberation,
     Evaluator,
-    ExactEnumeration,
-    Sampling,
-    SamplingSettings,
     Teammates,
 )
 from nested_agents.core.interface.hierarchy import Hierarchy

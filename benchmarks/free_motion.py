@@ -13,7 +13,8 @@ import numpy as np
 from pydantic import TypeAdapter
 from scipy.linalg import expm
 
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS, nominal_effect
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
 from nested_agents.scenarios.box_pushing.world.settings import (
     CONTROL_PERIOD,
     Failure,

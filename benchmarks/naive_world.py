@@ -71,7 +71,7 @@ class NaiveWorld(World):
         self.contact_time = touched / periods
 
     def _drive(self, r: int, speeds: list[float]) -> None:
-        """Apply the forces of a robot's wheels, see `scenarios.box_pushing.world.bodies`."""
+        """Apply the forces of a robot's wheels, see `scenarios.box_pushing.world.boxes`."""
         body, model = self._bodies[r], self._wheels
         vx, vy = body.linearVelocity
         omega = body.angularVelocity

@@ -18,13 +18,8 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.studies.results.statistics import (
-    LEVEL,
-    RATES,
-    deviation_of,
-    paired_permutation,
-    power,
-)
+from nested_agents.studies.results.power import RATES, deviation_of, power
+from nested_agents.studies.results.statistics import LEVEL, paired_permutation
 
 Draw = Callable[[np.random.Generator, int, int], np.ndarray]
 """Draws differences ``(n_studies, n_seeds)``."""

@@ -24,7 +24,8 @@ import numpy as np
 from rich.console import Console
 
 from nested_agents.scenarios.box_pushing.environments import WheelsEnv
-from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS, box_for
+from nested_agents.scenarios.box_pushing.world.boxes import box_for
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.box_pushing.world.world import World, place
 
 from .naive_world import NaiveWorld

@@ -15,7 +15,8 @@ from nested_agents.core.interface.scenario import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.adapters.adapted import AdaptedWorld
 from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
@@ -56,8 +57,9 @@ MODULES = {
         "interface.hierarchy", "interface.spaces", "interface.scenario", "agents.team",
         "adaptation.predictors", "agents.loop", "decision.exploration",
         "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
-        "learners.batch", "evaluators.evaluator", "evaluators.best_response",
-        "evaluators.coordination", "coordination.graphs", "adaptation.self_model",
+        "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",
+        "evaluators.best_response", "evaluators.coordination", "coordination.graphs",
+        "adaptation.self_model",
         "agents.cost", "plugins.registry", "plugins.settings", "numerics",
         "policies.settings", "policies.peer",
     )),
@@ -68,19 +70,19 @@ MODULES = {
         "box_pushing.environments", "adapters.passing_down", "adapters.adapted",
         "adapters.settings", "box_pushing.states.relational",
         "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
-        "box_pushing.world.bodies", "box_pushing.world.world",
+        "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.world",
         "box_pushing.pictures.rendering",
         "box_pushing.pushing_points", "kinematic_chain.config",
         "kinematic_chain.scenario", "kinematic_chain.variables", "matrix_games.scenario",
-        "line_up", "faults.settings", "faults.wrappers", "state_variables",
-        "checking.checker",
+        "matrix_games.team_games", "line_up", "faults.settings", "faults.wrappers",
+        "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.running", "api.alternatives", "api.recovery",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.contrasts", "results.published", "catalogue.study", "cost.cost",
-        "claims.claims",
+        "results.power", "results.contrasts", "results.published", "catalogue.study",
+        "cost.cost", "cost.table", "claims.claims",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""

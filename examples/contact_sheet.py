@@ -19,7 +19,7 @@ from nested_agents.core.interface.scenario import EpisodeRecorder
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import AXES, SIDES, picture
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 ROBOTS = (2, 4, 8)
 

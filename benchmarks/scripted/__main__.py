@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 from .controller import decisions_to_goal
 

@@ -16,7 +16,7 @@ import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from nested_agents.scenarios.box_pushing.world.bodies import BoxSpec
+from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.scenarios.box_pushing.world.geometry import surface
 from nested_agents.scenarios.box_pushing.world.world import approach
 

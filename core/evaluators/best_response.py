@@ -29,7 +29,8 @@ from pydantic import Field
 from ..interface.spaces import BestResponses, Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
-from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
+from .enumeration import combinations
+from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
 
 MOST_AHEAD = 4
 """Bodies that are valued at a time, if most keep to the plan: more would be valued in vain."""

@@ -28,7 +28,8 @@ from pydantic import Field
 
 from ..coordination.graphs import Elimination, MaxPlus
 from ..numerics import FloatArray, IntArray
-from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
+from .enumeration import combinations
+from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
 
 FIRST = 1e-9
 """By how much, relative to the value, an agent's own part comes before what is equally good."""

@@ -1,29 +1,22 @@
-"""Evaluators: their interface, and what those that try joint actions have in common.
+"""Evaluators: their interface, and what those that value joint actions have in common.
 
 In the mean value of several agents each thing that they share is valued once. A rule base is a sum
 of terms. What a term of common variables is worth to all agents is what it is worth to one that has
 the sum of their consequent weights; likewise for the agents of one body and the variables that they
 share. So the mean of many agents costs little more than the value of a few.
-
-Here are also those that try every joint action of the agents below, or a random sample. Few agents
-are enumerated, some sampled, and many planned for. Of many agents best responses around a plan
-reach greater values than a sample, in half of its time. They are also taken for some, if the values
-of others decide too, and wherever there must be a plan.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
-from pydantic import Field
 
 from ..interface.hierarchy import Hierarchy
-from ..interface.spaces import Prediction, has_tables, states_by_group
+from ..interface.spaces import Prediction, states_by_group
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import PartSettings
-from ..rules.kernels.dense import Tried
 from ..rules.rule_base import Pooled, RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]
@@ -39,8 +32,6 @@ Plan = Literal["private", "common"]
 """Whether each agent makes its own plan, or all work out the same one."""
 
 
-MOST_JOINT_ACTIONS = 4**11
-"""The most of some agents that are tried with each action of another: more fill the memory."""
 Predicted = Callable[[], FloatArray]
 """Predicts something of joint actions."""
 NOTHING_GIVEN: FloatArray = np.zeros((0, 0, 0))
@@ -139,9 +130,9 @@ class EvaluatorSettings(PartSettings):
 EVALUATORS = SettingsRegistry(
     "evaluator",
     {
-        "auto": f"{__name__}:AutoSettings",
-        "exact": f"{__name__}:ExactEnumeration",
-        "sampling": f"{__name__}:SamplingSettings",
+        "auto": f"{__package__}.enumeration:AutoSettings",
+        "exact": f"{__package__}.enumeration:ExactEnumeration",
+        "sampling": f"{__package__}.enumeration:SamplingSettings",
         "variable-elimination": f"{__package__}.coordination:VariableEliminationSettings",
         "max-plus": f"{__package__}.coordination:MaxPlusSettings",
         "best-response": f"{__package__}.best_response:BestResponseSettings",
@@ -150,24 +141,6 @@ EVALUATORS = SettingsRegistry(
     EvaluatorSettings,
 )
 """Evaluators by name."""
-
-
-def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
-    """Return all joint actions ``(A ** k, k)`` of k agents, in lexicographic order.
-
-    Raises
-    ------
-    ValueError
-        If they are too many; before anything is allocated.
-    """
-    if n_actions ** len(agents) > MOST_JOINT_ACTIONS:
-        raise ValueError(
-            f"learner.decision.evaluator: {n_actions} ** {len(agents)} joint actions of "
-            f"{len(agents)} agents would be tried, allowed {MOST_JOINT_ACTIONS}; use sampling"
-        )
-    k = len(agents)
-    grid = np.indices((n_actions,) * k).reshape(k, n_actions**k)
-    return np.ascontiguousarray(grid.T, dtype=np.int64)
 
 
 def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
@@ -324,169 +297,3 @@ class Aggregation:
         if probabilities is not None and probabilities.ndim == 2:
             return (values * probabilities).sum(axis=1)
         return values.mean(axis=1) if probabilities is None else values @ probabilities
-
-
-Samples = Annotated[int, Field(ge=1, le=1_000_000)]
-
-
-def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatArray:
-    """Return the probability ``(A ** k,)`` of each joint action of the k agents below."""
-    probabilities = np.ones(1)
-    for agent in below:
-        probabilities = np.multiply.outer(probabilities, frequencies[agent]).ravel()
-    return probabilities / probabilities.sum()
-
-
-class ExactEnumeration(Aggregation):
-    """Tries every joint action of the agents below, as the paper: ``A ** (1 + len(below))`` each.
-
-    If all agents together try at least as many joint actions as there are, and the prediction has
-    tables of all, next states are taken from there; else they are predicted for the joint actions
-    that are tried.
-
-    Raises
-    ------
-    ValueError
-        If an agent would have to try more than `MOST_JOINT_ACTIONS`.
-    """
-
-    def __init__(self, problem: DecisionProblem) -> None:
-        super().__init__(problem)
-        n, a = len(self.hierarchy), self.n_actions
-        self._below = [combinations(self.hierarchy.below(i), a) for i in range(n)]
-        uniform = problem.teammates == "uniform"
-        self._expected = np.full((n, a), 1.0 / a) if uniform else np.zeros((0, 0))
-        self._tried: list[Tried] = []
-        self._means: tuple[tuple[object, ...], FloatArray] | None = None
-        if self.hierarchy.joint_actions(a) >= a**n:
-            places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
-            self._tried = [self._tried_by(i, places) for i in range(n)]
-
-    def _tried_by(self, agent: int, places: IntArray) -> Tried:
-        below = np.array(self.hierarchy.below(agent), dtype=np.int64)
-        own = np.arange(self.n_actions)[:, None] * places[agent]
-        given = places.copy()
-        given[agent] = given[below] = 0
-        return own + self._below[agent] @ places[below], given, below
-
-    def values(self, deliberation: Deliberation) -> FloatArray:
-        """Return the value ``(A,)`` of each action of the deciding agent."""
-        agent, problem = deliberation.agent, self.problem
-        prediction: Any = deliberation.prediction
-        conditional = problem.teammates == "conditional"
-        own_value = problem.rule == "value" and len(self.concerned[agent]) == 1
-        if own_value and not conditional and self._tried and hasattr(prediction, "blocks"):
-            tried, blocks = self._tried[agent], prediction.blocks(agent)
-            self.count(agent, tried[0].size)
-            empirical = problem.teammates == "empirical"
-            expected = deliberation.frequencies if empirical else self._expected
-            weights, joint = deliberation.own_weights, deliberation.joint_action
-            return self.rules.enumerate(weights, blocks, tried, joint, expected)
-        below, probabilities = self.hierarchy.below(agent), None
-        if problem.teammates == "empirical":
-            probabilities = probabilities_of(deliberation.frequencies, below)
-        elif conditional:
-            probabilities = np.stack([probabilities_of(rows, below) for rows in deliberation.given])
-        return self.aggregate(deliberation, self._below[agent], probabilities)
-
-    def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
-        """Value each own action with each of the joint actions below, from tables if there are."""
-        prediction: Any = deliberation.prediction
-        if not (self._tried and has_tables(prediction)):
-            return super().worths(deliberation, tried)
-        known, places, _ = self._tried[deliberation.agent]
-        indices = (known + int(deliberation.joint_action @ places)).ravel()
-        self.count(deliberation.agent, len(indices))
-        worth = self.combine(
-            lambda: prediction.reward_table()[indices], lambda: self._mean(deliberation)[indices]
-        )
-        return worth.reshape(self.n_actions, -1)
-
-    def _mean(self, deliberation: Deliberation) -> FloatArray:
-        """Return the mean value ``(A ** n,)`` of all joint actions, once for a whole decision."""
-        prediction: Any = deliberation.prediction
-        weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
-        of = prediction, weights, concerned
-        if self._means is None or any(a is not b for a, b in zip(self._means[0], of, strict=True)):
-            indices, value = np.arange(self.n_actions ** len(weights)), self.rules.block_values
-            each = [value(weights[i], prediction.blocks(i), indices) for i in concerned]
-            self._means = of, np.mean(each, axis=0)
-        return self._means[1]
-
-
-class SamplingSettings(EvaluatorSettings):
-    """Try a random sample of the joint actions of the agents below."""
-
-    kind: Literal["sampling"] = "sampling"
-    factory: ClassVar[str] = f"{__name__}:Sampling"
-    samples: Samples = 64
-    """Joint actions of the agents below that are tried with each own action."""
-
-
-class Sampling(Aggregation):
-    """Tries a random sample of the joint actions below, the same ones for every own action.
-
-    Drawn with equal probability, or from the empirical frequencies if these are the teammate model
-    (then the plain mean estimates the weighted one). With no more joint actions than samples, all
-    are tried.
-
-    Raises
-    ------
-    ValueError
-        If the teammate model is conditional on the own action.
-    """
-
-    def __init__(self, settings: SamplingSettings, problem: DecisionProblem) -> None:
-        super().__init__(problem)
-        if problem.teammates == "conditional":
-            raise ValueError(
-                "learner.decision.teammates = 'conditional': sampling evaluates best-response, "
-                "uniform, empirical; use exact"
-            )
-        self.samples = settings.samples
-
-    def values(self, deliberation: Deliberation) -> FloatArray:
-        """Return the value ``(A,)`` of each action of the deciding agent."""
-        below, a = self.hierarchy.below(deliberation.agent), self.n_actions
-        frequencies, rng = deliberation.frequencies, deliberation.rng
-        empirical = self.problem.teammates == "empirical"
-        probabilities = None
-        if a ** len(below) <= self.samples:
-            tried = combinations(below, a)
-            if empirical:
-                probabilities = probabilities_of(frequencies, below)
-        elif empirical:
-            tried = self.drawn(frequencies[list(below)], self.samples, rng)
-        else:
-            tried = rng.integers(a, size=(self.samples, len(below)))
-        return self.aggregate(deliberation, tried, probabilities)
-
-
-class AutoSettings(EvaluatorSettings):
-    """Exact enumeration as long as it is quick, then sampling, then best responses."""
-
-    kind: Literal["auto"] = "auto"
-    exact_up_to: Annotated[int, Field(ge=1, le=10)] = 5
-    """Agents that may still be free for exact enumeration."""
-    sampling_up_to: Annotated[int, Field(ge=1)] = 12
-    """Agents that may still be free for sampling, if agents decide by their own value and expect
-    best responses."""
-    samples: Samples = 64
-    """Joint actions that are tried by sampling, as of the evaluator ``sampling``."""
-
-    def build(self, problem: DecisionProblem) -> Evaluator:
-        """Return the evaluator of a team."""
-        return self.chosen(problem).build(problem)
-
-    def chosen(self, problem: DecisionProblem) -> EvaluatorSettings:
-        """Return the settings of the evaluator that a team gets."""
-        hierarchy = problem.hierarchy
-        if problem.unseen == "plan" or problem.plan == "common":
-            return EVALUATORS.parsed("best-response")
-        free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
-        if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MOST_JOINT_ACTIONS:
-            return EVALUATORS.parsed("exact")
-        is_large = free > self.sampling_up_to or problem.value_of != "own"
-        if is_large and problem.teammates == "best-response":
-            return EVALUATORS.parsed("best-response")
-        return SamplingSettings(samples=self.samples)

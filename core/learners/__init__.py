@@ -22,7 +22,7 @@ LEARNERS = SettingsRegistry(
         "sparse-cooperative": f"{__name__}.td:SparseCooperativeSettings",
         "q-learning": f"{__name__}.td:QLearningSettings",
         "vdn": f"{__name__}.td:ValueDecompositionSettings",
-        "fitted-q": f"{__name__}.batch:FittedQSettings",
+        "fitted-q": f"{__name__}.fitted_q:FittedQSettings",
         "frozen": f"{__name__}.td:FrozenSettings",
         "ppo": f"{PEERS}:PPOSettings",
         "ippo": f"{PEERS}:IPPOSettings",

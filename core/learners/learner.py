@@ -9,7 +9,8 @@ from ..adaptation.predictors import GivenPredictor, Predictor
 from ..adaptation.self_model import CalibrationSettings, SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..evaluators import EVALUATORS, EvaluatorSettings
-from ..evaluators.evaluator import AutoSettings, Plan, Teammates, Unseen, ValueOf
+from ..evaluators.enumeration import AutoSettings
+from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray
 from ..plugins.registry import Plugged

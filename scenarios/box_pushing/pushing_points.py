@@ -39,8 +39,9 @@ from ...core.numerics import FloatArray, IntArray, njit, wrap
 from .config import BoxPushingSettings, BoxTaskSettings, PushingPointsSettings
 from .prediction.predictors import push_model
 from .scenario import MEASURES, BoxPushing
-from .world.bodies import BoxSpec, nominal_effect
+from .world.boxes import BoxSpec
 from .world.geometry import surface
+from .world.robots import nominal_effect
 from .world.settings import RobotSettings
 
 CLEARANCE = 0.006
@@ -291,7 +292,7 @@ def pushing_points(box: BoxSpec, count: int, gap: float) -> FloatArray:
     --------
     Four points around a square of 20 cm lie off its corners, eight have two to a side:
 
-    >>> from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+    >>> from nested_agents.scenarios.box_pushing.world.boxes import BOXES
     >>> pushing_points(BOXES["square"], 8, 0.05).round(2)[1:3].tolist()
     [[0.07, 0.15, -1.57], [-0.07, 0.15, -1.57]]
     """

@@ -24,7 +24,8 @@ from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.settings import BeliefSettings
 from .states.relational import View
 from .states.state_spaces import state_space_for
-from .world.bodies import box_for, growth, nominal_effect, robot_for
+from .world.boxes import box_for, growth
+from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD, Task, reward
 from .world.world import WheelFailures, World, place
 

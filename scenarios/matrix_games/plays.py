@@ -22,7 +22,7 @@ import numpy as np
 from ...core.agents.loop import EpisodeSummary
 from ...core.agents.team import Team
 from ...core.decision.exploration import Boltzmann, EpsilonDecreasingBoltzmann
-from ...core.evaluators.evaluator import ExactEnumeration
+from ...core.evaluators.enumeration import ExactEnumeration
 from ...core.learners.td import FMQ, Frozen, OptimisticTD, TDLambda
 from ...core.numerics import FloatArray, IntArray, njit
 

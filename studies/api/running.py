@@ -32,7 +32,7 @@ from ...core.plugins.sources import is_reference
 from ..catalogue.study import load_study, measured
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
-from ..results.statistics import SMALLEST, USUAL_DEVIATION, power_text
+from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
 from ..store.store import Store

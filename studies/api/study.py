@@ -35,8 +35,8 @@ from ..presentation.tables import SummaryTable, tabulate
 from ..results import published
 from ..results.analysis import Difference
 from ..results.contrasts import Aggregates, Contrasts, aggregate, contrasts
+from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
 from ..results.results import Results, chosen, read, together
-from ..results.statistics import SMALLEST, USUAL_DEVIATION, power_text
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store

@@ -11,25 +11,18 @@ Some ways to decide stand in place of a topology, see `WAYS`: they try few of al
 
 Counting and timing use the line-up scenario, whose prediction costs next to nothing, and sigmoid
 membership functions, with which every rule does fire.
-
-Tables are for the terminal, as JSON, CSV and LaTeX. Integers keep every digit in the files. A ratio
-beyond 2 ** 53, where floating-point numbers lie farther apart, is rounded to an integer.
 """
 
-import json
 import re
-import sys
 import tracemalloc
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, astuple, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass
 from fractions import Fraction
 from functools import cache
-from html import escape
-from itertools import chain, product
+from itertools import chain
 from statistics import median
-from typing import Any, Literal
 
-from ...core.agents.cost import Problem, below_counts, is_chain
+from ...core.agents.cost import Problem, below_counts
 from ...core.agents.loop import control_loop, join_agents, policy_seed
 from ...core.agents.team import Team
 from ...core.evaluators.best_response import CUTS
@@ -39,12 +32,9 @@ from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners.learner import Decision
 from ...core.learners.td import TDLambdaSettings
-from ...core.numerics import pd
 from ...core.rules.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
-from ...topologies.view import aligned, readable
-from ..presentation.tables import in_csv, in_latex
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 
 SINGLE_AGENT = "single-agent"
@@ -259,243 +249,3 @@ def _step(team: Team, scenario: Scenario) -> tuple[float, float]:
     """
     _, record = control_loop(scenario, team, episodes=1, steps=2, seed=0)
     return record.deciding, record.learning
-
-
-Form = Literal["table", "json", "csv", "latex"]
-
-FORMULAS = (
-    ("nested_exact", "Eq. 18"),
-    ("nested_closed_form", "Eq. 19"),
-    ("nested_asymptotic", "Eq. 21"),
-    ("single_agent", "single agent"),
-    ("ratio", "ratio"),
-)
-"""Columns by name, with their heading."""
-MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MB")
-"""Headings of what was measured per step."""
-NETWORK = ("messages", "in turn", "1 ms", "10 ms", "1 ms*", "10 ms*")
-"""Headings of messages, and of the seconds that a decision waits for them."""
-OF_THE_PAPER = PAPER.chain_closed_form(4)
-"""Operations of four agents by Eq. 19, with the paper's |S|, |A| and L."""
-
-
-def written(rows: Sequence[CostRow], form: Form) -> str:
-    """Return the rows in a format."""
-    if form == "table":
-        return _table(rows)
-    if form == "latex":
-        return "\n\n".join(map(_tabular, _cells(rows).values()))
-    records = [_record(row) for row in rows]
-    most = sys.get_int_max_str_digits()
-    sys.set_int_max_str_digits(0)  # those of n = 1000 are more than Python prints
-    try:
-        if form == "json":
-            return "[" + ",\n ".join(json.dumps(record) for record in records) + "]"
-        return in_csv(pd.DataFrame(records, dtype=object)).rstrip("\n")
-    finally:
-        sys.set_int_max_str_digits(most)
-
-
-def scientific(value: int | Fraction | None) -> str:
-    """Return a number for reading: some digits, powers of ten if it is large.
-
-    Examples
-    --------
-    >>> scientific(2457562500000), scientific(Fraction(5, 2)), scientific(None)
-    ('2.458e12', '2.5', '-')
-    """
-    if value is None:
-        return "-"
-    if isinstance(value, Fraction) and value.denominator > 1 and value < 1000:
-        return f"{float(value):.4g}"
-    return readable(round(value), 10**7)
-
-
-def _record(row: CostRow) -> dict[str, Any]:
-    """Return a row with integers as integers; Eq. 21 is rounded to the nearest one."""
-    asymptotic = row.nested_asymptotic
-    record = {name: getattr(row, name) for name in ("agents", "topology", *dict(FORMULAS))}
-    record["nested_asymptotic"] = None if asymptotic is None else round(asymptotic)
-    if row.ratio is not None:
-        record["ratio"] = float(row.ratio) if row.ratio < 2**53 else round(row.ratio)
-    if row.network is not None:
-        record["messages"], record["messages_in_turn"] = row.network
-    for what, counts in (("_formula", row.formula), ("", row.measured and row.measured.counted)):
-        if counts is not None:
-            record |= {f"{name}{what}_per_step": n for name, n in asdict(counts).items()}
-    if (cost := row.measured) is not None:
-        record |= {"deciding_s": cost.deciding, "learning_s": cost.learning}
-        record |= {"memory_bytes": cost.memory, "repeats": len(cost.repeats)}
-        record["step_s"], low, high = map(float, cost.step)
-        if len(cost.repeats) > 1:
-            record |= {"step_s_low": low, "step_s_high": high}
-    return record
-
-
-def _cells(rows: Sequence[CostRow]) -> dict[str, list[list[str]]]:
-    """Return the cells of each table, headings first: formulas, then what of rows was asked for."""
-    return {
-        kind: [["n", "topology", *titles], *([str(r.agents), r.topology, *cells(r)] for r in rows)]
-        for kind, titles, cells in (
-            ("topology", dict(FORMULAS).values(), _formula_cells),
-            ("formula", MEASURED, _measured_cells),
-            ("network", NETWORK, _network_cells),
-        )
-        if kind == "topology" or any(getattr(row, kind) is not None for row in rows)
-    }
-
-
-def _formula_cells(row: CostRow) -> list[str]:
-    return [scientific(getattr(row, name)) for name, _ in FORMULAS]
-
-
-def _network_cells(row: CostRow) -> list[str]:
-    assert row.network is not None
-    waits = (_amount(1e-3 * ms * count) for count in reversed(row.network) for ms in (1, 10))
-    return [*(f"{count:,}" for count in row.network), *waits]
-
-
-def _table(rows: Sequence[CostRow]) -> str:
-    tables = _cells(rows)
-    lines = [*aligned(tables["topology"], "><>>>>>"), ""]
-    lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
-    if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
-        lines.append("The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4.")
-    if "formula" in tables:
-        same = [row.formula == row.measured.counted for row in rows if row.measured is not None]
-        lines += ["", f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):"]
-        lines += ["", *aligned(tables["formula"], "><>>>>>>"), ""]
-        lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
-        most = max((len(row.measured.repeats) for row in rows if row.measured), default=1)
-        if most > 1:
-            lines += [f"±: a 95 % interval of the mean of {most} repeats, each with a new team;"]
-        lines += ["-: not measured, beyond a second or so a step."]
-        lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
-    if "network" in tables:
-        lines += ["", "Messages of a decision, and how long it waits for them [s]:", ""]
-        lines += [*aligned(tables["network"], "><>>>>>>"), ""]
-        lines += ["in turn: how many follow one another, others going at once, of 1 or 10 ms each;"]
-        lines += ["*: on a channel that carries one message at a time."]
-    return "\n".join(lines)
-
-
-def _measured_cells(row: CostRow) -> list[str]:
-    joint = None if row.formula is None else row.formula.joint_actions
-    if row.measured is None:
-        return [scientific(joint), *["-"] * len(MEASURED[1:])]
-    step, ms = row.measured.step, _amount(1e3 * float(row.measured.step.value))
-    if len(row.measured.repeats) > 1:
-        ms += f"±{_amount(1e3 * float(step.high - step.value), 2)}"
-    counts = joint, *astuple(row.measured.counted)
-    return [*map(scientific, counts), ms, _amount(1e-6 * row.measured.memory)]
-
-
-def _amount(value: float, digits: int = 3) -> str:
-    return f"{value:.{digits}g}" if value < 1000 else f"{value:,.0f}"
-
-
-def _tabular(cells: Sequence[Sequence[str]]) -> str:
-    head, *lines = cells
-    rows = [(n, topology, *map(_latex_cell, numbers)) for n, topology, *numbers in lines]
-    frame = pd.DataFrame(rows, columns=head)
-    return in_latex(frame, "topology", f"rl{'r' * (len(head) - 2)}").rstrip()
-
-
-def _latex_cell(text: str) -> str:
-    """Return a cell for LaTeX, numbers as they are printed."""
-    if text == "-":
-        return "--"
-    mantissa, e, power = text.partition("e")
-    if e:
-        return rf"${mantissa}\times 10^{{{int(power)}}}$"
-    return mantissa.replace(",", r"\,").replace("±", r"$\pm$")
-
-
-MOST_REPEATS = 1000
-"""A repeat takes a third of a second or more."""
-
-
-@dataclass(frozen=True)
-class CostTable:
-    """Costs, a row for every topology and number of agents; printed or shown by a notebook."""
-
-    rows: tuple[CostRow, ...]
-    """The costs as exact integers."""
-
-    @property
-    def csv(self) -> str:
-        """The table as CSV, with every digit."""
-        return written(self.rows, "csv")
-
-    @property
-    def latex(self) -> str:
-        """The table for LaTeX, with the package booktabs."""
-        return written(self.rows, "latex")
-
-    def __str__(self) -> str:
-        return written(self.rows, "table")
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
-
-
-def cost_table(
-    topologies: Sequence[str] = ("chain",),
-    agents: Iterable[int] = (4,),
-    problem: Problem = PAPER,
-    *,
-    measured: bool = False,
-    repeats: int = 1,
-    network: bool = False,
-) -> CostTable:
-    """Return what hierarchies cost, by Eq. 18-23 and, if asked, measured.
-
-    Parameters
-    ----------
-    topologies
-        As in a spec, or ``label=topology`` with a label of one's own; ``single-agent``, or ways to
-        decide: ``best-response``, ``max-plus``, ``fitted-q``, ``hierarchy-ppo``.
-    agents
-        Numbers of agents.
-    problem
-        Rules and actions of an agent, and steps of an episode; those of the paper unless given.
-    measured
-        Whether to count and time steps of the running system, too.
-    repeats
-        How often steps are timed, each with a new team; from two on the time has an interval.
-    network
-        Whether to count the messages of a decision, and how many of them follow one another.
-
-    Raises
-    ------
-    ValueError
-        If there is no topology, one or a number is refused, or two have one label; one line.
-    """
-    if not 1 <= repeats <= MOST_REPEATS:
-        raise ValueError(f"repeats = {repeats}, allowed: 1 to {MOST_REPEATS}")
-    if not topologies:
-        raise ValueError("topology = none, allowed: one or more, such as chain or tree:2")
-    matches = [LABELLED.fullmatch(text) for text in topologies]
-    named = [m.groups() if m else (t, t) for m, t in zip(matches, topologies, strict=True)]
-    labels = [label for label, _ in named]
-    rows = []
-    for (label, text), n in product(named, agents):
-        if labels.count(label) > 1:
-            raise ValueError(f"topology = {label!r} more than once; name each: LABEL={text}")
-        is_one = text not in {SINGLE_AGENT, *WAYS} and is_chain(agents_below(text, n))
-        tried = None if text == SINGLE_AGENT else joint_actions(text, n, problem.actions)
-        row = CostRow(
-            agents=n,
-            topology=label,
-            nested_exact=None if tried is None else problem.sweep(tried),
-            nested_closed_form=problem.chain_closed_form(n) if is_one else None,
-            nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
-            single_agent=problem.single_agent(n),
-            formula=step_formula(text, n) if measured else None,
-            measured=measure(text, n, repeats) if measured else None,
-            network=messages(text, n) if network else None,
-        )
-        rows.append(row)
-    return CostTable(tuple(rows))

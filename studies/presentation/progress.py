@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,9 +56,13 @@ def say(line: str) -> None:
 
 
 class Terminal(Observer):
-    """Shows on standard error how a study goes; what is noted more than once is said once."""
+    """Shows on standard error how a study goes; what is noted more than once is said once.
 
-    def __init__(self) -> None:
+    `react` is called with every outcome, while other trials run.
+    """
+
+    def __init__(self, react: Callable[[Outcome], None] = lambda outcome: None) -> None:
+        self._react = react
         self._noted: set[str] = set()
 
     def announce(self, spec: Spec, directory: Path, processes: int) -> None:
@@ -82,10 +86,13 @@ class Terminal(Observer):
             say(f"{done} of {total} trials were run before")
         if done == total:
             return
-        if sys.stderr.isatty():
-            _follow_bar(outcomes, total, done)
-        else:
-            _follow_lines(outcomes, total, done)
+        show = _follow_bar if sys.stderr.isatty() else _follow_lines
+        show(self._reacting(outcomes), total, done)
+
+    def _reacting(self, outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
+        for outcome in outcomes:
+            self._react(outcome)
+            yield outcome
 
 
 def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:

@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 from ...core.interface.scenario import SUCCESS
 from ...core.numerics import pd
 from ..errors import WIDTH
+from .power import power_lines
 from .results import Results
-from .statistics import LEVEL, Array, Estimate, bootstrap, exactly, paired_tests, power_lines, rate
+from .statistics import LEVEL, Array, Estimate, bootstrap, exactly, paired_tests, rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -88,8 +88,8 @@ import sys
 import numpy as np
 from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
 from nested_agents.scenarios.box_pushing.prediction.push import push
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES
-from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 
 rng = np.random.default_rng(0)
 model = push_model("push", [ROBOTS["e-puck"]] * 2, BOXES["square"])

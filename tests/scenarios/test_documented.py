@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.checking.predictions import MOST_JOINT_ACTIONS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError

@@ -1,12 +1,18 @@
 """docs/topologies.md holds the tables that the committed results give."""
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from published_tables import print_table
 
 import nested_agents as na
+from nested_agents.studies.catalogue.chain_order import equivalence
+from nested_agents.studies.claims.claims import PUBLISHED
+from nested_agents.studies.presentation.tables import Cell
+from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.statistics import two_figures
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "topologies.md"
 EDGES = ("evaluation success", "decisions to goal", "decision [ms]", "messages")
@@ -63,6 +69,42 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
         for row in rows:
             line = f"| {' | '.join(row)} |"
             assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+
+
+@pytest.mark.parametrize(
+    ("names", "task"),
+    [
+        (("orders-arm", "orders-arm-ppo"), "arm of 4 joints"),
+        (("orders-game", "orders-game-ppo"), "climbing, 3 agents"),
+        (("orders-line", "orders-line-ppo"), "game on a line, 8 agents"),
+        (("orders-line-again",), "the same, seeds 40 to 79"),
+    ],
+)
+def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
+    for name in names:
+        for group in contrasts(na.load(PUBLISHED / f"{name}.json").results, by="topology").groups:
+            rates = [line.estimates["success"].value for line in group.table]
+            learner, orders, verdict, ends = re.findall(
+                r"(.+), (\d+) orders, within 0.1: (.+) \((.+)\)", equivalence(group)
+            )[0]
+            rates = f"{two_figures(min(rates))} to {two_figures(max(rates))}"
+            cells = task, learner, orders, str(group.table[0].seeds), rates, ends, verdict
+            line = f"| {' | '.join(cells)} |"
+            assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+
+
+def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
+    fitted, ppo = (
+        contrasts(na.load(PUBLISHED / f"orders-line{own}.json").results, by="topology").table
+        for own in ("", "-ppo")
+    )
+    for own, other in zip(fitted, ppo, strict=True):
+        order = re.findall(r"agent(\d)", own.condition) or "12345678"
+        order = order[::-1] if own.condition.endswith("reversed") else order
+        heard = sum(abs(int(a) - int(b)) == 1 for a, b in pairwise(order))
+        rates = [Cell.of(line.estimates["success"]).bracketed(" ") for line in (own, other)]
+        line = f"| {' '.join(order)} | {heard} | {' | '.join(rates)} |"
+        assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
 
 
 @pytest.mark.slow

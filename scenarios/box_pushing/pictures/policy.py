@@ -20,7 +20,7 @@ from shapely.geometry import Point, Polygon
 from ....core.agents.team import Team
 from ....core.numerics import FloatArray, wrap
 from ..prediction.prediction import BoxPrediction
-from ..world.bodies import BoxSpec
+from ..world.boxes import BoxSpec
 from ..world.geometry import surface
 from ..world.settings import RobotSettings
 from ..world.world import place

@@ -37,8 +37,9 @@ from matplotlib.transforms import Affine2D
 
 from ....core.numerics import BoolArray, FloatArray
 from ...movies import DPI, Pixels, Scene, film
-from ..world.bodies import BoxSpec, box_for, robot_for, sensor_directions
+from ..world.boxes import BoxSpec, box_for
 from ..world.geometry import infrared_readings
+from ..world.robots import robot_for, sensor_directions
 from ..world.settings import InfraredSettings, RobotSettings
 
 Recording = Mapping[str, Any]

@@ -22,7 +22,8 @@ import numpy as np
 
 from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
-from ..world.bodies import BoxSpec, compliance
+from ..world.boxes import BoxSpec
+from ..world.robots import compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
 from .prediction import BoxPrediction, Premises, Situation

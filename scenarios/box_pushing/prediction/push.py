@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit
-from ..world.bodies import resistance
 from ..world.geometry import LANES, nearest_points, surface
+from ..world.robots import resistance
 from ..world.settings import RobotSettings
 from . import push_lanes as lanes
 from .push_lanes import BODY_SIZE, BOX_SIZE, MARGIN

@@ -36,8 +36,9 @@ from Box2D import _Box2D
 
 from ....core.numerics import FloatArray, wrap
 from ...faults.settings import Failures, Free
-from .bodies import BoxSpec, sensor_directions, wheel_model, wheel_wrenches
+from .boxes import BoxSpec
 from .geometry import gaps, infrared_readings, surface
+from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
 
 GOAL = (1.0, 0.0, 0.0)
@@ -110,7 +111,8 @@ def place(
 
     Examples
     --------
-    >>> from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS
+    >>> from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+    >>> from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
     >>> pair = [ROBOTS["e-puck"]] * 2
     >>> robots, box, goal = place("easy", np.random.default_rng(0), pair, BOXES["square"])
     >>> round(float(np.hypot(*(goal - box)[:2])), 9), bool((robots[:, 0] < box[0]).all())
@@ -256,8 +258,8 @@ class World:
 
     Examples
     --------
-    >>> from nested_agents.scenarios.box_pushing.world.bodies import BOXES
-    >>> from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS
+    >>> from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+    >>> from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
     >>> world = World([ROBOTS["e-puck"]], BOXES["square"])
     >>> world.place(np.array([[-0.2, 0.0, 0.0]]), np.zeros(3))
     >>> world.advance(np.array([0.13, 0.13]), periods=30)

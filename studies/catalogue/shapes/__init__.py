@@ -9,8 +9,9 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 import numpy as np
 
 from ...results.analysis import Analysis, Difference, Figures, Summary, adjusted, ratio
+from ...results.power import power_lines
 from ...results.results import Results
-from ...results.statistics import bootstrap, power_lines, rate
+from ...results.statistics import bootstrap, rate
 from ...spec.spec import Spec
 from ..study import check_evaluations
 from ..study import measure as measure

@@ -25,15 +25,7 @@ from ....core.numerics import pd
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures, Pair, Summary, judged
 from ...results.results import Results
-from ...results.statistics import (
-    BLOCK,
-    NOT_NEGATIVE,
-    REGAINED,
-    Array,
-    bootstrap,
-    rate,
-    recovery,
-)
+from ...results.statistics import BLOCK, NOT_NEGATIVE, REGAINED, Array, bootstrap, rate, recovery
 from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ...trials.session import Session, arrange

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from ....topologies.view import HierarchyView
-    from ...cost.cost import Form
+    from ...cost.table import Form
 
 
 @click.command()
@@ -226,7 +226,7 @@ def cost(
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
     from ....core.agents.cost import Problem
-    from ...cost.cost import cost_table, written
+    from ...cost.table import cost_table, written
     from ...presentation.progress import say
 
     with refused():

@@ -18,21 +18,35 @@ from ..display import print_table, show_results
 @click.option("--print-spec", is_flag=True, help="Print the spec that would be run, and stop.")
 def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
     """Train two e-Pucks to push a box: table, figures and replay within minutes."""
-    spec = Path(__file__).parents[2] / "catalogue/learning_curve/demo.toml"
-    text = spec.read_text(encoding="utf-8")
+    file = Path(__file__).parents[2] / "catalogue/learning_curve/demo.toml"
+    text = file.read_text(encoding="utf-8")
     if print_spec:
         print(text, end="")
         return 0
     from ...api import study as api
     from ...presentation.progress import Terminal
     from ...spec.spec import Spec
+    from ...workers.runner import Outcome
 
-    study = api.run(Spec.parse(text), out, jobs=jobs, observer=Terminal())
-    status = show_results(study)
-    for episode in ("first", "last") if not study.failed else ():
+    spec = Spec.parse(text)
+    first = spec.conditions()[0].label, spec.seeds[0]
+    replays: dict[str, Path] = {}
+
+    def draw(study: api.StudyResults, episode: str) -> Path:
         path = out / "replay" / f"{episode}-episode.gif"
         path.parent.mkdir(exist_ok=True)
-        print(f"replay  {study.replay(episode=episode, path=path).path}")
+        return study.replay(*first, episode, path).path
+
+    def draw_first(outcome: Outcome) -> None:
+        if (outcome.trial.condition, outcome.trial.seed) == first and outcome.error is None:
+            replays["last"] = draw(api.load(out), "last")
+            terminal.note(f"what the first trial has learned: {replays['last']}")
+
+    terminal = Terminal(draw_first)
+    study = api.run(spec, out, jobs=jobs, observer=terminal)
+    status = show_results(study)
+    for episode in ("first", "last") if not study.failed else ():
+        print(f"replay  {replays.get(episode) or draw(study, episode)}")
     return status
 
 

@@ -9,7 +9,8 @@ from benchmarks.scripted.controller import (
 )
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 
 
 def solved(scenario: BoxPushing, seed: int) -> bool:

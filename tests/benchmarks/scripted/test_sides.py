@@ -11,7 +11,7 @@ from benchmarks.scripted.sides import (
     is_concave,
     sides_of,
 )
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES, BoxSpec
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES, BoxSpec
 
 SPAN = 0.043
 

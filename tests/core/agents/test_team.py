@@ -13,12 +13,8 @@ from nested_agents.core.agents.failures import AbsentAgents, LostMessages
 from nested_agents.core.agents.loop import control_loop, join_agents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
-from nested_agents.core.evaluators.evaluator import (
-    Counts,
-    EvaluatorSettings,
-    ExactEnumeration,
-    Sampling,
-)
+from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
+from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import carried_rows
 from nested_agents.core.interface.spaces import ActionSet, StateSpace

@@ -7,15 +7,17 @@ import pytest
 
 from nested_agents.core.evaluators import best_response
 from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
-from nested_agents.core.evaluators.evaluator import (
-    Aggregation,
+from nested_agents.core.evaluators.enumeration import (
     AutoSettings,
-    DecisionProblem,
-    Deliberation,
     ExactEnumeration,
-    Rule,
     Sampling,
     SamplingSettings,
+)
+from nested_agents.core.evaluators.evaluator import (
+    Aggregation,
+    DecisionProblem,
+    Deliberation,
+    Rule,
     ValueOf,
     concerned,
 )

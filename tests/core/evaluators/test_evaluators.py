@@ -9,18 +9,15 @@ import numpy as np
 import pytest
 
 from nested_agents.core.evaluators import EVALUATORS
-from nested_agents.core.evaluators.evaluator import (
+from nested_agents.core.evaluators.enumeration import (
     MOST_JOINT_ACTIONS,
-    DecisionProblem,
-    Deliberation,
     ExactEnumeration,
-    Rule,
     Sampling,
     SamplingSettings,
-    Teammates,
     combinations,
     probabilities_of,
 )
+from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation, Rule, Teammates
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import Blocks, StateSpace, Variable
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings

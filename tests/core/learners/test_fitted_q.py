@@ -8,10 +8,11 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
-from nested_agents.core.learners.batch import REWARD_SCALE, FittedQ, FittedQSettings
+from nested_agents.core.learners.batch import REWARD_SCALE
+from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
 from nested_agents.core.learners.learner import Decision
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
-from nested_agents.scenarios.matrix_games.scenario import TeamGameSettings
+from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
 from nested_agents.studies.spec.spec import Spec
 
 SPACE = StateSpace("gap", (Variable("gap", "m", 0.0, 1.0, centres=(0.0, 0.5, 1.0)),))

@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.scenarios.box_pushing.config import PushingPointsSettings
 from nested_agents.scenarios.box_pushing.pushing_points import pushing_points
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.geometry import surface
 
 GAP = 0.05

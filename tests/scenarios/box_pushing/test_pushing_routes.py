@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.pushing_points import moved, paths
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 
 def test_constant_twists_lead_along_arcs() -> None:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from nested_agents.core.numerics import FloatArray
-from nested_agents.scenarios.box_pushing.world.bodies import WheelModel
 from nested_agents.scenarios.box_pushing.world.geometry import ON_SURFACE, Outline
+from nested_agents.scenarios.box_pushing.world.robots import WheelModel
 from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
 
 

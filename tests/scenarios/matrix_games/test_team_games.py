@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.scenarios.matrix_games.scenario import TeamGame, TeamGameSettings
+from nested_agents.scenarios.matrix_games.team_games import TeamGame, TeamGameSettings
 
 
 def begun(seed: int = 3, **keys: object) -> TeamGame:

@@ -13,8 +13,8 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.power import seeds_needed
 from nested_agents.studies.results.results import read
-from nested_agents.studies.results.statistics import seeds_needed
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import check as measures_of
 from nested_agents.studies.trials.trial import trials_of

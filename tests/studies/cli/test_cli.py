@@ -180,7 +180,9 @@ def test_presets(capsys, monkeypatch):
     assert "step_size = 0.00012" in capsys.readouterr().out
 
 
-def test_the_demo_draws_a_replay_of_the_first_and_of_the_last_episode(tmp_path, monkeypatch):
+def test_the_demo_draws_what_is_learned_first_and_then_the_first_episode(
+    tmp_path, monkeypatch, capsys
+):
     drawn = []
     rendering = ModuleType("rendering")
     rendering.animate = lambda recording, path: (drawn.append(recording), path.touch())
@@ -189,7 +191,9 @@ def test_the_demo_draws_a_replay_of_the_first_and_of_the_last_episode(tmp_path, 
     )
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
     monkeypatch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
-    assert main(["demo", "--out", str(tmp_path)]) == 0
+    assert main(["demo", "--out", str(tmp_path), "--jobs", "1"]) == 0
+    seen = capsys.readouterr().err
+    assert seen.index("what the first trial has learned: ") < seen.index("of 32 trials")
     assert len(drawn) == 2
     assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [
         "first-episode.gif", "last-episode.gif",

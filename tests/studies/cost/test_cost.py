@@ -18,13 +18,12 @@ from nested_agents.studies.cost.cost import (
     CostRow,
     StepCost,
     agents_below,
-    cost_table,
     measure,
     messages,
     step_formula,
-    written,
 )
 from nested_agents.studies.cost.figure import draw
+from nested_agents.studies.cost.table import cost_table, written
 from nested_agents.studies.presentation import figures
 
 FIVE = ("chain", "teams", "tree:2", "star", "independent")

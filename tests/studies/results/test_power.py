@@ -3,12 +3,9 @@ import pytest
 from scipy import special, stats
 
 from nested_agents.studies.results.analysis import Difference, adjusted, verdict_lines
-from nested_agents.studies.results.statistics import (
-    LEVEL,
-    bootstrap,
+from nested_agents.studies.results.power import (
     detectable,
     deviation_of,
-    paired_permutation,
     power,
     power_lines,
     power_of_t,
@@ -16,6 +13,7 @@ from nested_agents.studies.results.statistics import (
     seeds_for,
     seeds_needed,
 )
+from nested_agents.studies.results.statistics import LEVEL, bootstrap, paired_permutation
 
 
 def found_in_simulation(

@@ -17,7 +17,8 @@ from nested_agents.scenarios.box_pushing.prediction.push_lanes import (
     head,
 )
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS, compliance
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, compliance
 
 BOX, ROBOT = BOXES["square"], ROBOTS["e-puck"]
 BEHIND = -0.1 - ROBOT.radius

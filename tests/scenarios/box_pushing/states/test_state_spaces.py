@@ -21,7 +21,7 @@ from nested_agents.scenarios.box_pushing.states.state_spaces import (
     listed,
     state_space_for,
 )
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.state_variables import StateVariable, find_variable, sensed
 
 GOAL = np.array([1.0, 0.0, 0.0])

@@ -15,10 +15,9 @@ from shapely.affinity import rotate, translate
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from nested_agents.scenarios.box_pushing.world.bodies import (
+from nested_agents.scenarios.box_pushing.world.boxes import (
     AREA,
     BOXES,
-    ROBOTS,
     BoxSpec,
     _merged,
     box_for,
@@ -26,6 +25,7 @@ from nested_agents.scenarios.box_pushing.world.bodies import (
     moments,
     polygon_edges,
 )
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 from nested_agents.scenarios.box_pushing.world.world import UNIT, World
 

@@ -9,7 +9,7 @@ from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS, robot_for
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, robot_for
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, RobotSettings, label
 from nested_agents.scenarios.checking.checker import check_scenario
 from nested_agents.studies.errors import SpecError

@@ -11,7 +11,8 @@ from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS, nominal_effect
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
 from nested_agents.scenarios.box_pushing.world.settings import (
     Failure,
     FailureSettings,

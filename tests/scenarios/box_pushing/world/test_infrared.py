@@ -9,13 +9,13 @@ from world_oracles import infrared_readings_numpy
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.bodies import (
-    BOXES,
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.geometry import infrared_readings
+from nested_agents.scenarios.box_pushing.world.robots import (
     E_PUCK_SENSORS,
     ROBOTS,
     sensor_directions,
 )
-from nested_agents.scenarios.box_pushing.world.geometry import infrared_readings
 from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings, Normalisation
 from nested_agents.scenarios.box_pushing.world.world import World
 from nested_agents.studies.errors import SpecError

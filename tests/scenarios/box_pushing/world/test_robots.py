@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.world.bodies import (
+from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
     compliance,
     nominal_effect,

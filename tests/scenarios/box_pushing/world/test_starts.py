@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS, BoxSpec, box_for
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES, BoxSpec, box_for
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.box_pushing.world.world import CLEARANCE, STARTS, World, place
 
 ROBOT = ROBOTS["e-puck"]

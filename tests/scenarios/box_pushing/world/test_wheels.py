@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from world_oracles import wheel_wrenches_numpy
 
-from nested_agents.scenarios.box_pushing.world.bodies import (
+from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
     compliance,
     nominal_effect,

@@ -7,13 +7,8 @@ import pytest
 
 from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.world import world as world_module
-from nested_agents.scenarios.box_pushing.world.bodies import (
-    BOXES,
-    ROBOTS,
-    box_for,
-    compliance,
-    nominal_effect,
-)
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES, box_for
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, compliance, nominal_effect
 from nested_agents.scenarios.box_pushing.world.settings import CONTROL_PERIOD
 from nested_agents.scenarios.box_pushing.world.world import World, place
 

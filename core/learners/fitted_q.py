@@ -1,0 +1,213 @@
+"""Fitted Q: values of actions, regressed without a predictor (Ernst, Geurts and Wehenkel 2005).
+
+An agent values its own actions in the state that it is in, given the actions that it is told; it
+needs no prediction of where they lead, and considers nobody. Its rule base is over its state
+variables and, for each agent that tells it something, a variable with a membership function at
+every action and one for ``nobody``; every rule has as many consequents as the agent has actions. So
+the hierarchy says what an agent can make its action depend on: agents that are told nothing are
+independent learners.
+
+Learning is that of batch TD, but for the target. With x what an agent knew at a decision, u what it
+did then, r what all this paid, and (x', u') the next decision::
+
+    Q(x, u) = r + gamma max_v Q(x', v)
+
+The maximum is the agent's own: what it was told is part of x', and is not maximised over. There is
+one reward and one target for each *joint* step, so that no agent learns from another's turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
+from ..evaluators.evaluator import Counts, Deliberation
+from ..interface.spaces import ActionSet, StateSpace, choice
+from ..numerics import FloatArray, IntArray
+from ..plugins.registry import Plugged
+from ..plugins.settings import Positive
+from ..rules.kernels.fuzzy import Partition
+from ..rules.rule_base import RuleBase
+from .batch import BatchTD, Function, add_gram, row_values, solver
+from .learner import Decision, LearnerSettings
+
+NOBODY = "nobody"
+"""What an agent is told by a sender that it has not."""
+
+
+class FittedQSettings(LearnerSettings):
+    """Fitted Q: values of actions, without a predictor."""
+
+    kind: Literal["fitted-q"] = "fitted-q"
+    factory: ClassVar[str] = f"{__name__}:FittedQ"
+    values_actions = True
+    ridge: Positive = 0.1
+    """Weight of the squared consequents against squared errors of rewards scaled by 100."""
+    regression_iterations: Annotated[int, Field(ge=1, le=10_000)] = 8
+    """Regressions on freshly discounted targets each time."""
+    target_averaging_rate: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """Share of the way that the weights go towards the last regression's."""
+    interval: Annotated[int, Field(ge=1)] = 1_000_000
+    """Decisions of an episode after which is regressed without waiting for its end."""
+    trace_decay: ClassVar[float] = 0.0
+    forgetting: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    """Share of its weight that experience loses from regression to regression: what it was worth to
+    act so depends on what the others did then."""
+    mirrored: bool = False
+    """Whether what the mirror image of the team would have met is experience as well; of agents
+    that are told nothing."""
+    exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration(
+        rate=1.0, decay=0.85, floor=0.05, length=1.0
+    )
+    """How agents explore: without a predictor they begin at random."""
+
+    def rules_over(
+        self, space: StateSpace, actions: ActionSet, n_told: int
+    ) -> tuple[StateSpace, RuleBase]:
+        """Return what values are functions of, the own action last, and their rule base."""
+        self._check_decision()
+        if self.mirrored and n_told:
+            raise ValueError(
+                "learner.mirrored = true: messages have no mirror image; set topology.told = 'none'"
+            )
+        told = [choice(f"told{k + 1}", (*actions.names, NOBODY)) for k in range(n_told)]
+        names = tuple(variable.name for variable in told)
+        known = StateSpace(
+            space.name, (*space.variables, *told), space.n_own, actions=(*space.actions, *names)
+        )
+        base = RuleBase.build(known, self.rule_base)
+        action = choice("action", actions.names)
+        own = Partition.of(action, self.rule_base.membership, None, self.rule_base.steepness)
+        terms = [(*term, len(base.partitions)) for term in base.terms]
+        rules = RuleBase((*base.partitions, own), terms, dtype=self.rule_base.precision)
+        return StateSpace(space.name, (*known.variables, action)), rules
+
+    def _check_decision(self) -> None:
+        """Refuse what takes a prediction."""
+        taken = Decision(rule=self.decision.rule, unseen=self.decision.unseen)
+        for key, allowed in taken:
+            if (value := getattr(self.decision, key)) != allowed:
+                raise ValueError(
+                    f"learner.decision.{key} = {getattr(value, 'kind', value)!r}: fitted-q "
+                    "predicts nothing and decides by its own value; leave it out, or set preset = "
+                    "'fitted-q'"
+                )
+        if self.decision.rule not in ("value", "random") or self.decision.unseen == "plan":
+            raise ValueError(
+                "learner.decision: fitted-q has neither predicted rewards nor plans, allowed: rule "
+                "= value or random, unseen = maintain or last"
+            )
+        if self.self_model.enabled or self.calibration.enabled:
+            raise ValueError("learner.self_model, calibration: fitted-q has no predictor to adapt")
+
+
+class FittedQ(BatchTD):
+    """Fitted Q: learns the values of actions, and tells them.
+
+    Weights are laid out rule by rule, the own action last: ``theta.reshape(-1, A)`` has a column
+    for each action. Their normal equations are sums over what agents did: of each decision only the
+    first time, and for each action by itself.
+    """
+
+    def __init__(self, settings: FittedQSettings, rules: RuleBase, rows: IntArray) -> None:
+        super().__init__(settings, rules, rows)
+        self.counts = Counts()
+        self._n_actions = rules.partitions[-1].size
+        self._known = RuleBase(rules.partitions[:-1], [term[:-1] for term in rules.terms])
+        k = self._known.n_rules
+        self._gram: FloatArray = np.zeros((len(self.theta), self._n_actions, k, k))
+        self._weights: list[FloatArray] = [np.zeros(0)] * len(self.theta)
+        """By row, with what weight the sums hold each decision."""
+
+    def values(self, deliberation: Deliberation) -> FloatArray:
+        """Return the value ``(A,)`` of each action in the agent's present state."""
+        active, strengths = self._known.active(deliberation.present[[deliberation.agent]])
+        self.counts.joint_actions += self._n_actions
+        self.counts.rule_evaluations += len(deliberation.own_weights)
+        weights = deliberation.own_weights.reshape(-1, self._n_actions)
+        return strengths[0] @ weights[active[0]]
+
+    def observe(  # type: ignore[override]  # what is asked for by name is given
+        self,
+        states: FloatArray,
+        reward: float | FloatArray,
+        terminated: bool,
+        *,
+        left: FloatArray,
+        joint_action: IntArray,
+    ) -> int:
+        """Remember what the agents knew, did and got; regress if the episode has gone on."""
+        return super().observe(np.column_stack([left, joint_action]), reward, terminated)
+
+    def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return the active rules of decisions, by the action that was taken, and strengths."""
+        active, strengths = self._known.active(states[:, :-1])
+        return active * self._n_actions + states[:, -1:].astype(np.int64), strengths
+
+    def _equations(self, row: int, known: FloatArray) -> tuple[FloatArray, Function, Function]:
+        """As in batch TD, action by action; a state is worth its best action."""
+        (taken, strengths), n_actions = self._active[row], self._n_actions
+        active, ridge = taken // n_actions, self.settings.ridge * np.eye(self._known.n_rules)
+        gram, weights = self._sums(row, known)
+        solvers = [solver(own + ridge) for own in gram]
+
+        def values_of(theta: FloatArray) -> FloatArray:
+            columns = np.ascontiguousarray(theta.reshape(-1, n_actions).T)
+            return np.max([row_values(own, active, strengths) for own in columns], axis=0)
+
+        def solve(moment: FloatArray) -> FloatArray:
+            columns = zip(solvers, moment.reshape(-1, n_actions).T, strict=True)
+            return np.stack([solve_one(own) for solve_one, own in columns], axis=1).ravel()
+
+        return weights, values_of, solve
+
+    def _sums(self, row: int, known: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the sums of phi phi' ``(A, k, k)`` of a row, and the weights ``(N,)`` in them.
+
+        What is new is added. The last decision of a running episode has no outcome yet, and is
+        added later.
+        """
+        is_running = self._follower[-1] == len(self._states)
+        begin, end = len(self._weights[row]), len(known) - is_running * len(self.members[row])
+        kept, new = 1.0 - self.settings.forgetting, slice(begin, end)
+        taken, strengths = self._active[row][0][new], self._active[row][1][new]
+        self._gram[row] *= kept
+        self._weights[row] = np.append(kept * self._weights[row], known[new])
+        for action, gram in enumerate(self._gram[row]):
+            weights = known[new] * (taken[:, 0] % self._n_actions == action)
+            add_gram(gram, taken // self._n_actions, strengths, weights)
+        return self._gram[row], np.append(self._weights[row], np.zeros(len(known) - end))
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return weights, all experience, and its sums."""
+        held = np.cumsum([len(weights) for weights in self._weights])
+        sums = {"gram": self._gram, "weights": np.concatenate(self._weights), "held": held}
+        return super().arrays() | sums
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from `arrays`."""
+        super().restore(arrays)
+        self._gram = arrays["gram"].copy()
+        self._weights = np.split(arrays["weights"], arrays["held"].astype(int)[:-1])
+
+    def continue_from(self, former: Any, rows: IntArray) -> None:
+        """Begin with weights and experience of another team, of which no episode is under way.
+
+        Raises
+        ------
+        ValueError
+            If the agents are told by another number of others; one line.
+        """
+        if former.rules.n_rules != self.rules.n_rules:
+            fewer = len(self.rules.partitions) - len(former.rules.partitions)
+            raise ValueError(
+                f"topology: an agent is told by {abs(fewer)} {'more' if fewer > 0 else 'fewer'} "
+                "others than when it learned what to make of it; allowed: as many"
+            )
+        super().continue_from(former, rows)
+        self._gram = former._gram[rows]
+        self._weights = [former._weights[row].copy() for row in rows]
