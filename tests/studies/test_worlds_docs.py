@@ -7,6 +7,7 @@ from published_tables import print_table
 
 import nested_agents as na
 from nested_agents.studies.claims.claims import PUBLISHED
+from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.results.analysis import Summary
 from nested_agents.studies.results.statistics import bootstrap
@@ -25,7 +26,6 @@ COLUMNS = ("success last 5", "evaluation success", "total reward")
         ("pendulum", COLUMNS),
         ("cartpole", ("success last 5", "evaluation success", "evaluation steps")),
         ("spread", ("evaluation steps", "total reward")),
-        ("swimmer", COLUMNS),
         ("multiwalker", ("evaluation steps", "total reward")),
     ],
 )
@@ -65,6 +65,14 @@ def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
 
 
+def test_evaluated_rewards(capsys: pytest.CaptureFixture[str]) -> None:
+    path, by = str(PUBLISHED / "aloha.json"), ("--phase", "evaluation", "--reference", "none")
+    of = ("--measure", "total_reward", "--format", "markdown")
+    assert main(["compare", path, *of, *by]) == 0
+    table = capsys.readouterr().out
+    assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("spec", "extras", "agents"),
@@ -74,6 +82,9 @@ def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
         ("swimmer_transfer", ("mujoco",), 4),
         ("spread", ("mpe2",), 3),
         ("spread_ppo", ("mpe2", "stable_baselines3"), 3),
+        ("aloha", (), 10),
+        ("aloha_ppo", ("stable_baselines3",), 10),
+        ("aloha_copies", (), 10),
     ],
 )
 def test_specs_of_worlds_of_others_run(spec: str, extras: tuple[str, ...], agents: int) -> None:

@@ -329,6 +329,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "swimmer-4",
         "swimmer-transfer",
         "multiwalker",
+        "aloha",
         "predictors-pendulum",
         "predictors-pendulum-midpoint",
         "predictors-cartpole",
