@@ -281,6 +281,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "edges-sixteen",
         "orders-arm",
         "orders-arm-ppo",
+        "orders-boxes",
         "orders-game",
         "orders-game-ppo",
         "orders-line",
