@@ -327,6 +327,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "cartpole",
         "spread",
         "swimmer",
+        "swimmer-4",
         "swimmer-transfer",
         "multiwalker",
         "aloha",
