@@ -74,6 +74,7 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
 @pytest.mark.parametrize(
     ("names", "task"),
     [
+        (("orders-boxes",), "boxes, 2 robots"),
         (("orders-arm", "orders-arm-ppo"), "arm of 4 joints"),
         (("orders-game", "orders-game-ppo"), "climbing, 3 agents"),
         (("orders-line", "orders-line-ppo"), "game on a line, 8 agents"),

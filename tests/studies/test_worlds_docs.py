@@ -5,8 +5,12 @@ from pathlib import Path
 import pytest
 from published_tables import print_table
 
+import nested_agents as na
 from nested_agents.studies.claims.claims import PUBLISHED
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.results.analysis import Summary
+from nested_agents.studies.results.statistics import bootstrap
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
@@ -22,13 +26,42 @@ COLUMNS = ("success last 5", "evaluation success", "total reward")
         ("pendulum", COLUMNS),
         ("cartpole", ("success last 5", "evaluation success", "evaluation steps")),
         ("spread", ("evaluation steps", "total reward")),
-        ("swimmer", COLUMNS),
-        ("swimmer-transfer", (*COLUMNS[:2], "success, eight", COLUMNS[2])),
         ("multiwalker", ("evaluation steps", "total reward")),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
+    assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
+
+
+SPEED = 180.0
+"""Steps of the environment in an episode of a swimmer: total reward over it is a speed [m/s]."""
+SPEEDS = {"speed [m/s]": "evaluation", "actions sampled": "evaluation:sampled actions"}
+
+
+@pytest.mark.parametrize(
+    ("name", "phases"),
+    [
+        ("swimmer", SPEEDS),
+        ("swimmer-4", SPEEDS),
+        (
+            "swimmer-transfer",
+            {
+                "4 joints": "evaluation",
+                "8 joints": "evaluation:eight",
+                "16 joints": "evaluation:sixteen",
+            },
+        ),
+    ],
+)
+def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
+    results, lines = na.load(PUBLISHED / f"{name}.json").results, []
+    for condition in results.of_phase("evaluation"):
+        own = {t: p for t, p in phases.items() if results.has(condition, p, "total_reward")}
+        each = {t: results.values(condition, "total_reward", p) for t, p in own.items()}
+        speeds = {t: bootstrap(v.mean(axis=1) / SPEED) for t, v in each.items()}
+        lines.append(Summary(condition, len(results.seeds(condition)), speeds))
+    table = tabulate(lines).markdown
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
 
 
@@ -55,12 +88,9 @@ def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixt
         ("aloha_copies", (), 10),
     ],
 )
-def test_specs_of_worlds_of_others_run(
-    spec: str, extras: tuple[str, ...], agents: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_specs_of_worlds_of_others_run(spec: str, extras: tuple[str, ...], agents: int) -> None:
     for extra in extras:
         pytest.importorskip(extra, reason="extras mpe, mujoco, peers")
-    monkeypatch.chdir(ROOT)  # swimmers of more joints are files of examples
     path = ROOT / "studies" / "catalogue" / "learning_curve" / f"{spec}.toml"
     few = ["seeds=1", "episodes=2", "steps=3", "evaluation=1"]
     for trial in trials_of(Spec.load(path, few)):
