@@ -65,8 +65,9 @@ def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
 
 
-def test_evaluated_rewards(capsys: pytest.CaptureFixture[str]) -> None:
-    path, by = str(PUBLISHED / "aloha.json"), ("--phase", "evaluation", "--reference", "none")
+@pytest.mark.parametrize(("name", "reference"), [("aloha", "none"), ("aloha-copies", "planner")])
+def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path, by = str(PUBLISHED / f"{name}.json"), ("--phase", "evaluation", "--reference", reference)
     of = ("--measure", "total_reward", "--format", "markdown")
     assert main(["compare", path, *of, *by]) == 0
     table = capsys.readouterr().out

@@ -331,6 +331,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "swimmer-transfer",
         "multiwalker",
         "aloha",
+        "aloha-copies",
         "predictors-pendulum",
         "predictors-pendulum-midpoint",
         "predictors-cartpole",
