@@ -2,4 +2,8 @@
 
 from importlib.util import find_spec
 
-collect_ignore_glob = [] if find_spec("torch") else ["nested_agents/core/policies/*.py"]
+NEEDED = {
+    "torch": "nested_agents/core/policies/*.py",
+    "mujoco": "nested_agents/scenarios/swimmers.py",
+}
+collect_ignore_glob = [pattern for extra, pattern in NEEDED.items() if not find_spec(extra)]

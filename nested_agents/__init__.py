@@ -65,7 +65,7 @@ _PLACES = {
     "check_scenario": ("scenarios.checking.checker", "check_scenario"),
     "cost_table": ("studies.cost.table", "cost_table"),
     "control_loop": ("core.agents.loop", "control_loop"),
-    "detectable": ("studies.results.statistics", "detectable"),
+    "detectable": ("studies.results.power", "detectable"),
     "from_gymnasium": ("scenarios.adapters.adapted", "from_gymnasium"),
     "from_pettingzoo": ("scenarios.adapters.adapted", "from_pettingzoo"),
     "greatest": ("core.numerics", "greatest"),
@@ -78,7 +78,7 @@ _PLACES = {
     "reevaluate": ("studies.api.alternatives", "reevaluate"),
     "run": ("studies.api.study", "run"),
     "run_trial": ("studies.trials.session", "run_trial"),
-    "seeds_for": ("studies.results.statistics", "seeds_for"),
+    "seeds_for": ("studies.results.power", "seeds_for"),
     "tune": ("studies.api.alternatives", "tune"),
     "state_variable": ("scenarios.state_variables", "state_variable"),
 }
