@@ -1,5 +1,7 @@
 """Every key of a spec is told of: type, default, what is allowed, meaning."""
 
+from pkgutil import resolve_name
+
 import pytest
 
 from nested_agents.core.plugins.registry import Plugged
@@ -19,7 +21,8 @@ def built_in_models() -> set[type[Settings]]:
     """All settings models of ours that have fields, however they are reached.
 
     Not those of controllers of one scenario, which are named by module and class, nor those of
-    faults of other environments, nor entries of a benchmark.
+    faults of other environments, nor entries of a benchmark; nor those that other tests have made
+    of a function.
     """
     found = subclasses(Settings) - {Settings, ConditionSettings}
     return {
@@ -28,6 +31,7 @@ def built_in_models() -> set[type[Settings]]:
         if model.__module__.startswith("nested_agents.")
         and not model.__module__.endswith((".scripted", ".wrappers", ".push_n"))
         and set(model.model_fields) - {"kind"}
+        and resolve_name(f"{model.__module__}:{model.__qualname__}") is model
     }
 
 
