@@ -65,7 +65,10 @@ def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
 
 
-@pytest.mark.parametrize(("name", "reference"), [("aloha", "none"), ("aloha-copies", "planner")])
+@pytest.mark.parametrize(
+    ("name", "reference"),
+    [("aloha", "none"), ("aloha-copies", "planner"), ("spread-ppo", "random")],
+)
 def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixture[str]) -> None:
     path, by = str(PUBLISHED / f"{name}.json"), ("--phase", "evaluation", "--reference", reference)
     of = ("--measure", "total_reward", "--format", "markdown")

@@ -326,6 +326,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "pendulum",
         "cartpole",
         "spread",
+        "spread-ppo",
         "swimmer",
         "swimmer-4",
         "swimmer-transfer",
