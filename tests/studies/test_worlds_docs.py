@@ -67,7 +67,12 @@ def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
 
 @pytest.mark.parametrize(
     ("name", "reference"),
-    [("aloha", "none"), ("aloha-copies", "planner"), ("spread-ppo", "random")],
+    [
+        ("aloha", "none"),
+        ("aloha-copies", "planner"),
+        ("aloha-ppo", "hierarchy-ppo, none"),
+        ("spread-ppo", "random"),
+    ],
 )
 def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixture[str]) -> None:
     path, by = str(PUBLISHED / f"{name}.json"), ("--phase", "evaluation", "--reference", reference)

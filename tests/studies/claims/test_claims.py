@@ -333,6 +333,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "multiwalker",
         "aloha",
         "aloha-copies",
+        "aloha-ppo",
         "predictors-pendulum",
         "predictors-pendulum-midpoint",
         "predictors-cartpole",
