@@ -3,9 +3,11 @@
 import json
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from itertools import accumulate, zip_longest
+from textwrap import wrap
 from typing import Literal
 
 from ..core.agents.cost import below_counts
@@ -190,16 +192,36 @@ def printed(shown: HierarchyView, form: Form) -> str:
     return "\n".join([shown.title, *shown.remarks, "", *aligned(rows, "><>><"), "", *legend])
 
 
-def aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
-    """Return rows as lines, columns aligned to `sides` (< or >), cut to a terminal's width."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+def aligned(rows: Sequence[Sequence[str]], sides: str, heads: int = 0) -> list[str]:
+    """Return rows as lines, columns aligned to `sides` (< or >), within a terminal's width.
+
+    What does not fit is cut; but with `heads`, columns beyond these first ones follow below, as a
+    further table, and texts of the last of `heads` that are too long for both are broken.
+    """
     most = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    if heads:
+        rows = [line for row in rows for line in _broken(row, heads - 1, most // 2)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    ends = [end - 2 for end in accumulate(width + 2 for width in widths)]
+    if heads and ends[-1] > most:
+        n = max(heads + 1, sum(end <= most for end in ends))
+        first, rest = [r[:n] for r in rows], [[*r[:heads], *r[n:]] for r in rows]
+        below = ["", *aligned(rest, sides[:heads] + sides[n:], heads)] * (n < len(widths))
+        return [*aligned(first, sides[:n]), *below]
     lines = []
     for row in rows:
         cells = (f"{c:{s}{w}}" for c, s, w in zip(row, sides, widths, strict=True))
         line = "  ".join(cells).rstrip()
         lines.append(line if len(line) <= most else line[: most - 4] + " ...")
     return lines
+
+
+def _broken(row: Sequence[str], column: int, most: int) -> Iterator[tuple[str, ...]]:
+    """Yield a row, and below it what is left of the text of a column if that is too long."""
+    text = row[column]
+    parts = wrap(text, most or 1) if len(text) > most else [text]
+    cells = [parts if i == column else [cell] for i, cell in enumerate(row)]
+    yield from zip_longest(*cells, fillvalue="")
 
 
 def readable(number: int, few: int = 10**9) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterable, Sequence
 from shutil import get_terminal_size
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -23,17 +24,22 @@ def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> Non
     from rich.console import Console
 
     table.print(Console())
-    print(*(table.legend if legend is None else legend), sep="\n")
+    print_lines(table.legend if legend is None else legend)
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines; on a terminal those that are wider than it go on in the next one, indented."""
+    width = get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    for line in lines:
+        print(line if len(line) <= width else fill(line, width, subsequent_indent="  "))
 
 
 def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:
     """Print the table of a study and what it says of its results."""
     print_table(study.table(columns))
-    for note in study.notes:
-        print(note)
+    print_lines(study.notes)
     if not any(note.startswith("Power:") for note in study.notes):
-        for line in study.power:
-            print(line)
+        print_lines(study.power)
 
 
 def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
+from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.keeping import open_to_run
 from nested_agents.studies.trials.trial import EpisodeRow, TrialResult, trials_of
@@ -90,16 +91,62 @@ def threads(trial):
     return measure(trial)
 
 
-def logged(trial):
-    """As `slow`, and writes down which process began which trial."""
-    with open(os.environ["MADE_UP_MARK"], "a") as file:
-        file.write(f"{os.getpid()} {trial.identity}\n")
-    return slow(trial)
-
-
 def pids(trial):
     """Writes down its worker's process id and takes a long time."""
     with open(os.environ["MADE_UP_MARK"], "a") as file:
         file.write(f"{os.getpid()}\n")
     time.sleep(30)
     return measure(trial)
+
+
+NOTED = """
+import os
+import time
+
+
+class Noted(Tank):
+    def reset(self, seed, episode=0):
+        if episode == 0 and "MADE_UP_MARK" in os.environ:
+            with open(os.environ["MADE_UP_MARK"], "a") as file:
+                file.write(f"{os.getpgid(0)}\\n")
+            time.sleep(1.0)
+        return super().reset(seed, episode)
+"""
+"""A tank that writes down which process group begins a trial, and takes its time there."""
+
+STUDY = """
+study = "learning-curve"
+seeds = 3
+episodes = 3
+steps = 20
+evaluation = 1
+scenario.kind = "tank.py:Noted"
+sweep.preset = ["default", "frozen"]
+"""
+
+
+def write_study(folder):
+    """Write a study of six trials, and its world, that leaves time to kill who runs it."""
+    tank = Path(__file__).resolve().parents[2] / "examples" / "tank.py"
+    (folder / "tank.py").write_text(tank.read_text(encoding="utf-8") + NOTED)
+    (folder / "study.toml").write_text(STUDY)
+
+
+def begun(mark):
+    """Return the process groups that began a trial of that study, in order."""
+    return [*map(int, mark.read_text().split())] if mark.exists() else []
+
+
+def kill_group(mark, n):
+    """Kill the process group that begins the `n`-th trial of that study, while it runs it."""
+    until = time.monotonic() + 60
+    while time.monotonic() < until and len(begun(mark)) < n:
+        time.sleep(0.02)
+    os.killpg(begun(mark)[n - 1], signal.SIGKILL)
+
+
+def exported(study):
+    """Return the exported rows of a study and its recordings, byte for byte."""
+    assert main(["export", str(study), "--format", "csv"]) == 0
+    files = [Path(study, "export", "episodes.csv"), *Path(study).glob("recordings/*.npz")]
+    return {path.name: path.read_bytes() for path in files}

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import nested_agents as na
-from nested_agents.studies.cli.display import print_table, show_results
+from nested_agents.studies.cli.display import print_lines, print_table, show_results
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.results.analysis import Summary
 from nested_agents.studies.results.statistics import Estimate
@@ -38,6 +38,17 @@ def test_columns_without_room_follow_below(monkeypatch, capsys):
         tables[width] = capsys.readouterr().out
     assert tables[40].count("default") > tables[120].count("default") == 1
     assert tables[120].splitlines()[0].split() == " ".join(TITLES).split()
+
+
+def test_lines_are_broken_on_a_terminal_only(monkeypatch, capsys):
+    lines = ["short", "", "training success: 24 orders do not differ significantly"]
+    monkeypatch.setenv("COLUMNS", "40")
+    print_lines(lines)
+    assert capsys.readouterr().out.splitlines() == lines
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    print_lines(lines)
+    broken = ["training success: 24 orders do not", "  differ significantly"]
+    assert capsys.readouterr().out.splitlines() == ["short", "", *broken]
 
 
 def test_what_learns_nothing_is_named(tmp_path, capsys):

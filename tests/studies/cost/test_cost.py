@@ -99,6 +99,23 @@ def test_the_table_fits_a_terminal(said) -> None:
     assert "e+" not in out
 
 
+def test_columns_that_do_not_fit_a_terminal_follow_below(said, monkeypatch) -> None:
+    named = "a name that is a little longer than usual=star"
+    edges = "edges:" + ",".join(f"agent{i}>agent{i + 1}" for i in range(1, 9))
+    line = ("--agents", "9", "--topology", "chain", named, edges, "--network")
+    whole = said(*line)[1]
+    assert edges in whole
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    out = said(*line)[1]
+    assert max(map(len, out.splitlines())) <= 80
+    assert "..." not in out
+    for text in set(whole.split()) - {edges}:
+        assert text in out.split()
+    first = [line[: line.index("  ", 3)] for line in out.splitlines() if line.startswith("9  ")]
+    assert first == 4 * ["9  chain", "9  a name that is a little longer than", f"9  {edges[:40]}"]
+
+
 def test_numbers() -> None:
     assert list(numbers("5:7")) == [5, 6, 7]
     assert numbers("4,8,16") == [4, 8, 16]

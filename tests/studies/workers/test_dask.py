@@ -1,10 +1,8 @@
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
-from collections import Counter
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -16,7 +14,6 @@ from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.tables import dumps
-from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers import dask as dask_workers
 from nested_agents.studies.workers.dask import DaskWorkers
@@ -36,10 +33,10 @@ class Cluster:
             "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
             "--scheduler-file", folder / "scheduler.json",
         )  # fmt: skip
-        deadline = time.monotonic() + 60
-        while not (folder / "scheduler.json").exists() and time.monotonic() < deadline:
+        file, deadline = folder / "scheduler.json", time.monotonic() + 60
+        while not (file.exists() and file.stat().st_size) and time.monotonic() < deadline:
             time.sleep(0.05)
-        self.address = json.loads((folder / "scheduler.json").read_text())["address"]
+        self.address = json.loads(file.read_text())["address"]
 
     def start(self, *arguments):
         places = [str(Path(made_up.__file__).parent), os.environ.get("PYTHONPATH", "")]
@@ -47,7 +44,7 @@ class Cluster:
                        "MADE_UP_MARK": str(self.mark)}  # fmt: skip
         process = subprocess.Popen(
             [DASK, *map(str, arguments)], env=environment, cwd=self.folder,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         self.processes.append(process)
         return process
@@ -58,13 +55,16 @@ class Cluster:
     def close(self):
         for process in reversed(self.processes):
             process.terminate()
+        for process in self.processes:
             process.wait()
 
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory):
     with closing(Cluster(tmp_path_factory.mktemp("cluster"))) as started:
-        started.add("--nthreads", "1", "--nworkers", "2")
+        for machine in range(4):
+            place = started.folder / str(machine)
+            started.add("--nthreads", "1", "--local-directory", place)
         yield started
 
 
@@ -87,22 +87,6 @@ def content(store):
     recordings = sorted((store.directory / "recordings").glob("*.npz"))
     files = {path.name: path.read_bytes() for path in recordings}
     return list(store.episodes()[1]), files
-
-
-def test_a_worker_killed_in_a_cluster_costs_its_running_trial_only(cluster, tmp_path, expected):
-    with DaskWorkers.at(cluster.address, None) as workers, written(tmp_path) as (store, trials):
-        running = run_trials(trials, store, made_up.logged, workers)
-        first = next(running)
-        assert first.error is None
-        begun = [line.split() for line in cluster.mark.read_text().splitlines()]
-        victim = int(begun[-1][0])
-        os.kill(victim, signal.SIGKILL)
-        rest = list(running)
-        assert [outcome.error for outcome in rest] == [None] * 5
-        assert content(store) == expected
-    runs = Counter(line.split()[1] for line in cluster.mark.read_text().splitlines())
-    assert set(runs) == {trial.identity for trial in trials}
-    assert sum(runs.values()) <= len(trials) + 1  # what it was running
 
 
 def test_a_local_cluster_and_a_trial_that_kills_every_worker(tmp_path, expected):
@@ -132,14 +116,21 @@ def made_up_results(monkeypatch):
     monkeypatch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
 
 
-@pytest.mark.usefixtures("made_up_results")
-def test_the_command_with_an_address(cluster, tmp_path, capsys, expected):
-    assert run(tmp_path, "--address", cluster.address) == 0
-    _, err = capsys.readouterr()
-    assert "2 processes" in err
+def test_a_machine_killed_in_a_cluster_costs_its_running_trial_only(cluster, tmp_path, monkeypatch):
+    made_up.write_study(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    command = ["run", "study.toml", "--out"]
+    assert main([*command, "serial", "--jobs", "1"]) == 0
+    line = [sys.executable, "-m", "nested_agents", *command, "cluster"]
+    line += ["--backend", "dask", "--address", cluster.address]
+    with subprocess.Popen(line, stderr=subprocess.PIPE, text=True) as running:
+        made_up.kill_group(cluster.mark, 5)
+        _, err = running.communicate(timeout=120)
+    assert running.returncode == 0
+    assert "4 processes" in err
     assert "6 of 6 trials" in err
-    with Store.open(tmp_path / "out") as store:
-        assert content(store) == expected
+    assert made_up.exported("cluster") == made_up.exported("serial")
+    assert 6 <= len(made_up.begun(cluster.mark)) <= 6 + 1  # what it was running
 
 
 @pytest.mark.usefixtures("made_up_results")

@@ -1,53 +1,69 @@
-"""An array of Slurm jobs, as the tutorial has it: killed, put back in the queue, the same rows."""
+"""The script of a Slurm array, as it stands in the tutorial, with a stand-in for ``sbatch``."""
 
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
+import made_up
 import pytest
 
-ROOT = Path(__file__).resolve().parents[3]
-SPEC = """
-seeds = 2
-episodes = 2
-steps = 40
-evaluation = 1
-scenario.kind = "line-up"
-[sweep]
-preset = ["default", "frozen", "random"]
+from nested_agents.studies.cli.main import main
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "tutorials" / "cluster.md"
+SBATCH = """#!{python}
+import os, re, shutil, subprocess, sys
+
+spooled = shutil.copy(sys.argv[1], "{spool}")
+os.chmod(spooled, 0o700)
+array = re.search(r"^#SBATCH --array=(.+)$", open(spooled).read(), re.MULTILINE)[1]
+first, last = map(int, os.environ.get("SBATCH_ARRAY_INX", array).split("-"))
+for task in map(str, range(first, last + 1)):
+    names = dict(SLURM_JOB_ID="7" + task, SLURM_ARRAY_JOB_ID="7", SLURM_ARRAY_TASK_ID=task)
+    with open(f"slurm-7_{{task}}.out", "a") as log:
+        subprocess.run(
+            [spooled], env=os.environ | names, stdout=log, stderr=log, start_new_session=True
+        )
+print("Submitted batch job 7")
 """
-
-
-def rows(study: Path) -> list[str]:
-    """Return what `export` writes of every episode."""
-    command = [sys.executable, "-m", "nested_agents", "export", str(study)]
-    subprocess.run(command, check=True, capture_output=True)
-    return (study / "export" / "episodes.csv").read_text().splitlines()[1:]
+"""Runs a script for each index of its array, one after the other; as in Slurm a variable of the
+environment is stronger than the script's line."""
 
 
 @pytest.mark.slow
-def test_an_array_that_is_killed_and_put_back_ends_with_the_same_rows(tmp_path: Path) -> None:
-    page = (ROOT / "docs" / "tutorials" / "cluster.md").read_text()
-    line = next(re.finditer(r"^nested-agents run .*SLURM_ARRAY_TASK_ID.*$", page, re.M)).group()
-    line = "exec " + line.replace("nested-agents", f"{sys.executable} -m nested_agents", 1)
-    (tmp_path / "study.toml").write_text(SPEC)
+def test_a_killed_array_that_is_submitted_again_ends_with_the_bytes_of_a_serial_run(
+    tmp_path, monkeypatch
+):
+    (script,) = re.findall(r"^```bash\n(#!.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+    made_up.write_study(tmp_path)
+    (tmp_path / "array.sh").write_text(script)
+    sbatch = tmp_path / "bin" / "sbatch"
+    sbatch.parent.mkdir()
+    sbatch.write_text(SBATCH.format(python=sys.executable, spool=tmp_path / "bin"))
+    sbatch.chmod(0o700)
+    mark = tmp_path / "mark"
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "study.toml", "--out", "serial", "--jobs", "1", "--set", "seeds=2"]) == 0
+    places = [str(sbatch.parent), str(Path(sys.executable).parent), os.environ["PATH"]]
+    monkeypatch.setenv("PATH", os.pathsep.join(places))
+    monkeypatch.setenv("SBATCH_ARRAY_INX", "0-1")
+    monkeypatch.setenv("MADE_UP_MARK", str(mark))
+    with subprocess.Popen(["sbatch", "array.sh"]) as submitted:
+        made_up.kill_group(mark, 2)
+    assert submitted.returncode == 0
+    assert main(["status", "out/part-0"]) == 0
+    subprocess.run(["sbatch", "array.sh"], check=True)
+    assert len(made_up.begun(mark)) == 4 + 1  # the one that was killed
 
-    def job(task: int) -> "subprocess.Popen[bytes]":
-        """Begin a job of the array, as `sbatch` does."""
-        env = {**os.environ, "SLURM_ARRAY_TASK_ID": str(task)}
-        return subprocess.Popen(["bash", "-c", line], cwd=tmp_path, env=env)
-
-    killed, kept = job(0), tmp_path / "out" / "part-0" / "recordings"
-    while killed.poll() is None and not list(kept.glob("[!.]*.npz")):
-        time.sleep(0.01)
-    killed.send_signal(signal.SIGKILL)
-    assert killed.wait() == -signal.SIGKILL
-    assert [job(task).wait() for task in (0, 1)] == [0, 0]
-    whole = [sys.executable, "-m", "nested_agents", "run", "study.toml", "--out", "whole"]
-    subprocess.run(whole, cwd=tmp_path, check=True, capture_output=True)
-    parts = [row for task in (0, 1) for row in rows(tmp_path / "out" / f"part-{task}")]
-    assert sorted(parts) == sorted(rows(tmp_path / "whole"))
+    whole = made_up.exported("serial")
+    parts = [made_up.exported(f"out/part-{task}") for task in range(2)]
+    head, *rows = whole.pop("episodes.csv").splitlines(keepends=True)
+    joined = []
+    for part in parts:
+        above, *below = part.pop("episodes.csv").splitlines(keepends=True)
+        assert above == head
+        joined += below
+    order = list(dict.fromkeys(row.split(b",")[0] for row in rows))
+    assert sorted(joined, key=lambda row: order.index(row.split(b",")[0])) == rows
+    assert {name: data for part in parts for name, data in part.items()} == whole
