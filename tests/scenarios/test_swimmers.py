@@ -1,8 +1,13 @@
 """Swimmers of any number of joints."""
 
+from pathlib import Path
+
 import gymnasium
 import numpy as np
 import pytest
+
+from nested_agents.core.plugins.sources import Sources
+from nested_agents.scenarios import SCENARIOS
 
 pytest.importorskip("mujoco", reason="extra mujoco")
 
@@ -32,3 +37,17 @@ def test_further_joints_have_torques_and_are_observed(joints: int) -> None:
     world.reset(seed=0)
     turned = np.eye(joints, dtype=np.float32)[-1]
     assert abs(world.step(turned)[0] - still).argmax() == 2 * joints + 3  # the last joint's speed
+
+
+def test_joints_of_the_example_see_those_next_to_them() -> None:
+    with Sources(Path(__file__).resolve().parents[2] / "examples" / "worlds").active():
+        world = SCENARIOS.parsed("swimmer.py:swimmer", joints=3).build()
+    assert world.agents == ("body1.1", "body2.1", "body3.1")
+    env = world._simulator.env.unwrapped  # the pose is set by hand
+    turned = np.array([0.1, 0.2, 0.3])
+    env.set_state(np.r_[0, 0, 0, turned], np.r_[0.5, 0, 0, 10 * turned])
+    seen = world.states_of({"": env._get_obs()})
+    assert np.allclose(seen[:, 0], turned)
+    assert np.allclose(seen[:, 1:3], [[0.2, 0.2], [0.1, 0.3], [0.2, 0.2]])
+    assert np.allclose(seen[:, 3], 10 * turned)
+    assert np.allclose(seen[:, 4:], [0.0, 0.5])

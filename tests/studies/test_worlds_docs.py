@@ -50,6 +50,7 @@ SPEEDS = {"speed [m/s]": "evaluation", "actions sampled": "evaluation:sampled ac
                 "4 joints": "evaluation",
                 "8 joints": "evaluation:eight",
                 "16 joints": "evaluation:sixteen",
+                "32 joints": "evaluation:thirty_two",
             },
         ),
     ],
@@ -86,25 +87,30 @@ def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(
     ("spec", "extras", "agents"),
     [
-        ("swimmer", ("mujoco", "stable_baselines3"), 2),
-        ("swimmer_4", ("mujoco", "stable_baselines3"), 4),
-        ("swimmer_transfer", ("mujoco",), 4),
-        ("spread", ("mpe2",), 3),
-        ("spread_ppo", ("mpe2", "stable_baselines3"), 3),
-        ("aloha", (), 10),
-        ("aloha_ppo", ("stable_baselines3",), 10),
-        ("aloha_copies", (), 10),
+        ("swimmer", ("mujoco", "stable_baselines3"), {2}),
+        ("swimmer_4", ("mujoco", "stable_baselines3"), {4}),
+        ("swimmer_transfer", ("mujoco",), {4}),
+        ("swimmer_n", ("mujoco",), {2, 4, 8, 16}),
+        ("spread", ("mpe2",), {3}),
+        ("spread_ppo", ("mpe2", "stable_baselines3"), {3}),
+        ("aloha", (), {10}),
+        ("aloha_ppo", ("stable_baselines3",), {10}),
+        ("aloha_copies", (), {10}),
     ],
 )
-def test_specs_of_worlds_of_others_run(spec: str, extras: tuple[str, ...], agents: int) -> None:
+def test_specs_of_worlds_of_others_run(
+    spec: str, extras: tuple[str, ...], agents: set[int]
+) -> None:
     for extra in extras:
         pytest.importorskip(extra, reason="extras mpe, mujoco, peers")
     path = ROOT / "studies" / "catalogue" / "learning_curve" / f"{spec}.toml"
     few = ["seeds=1", "episodes=2", "steps=3", "evaluation=1"]
+    teams = set()
     for trial in trials_of(Spec.load(path, few)):
         session = Session(trial)
         session.train(2)
-        assert len(session.scenario.agents) == agents
+        teams.add(len(session.scenario.agents))
         phases = [row.phase for row in session.finish().rows]
         assert phases[:3] == ["training", "training", "evaluation"]
         assert {f"evaluation:{name}" for name, _ in trial.evaluations} <= {*phases}
+    assert teams == agents
