@@ -150,3 +150,31 @@ def test_hierarchies_say_how_small_a_difference_they_could_find() -> None:
     assert any(
         "Power: with 20 seeds" in note for note in analyse(hierarchies(chances).frames()).notes
     )
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        (
+            "learner.predictor = { ridge = 1 }",
+            "learner.predictor = {ridge = 1}: kind is missing; known: given, learned, static",
+        ),
+        (
+            'learner.predictor.kind = "push"',
+            "learner.predictor.kind = 'push': known: given, learned, static; did you mean "
+            "scenario.predictor = 'push'?",
+        ),
+        (
+            'learner.predictor = "copy"\nscenario.kind = "gymnasium"\nscenario.id = "CartPole-v1"',
+            "learner.predictor = 'copy': must be a table; did you mean scenario.predictor = "
+            "'copy'?",
+        ),
+        ('learner.predictor.kind = "copy"', "kind = 'copy': known: given, learned, static\n"),
+    ],
+)
+def test_a_predictor_of_the_wrong_table_is_pointed_to_the_right_one(
+    keys: str, message: str, tmp_path, capsys
+) -> None:
+    (tmp_path / "spec.toml").write_text(keys)
+    assert main(["plan", str(tmp_path / "spec.toml"), "--no-timed"]) == 2
+    assert message in capsys.readouterr().err
