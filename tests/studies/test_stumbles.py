@@ -1,5 +1,7 @@
 """What a new user stumbled over, each mended thing once."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from made_up_results import hierarchies, wheel_failure
@@ -178,3 +180,27 @@ def test_a_predictor_of_the_wrong_table_is_pointed_to_the_right_one(
     (tmp_path / "spec.toml").write_text(keys)
     assert main(["plan", str(tmp_path / "spec.toml"), "--no-timed"]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_team_that_no_memory_holds_is_refused_in_a_world_of_ones_own(
+    tmp_path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    tank = Path(__file__).resolve().parents[2] / "examples" / "tank.py"
+    (tmp_path / "tank.py").write_text(tank.read_text(encoding="utf-8"))
+    (tmp_path / "spec.toml").write_text('scenario = { kind = "tank.py:Tank", pumps = 100_000 }')
+    assert main(["plan", "spec.toml", "--no-timed"]) == 2
+    assert "scenario: has 100000 agents: a worker would hold 2.8" in capsys.readouterr().err
+
+
+def test_a_file_that_cannot_be_written_is_called_by_its_own_name(
+    tmp_path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.svg").mkdir()
+    reasons = {"nowhere/a.svg": "No such file or directory", "file/a.svg": "Not a directory",
+               "folder.svg": "Is a directory"}  # fmt: skip
+    for path, reason in reasons.items():
+        assert main(["cost", "--plot", path]) == 2
+        assert capsys.readouterr().err == f"nested-agents: error: {path}: {reason}\n"
