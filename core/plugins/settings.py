@@ -166,16 +166,21 @@ def team_size(seconds_per_pair: float, agents: int = 1) -> AfterValidator:
     """
 
     def check(number: int) -> int:
-        pairs = Decimal(agents * number) ** 2  # of numbers too large for floats, too
-        held, seconds = 2 * 10**8 + 28 * pairs, Decimal(seconds_per_pair) * pairs
-        if held > MOST_BYTES or seconds > MOST_SECONDS:
-            raise ValueError(
-                f"a worker would hold {held / 10**9:.2g} GB, and a decision take {seconds:.2g} s, "
-                f"by estimate, allowed up to {MOST_BYTES // 10**9} GB and {MOST_SECONDS} s"
-            )
+        check_team(number * agents, seconds_per_pair)
         return number
 
     return AfterValidator(check)
+
+
+def check_team(agents: int, seconds_per_pair: float) -> None:
+    """Raise `ValueError` if a team is too large by an estimate, see `team_size`."""
+    pairs = Decimal(agents) ** 2  # of numbers too large for floats, too
+    held, seconds = 2 * 10**8 + 28 * pairs, Decimal(seconds_per_pair) * pairs
+    if held > MOST_BYTES or seconds > MOST_SECONDS:
+        raise ValueError(
+            f"a worker would hold {held / 10**9:.2g} GB, and a decision take {seconds:.2g} s, "
+            f"by estimate, allowed up to {MOST_BYTES // 10**9} GB and {MOST_SECONDS} s"
+        )
 
 
 def unwritten(default: Any) -> Any:

@@ -266,7 +266,8 @@ def plan(
 def _taken(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Range, float]:
     """Return the time of a study [s], from and to, and its memory [bytes]."""
     begin, used = time.perf_counter(), _used()
-    subprocess.run([sys.executable, "-c", START], check=True)
+    # Ctrl-C is for this process, which then kills that one: it would print a traceback.
+    subprocess.run([sys.executable, "-c", START], check=True, process_group=0)
     started = STARTS * (_used() - used)
     with spec.sources.active():
         tried = [try_out(trial) for trial in trials[: len(spec.conditions())]]

@@ -24,7 +24,14 @@ from ...core.interface.scenario import Scenario, groups_of
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.registry import Plugged
-from ...core.plugins.settings import ScenarioSettings, Settings, closest, tuples, unwritten
+from ...core.plugins.settings import (
+    ScenarioSettings,
+    Settings,
+    check_team,
+    closest,
+    tuples,
+    unwritten,
+)
 from ...scenarios import DEFAULT, SCENARIOS
 from ...topologies import build
 from ...topologies.config import Topology, parse
@@ -32,6 +39,8 @@ from ..errors import SpecError, refused, show
 from .presets import PRESETS
 from .tables import TomlTable, explain, flat, label, misplaced, nested, overlay, scalar
 
+SECONDS_PER_PAIR = 1e-8
+"""What a decision takes at least for every pair of agents, of whatever scenario [s]."""
 SECTIONS = ("scenario", "topology", "learner")
 
 
@@ -98,9 +107,14 @@ class ConditionSettings(Settings):
         Raises
         ------
         ValueError
-            If agents or topology do not fit the world; one line that names the culprit.
+            If agents or topology do not fit the world, or agents are too many by an estimate; one
+            line that names the culprit.
         """
         scenario = join_agents(world, self.agents)
+        try:
+            check_team(len(scenario.agents), SECONDS_PER_PAIR)
+        except ValueError as error:
+            raise ValueError(f"scenario: has {len(scenario.agents)} agents: {error}") from None
         own: Sequence[tuple[int, int]] | None = getattr(scenario, "interactions", None)
         return scenario, build(self.topology, scenario.agents, groups_of(scenario), own)
 

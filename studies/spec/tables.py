@@ -20,7 +20,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from ...core.plugins.registry import Plugged, SettingsRegistry
-from ...core.plugins.settings import closest, dotted, mistaken, near, place, rule
+from ...core.plugins.settings import Keys, closest, dotted, mistaken, near, place, rule
 from ..errors import show
 
 TomlTable = dict[str, Any]
@@ -231,20 +231,33 @@ def explain(
         return f"{path}: missing" if keys == (name,) else f"{path}.{name}: missing"
     value = first["input"]
     if first["type"] == "plugged_kind":
-        if isinstance(value, Mapping):
-            path, value = f"{path}.kind", value.get("kind")
-        return f"{path} = {show(value)}: {first['msg']}"
+        return f"{_kind(path, value)}{first['msg']}"
     if first["type"].startswith("union_tag"):
-        path, value = f"{path}.kind", value.get("kind") if isinstance(value, Mapping) else value
         slot, _ = _reach(keys, model, data)
         kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
-        return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
+        kind = value.get("kind")
+        known = closest(kind, [k for k in kinds if k]) + _elsewhere(keys, kind, model, data)
+        return f"{_kind(path, value)}{known}"
     # The members of a union complain one by one about the same place: say what any would take.
     text = ", or ".join(dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys))
     owner = model_at(*_reach(keys[:-1], model, data)) if keys else None
     is_other_type = ("string" in text) is not isinstance(value, str)
     other = mistaken(keys[-1], owner.model_fields, first) if owner and is_other_type else ""
-    return f"{path} = {show(value)}: {text}{other}"
+    return f"{path} = {show(value)}: {text}{other or _elsewhere(keys, value, model, data)}"
+
+
+def _kind(path: str, value: object) -> str:
+    """Return how a line begins on the kind of a table, or on the name that stands for one."""
+    if isinstance(value, Mapping) and "kind" in value:
+        return f"{path}.kind = {show(value['kind'])}: "
+    return f"{path} = {show(value)}: " + "kind is missing; " * isinstance(value, Mapping)
+
+
+def _elsewhere(keys: Keys, value: object, model: type[BaseModel], data: Mapping[str, Any]) -> str:
+    """Return "; did you mean ...?" if a key of the same name in another table takes a word."""
+    places = _places(str(keys[-1]), model, data) if keys and isinstance(value, str) else ()
+    match = next((n for n, field in places if value in typing.get_args(field.annotation)), None)
+    return f"; did you mean {match} = {value!r}?" if match and match != dotted(keys) else ""
 
 
 def misplaced(path: str, model: type[BaseModel], data: Mapping[str, Any]) -> str:
@@ -261,13 +274,15 @@ def misplaced(path: str, model: type[BaseModel], data: Mapping[str, Any]) -> str
         through.
     """
     key = path.rpartition(".")[2]
-    places = (name for name in _places(key, model, data) if not f".{path}".endswith(f".{name}"))
+    places = (name for name, _ in _places(key, model, data) if not f".{path}".endswith(f".{name}"))
     matches = dict.fromkeys(places)
     return f"did you mean {' or '.join(map(repr, matches))}?" if matches and key != "kind" else ""
 
 
-def _places(key: str, model: type[BaseModel], data: object, name: str = "") -> Iterator[str]:
-    """Yield the dotted names that a key has in the tables below a model."""
+def _places(
+    key: str, model: type[BaseModel], data: object, name: str = ""
+) -> Iterator[tuple[str, FieldInfo]]:
+    """Yield the dotted names that a key has in the tables below a model, and its fields."""
     for field, info in model.model_fields.items():
         table = data.get(field) if isinstance(data, Mapping) else None
         registry, own = registry_of(info), model_at(info, table)
@@ -279,7 +294,7 @@ def _places(key: str, model: type[BaseModel], data: object, name: str = "") -> I
             held = [registry.model(kind) for kind in registry.built_in]
         for inner in held:
             if key in inner.model_fields:
-                yield f"{name}{field}.{key}"
+                yield f"{name}{field}.{key}", inner.model_fields[key]
             yield from _places(key, inner, table, f"{name}{field}.")
 
 

@@ -1,5 +1,7 @@
 """What a new user stumbled over, each mended thing once."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from made_up_results import hierarchies, wheel_failure
@@ -8,6 +10,7 @@ from matplotlib.figure import Figure
 import nested_agents as na
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import SUCCESS
+from nested_agents.studies.api import running
 from nested_agents.studies.catalogue.learning_curve import metrics_of
 from nested_agents.studies.catalogue.wheel_failure import analyse as analyse_failures
 from nested_agents.studies.catalogue.wheel_failure import draw as draw_failures
@@ -150,3 +153,64 @@ def test_hierarchies_say_how_small_a_difference_they_could_find() -> None:
     assert any(
         "Power: with 20 seeds" in note for note in analyse(hierarchies(chances).frames()).notes
     )
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        (
+            "learner.predictor = { ridge = 1 }",
+            "learner.predictor = {ridge = 1}: kind is missing; known: given, learned, static",
+        ),
+        (
+            'learner.predictor.kind = "push"',
+            "learner.predictor.kind = 'push': known: given, learned, static; did you mean "
+            "scenario.predictor = 'push'?",
+        ),
+        (
+            'learner.predictor = "copy"\nscenario.kind = "gymnasium"\nscenario.id = "CartPole-v1"',
+            "learner.predictor = 'copy': must be a table; did you mean scenario.predictor = "
+            "'copy'?",
+        ),
+        ('learner.predictor.kind = "copy"', "kind = 'copy': known: given, learned, static\n"),
+    ],
+)
+def test_a_predictor_of_the_wrong_table_is_pointed_to_the_right_one(
+    keys: str, message: str, tmp_path, capsys
+) -> None:
+    (tmp_path / "spec.toml").write_text(keys)
+    assert main(["plan", str(tmp_path / "spec.toml"), "--no-timed"]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_team_that_no_memory_holds_is_refused_in_a_world_of_ones_own(
+    tmp_path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    tank = Path(__file__).resolve().parents[2] / "examples" / "tank.py"
+    (tmp_path / "tank.py").write_text(tank.read_text(encoding="utf-8"))
+    (tmp_path / "spec.toml").write_text('scenario = { kind = "tank.py:Tank", pumps = 100_000 }')
+    assert main(["plan", "spec.toml", "--no-timed"]) == 2
+    assert "scenario: has 100000 agents: a worker would hold 2.8" in capsys.readouterr().err
+
+
+def test_a_file_that_cannot_be_written_is_called_by_its_own_name(
+    tmp_path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.svg").mkdir()
+    reasons = {"nowhere/a.svg": "No such file or directory", "file/a.svg": "Not a directory",
+               "folder.svg": "Is a directory"}  # fmt: skip
+    for path, reason in reasons.items():
+        assert main(["cost", "--plot", path]) == 2
+        assert capsys.readouterr().err == f"nested-agents: error: {path}: {reason}\n"
+
+
+def test_ctrl_c_in_a_plan_reaches_no_process_that_would_print_a_traceback(
+    tmp_path, monkeypatch, capsys
+) -> None:
+    monkeypatch.setattr(running, "START", "import os; assert os.getpgid(0) == os.getpid()")
+    (tmp_path / "spec.toml").write_text('scenario.kind = "matrix-game"\nsteps = 2\nepisodes = 1')
+    assert main(["plan", str(tmp_path / "spec.toml")]) == 0
+    assert "time" in capsys.readouterr().out
