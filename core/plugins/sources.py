@@ -25,6 +25,7 @@ import sys
 import traceback
 from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -301,6 +302,7 @@ def kept_name(name: str) -> str:
     return name.replace("\\", "/").replace("/", "__")
 
 
+@cache
 def meaning(text: str, name: str) -> str:
     """Return a short hash of what a file means: of its syntax tree, if it is Python.
 
