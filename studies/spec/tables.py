@@ -236,8 +236,8 @@ def explain(
         slot, _ = _reach(keys, model, data)
         kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
         kind = value.get("kind")
-        known = closest(kind, [k for k in kinds if k]) + _elsewhere(keys, kind, model, data)
-        return f"{_kind(path, value)}{known}"
+        hint = closest(kind, [k for k in kinds if k]) + _elsewhere(keys, kind, model, data)
+        return f"{_kind(path, value)}{hint}"
     # The members of a union complain one by one about the same place: say what any would take.
     text = ", or ".join(dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys))
     owner = model_at(*_reach(keys[:-1], model, data)) if keys else None
