@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from shlex import quote
 from shutil import get_terminal_size
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -74,8 +75,9 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
             "order: docs/not_learned.md; nested-agents tune tries it for you.",
             "hint    ", 8,
         )  # fmt: skip
-    print(f"rows    nested-agents results {directory} --format csv")
-    print(f"report  nested-agents report {directory}")
+    typed = quote(str(directory))
+    print(f"rows    nested-agents results {typed} --format csv")
+    print(f"report  nested-agents report {typed}")
     if study.failed:
-        say(f"{count(len(study.failed), 'trial')} failed: nested-agents status {directory}")
+        say(f"{count(len(study.failed), 'trial')} failed: nested-agents status {typed}")
     return 1 if study.failed else 0

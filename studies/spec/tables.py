@@ -236,14 +236,14 @@ def explain(
         slot, _ = _reach(keys, model, data)
         kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
         kind = value.get("kind")
-        known = closest(kind, [k for k in kinds if k]) + _elsewhere(keys, kind, model, data)
-        return f"{_kind(path, value)}{known}"
+        hint = closest(kind, [k for k in kinds if k]) + _pointer(keys, kind, model, data)
+        return f"{_kind(path, value)}{hint}"
     # The members of a union complain one by one about the same place: say what any would take.
     text = ", or ".join(dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys))
     owner = model_at(*_reach(keys[:-1], model, data)) if keys else None
     is_other_type = ("string" in text) is not isinstance(value, str)
     other = mistaken(keys[-1], owner.model_fields, first) if owner and is_other_type else ""
-    return f"{path} = {show(value)}: {text}{other or _elsewhere(keys, value, model, data)}"
+    return f"{path} = {show(value)}: {text}{other or _pointer(keys, value, model, data)}"
 
 
 def _kind(path: str, value: object) -> str:
@@ -253,7 +253,7 @@ def _kind(path: str, value: object) -> str:
     return f"{path} = {show(value)}: " + "kind is missing; " * isinstance(value, Mapping)
 
 
-def _elsewhere(keys: Keys, value: object, model: type[BaseModel], data: Mapping[str, Any]) -> str:
+def _pointer(keys: Keys, value: object, model: type[BaseModel], data: Mapping[str, Any]) -> str:
     """Return "; did you mean ...?" if a key of the same name in another table takes a word."""
     places = _places(str(keys[-1]), model, data) if keys and isinstance(value, str) else ()
     match = next((n for n, field in places if value in typing.get_args(field.annotation)), None)

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from shlex import quote
 from typing import Any, Literal
 
 import click
@@ -29,7 +30,7 @@ def status(directory: Path) -> int:
     for condition, seed, error in failed:
         print(f"\n{condition}, seed {seed} failed:\n{error.rstrip()}")
     if failed:
-        print(f"\nto run them again: nested-agents retry {directory}")
+        print(f"\nto run them again: nested-agents retry {quote(str(directory))}")
     return 1 if failed else 0
 
 

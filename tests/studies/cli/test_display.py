@@ -57,9 +57,11 @@ def test_what_learns_nothing_is_named(tmp_path, capsys):
         "seeds": 2, "episodes": 1, "steps": 2, "evaluation": 1, "scenario": {"kind": "line-up"},
         "sweep": {"preset": ["default", "frozen", "planner"]},
     }  # fmt: skip
-    study = na.run(spec, tmp_path, jobs=1, progress=False)
+    study = na.run(spec, tmp_path / "my study", jobs=1, progress=False)
     assert study.results.success("default", "evaluation").sum() == 0
     assert study.unlearned == ("default",)
     assert show_results(study, ["png"]) == 0
-    assert "hint    default: no better than frozen weights" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "hint    default: no better than frozen weights" in out
+    assert f"rows    nested-agents results '{tmp_path}/my study' --format csv" in out
     assert study.where("condition != 'frozen'").unlearned == ()
