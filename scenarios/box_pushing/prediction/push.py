@@ -119,15 +119,16 @@ def pushed(robots, box, twists, choices, seconds, model):  # type: ignore[no-unt
                 shared[j * LANES + k] = box[j]
         # How far robots may move in a substep, and what is left of their gaps until they may touch.
         for r in range(n):
-            fastest = 0.0
+            fastest, last = 0.0, -1
             for k in range(width):
                 choice = choices[first + min(k, used - 1), r]
                 for j in range(3):
                     bodies[r, j * LANES + k] = robots[r, j]
                     bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, choice, j]
-                ahead, left = twists[r, choice, 0], twists[r, choice, 1]
-                half = 0.5 * dt * twists[r, choice, 2]  # makes chords longer, see `lanes.move`
-                fastest = max(fastest, (1.0 + 0.25 * half**4) * (ahead * ahead + left * left))
+                if choice != last:
+                    last, ahead, left = choice, twists[r, choice, 0], twists[r, choice, 1]
+                    half = 0.5 * dt * twists[r, choice, 2]  # makes chords longer, see `lanes.move`
+                    fastest = max(fastest, (1.0 + 0.25 * half**4) * (ahead * ahead + left * left))
             way[r] = dt * np.sqrt(fastest)
             spare[r] = gaps[r] - 2.0 * way[r] - MARGIN - ROUNDED
         moved = 0.0
