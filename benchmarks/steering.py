@@ -3,24 +3,33 @@
 Reads the committed rows of the scaling studies, rebuilds the worlds of their evaluation episodes,
 and counts the successful ones by the *initial heading error*: the angle between the normal of the
 face that the team stands at and the direction from the box to the goal. No trial is run.
+
+With ``--scripted 64 128`` the scripted controller plays such worlds of teams of these sizes, in as
+many decisions as the trained teams had.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
+from statistics import median
+from time import process_time
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.core.numerics import FloatArray, wrap
+from nested_agents.core.numerics import FloatArray, IntArray, wrap
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.studies.claims import claims
 from nested_agents.studies.results import published
+from nested_agents.studies.results.statistics import rate
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
+
+from .scripted.controller import decisions_to_goal
 
 EDGES = (0.0, 10.0, 15.0, 20.0, 30.0, 50.0)
 """Of the bins of the initial heading error [deg]; medium starts have at most 50."""
@@ -31,8 +40,11 @@ TEAMS = (
     ("64, sixteen first", 64, "sixty-four", "evaluation", "64, sixteen first"),
     ("64, trained with 8", 64, "from-eight", "evaluation:sixty-four", "default"),
     ("64, wide box first", 64, "wide", "evaluation:sixty-four", "8, wide box"),
+    ("128, trained with 8", 128, "from-eight-128", "evaluation:128", "default"),
 )
 """A row's name, the number of robots, published results, and their phase and condition."""
+STEPS = 450
+"""Most decisions of an episode in those results."""
 
 
 @cache
@@ -49,11 +61,34 @@ def heading_errors(robots: int, seed: int, episodes: int) -> FloatArray:
     return np.degrees(errors)
 
 
-def counts(robots: int, name: str, phase: str, condition: str) -> list[str]:
-    """Return by bin how many of how many episodes succeeded."""
+def trained(robots: int, name: str, phase: str, condition: str) -> list[str]:
+    """Return by bin how many of how many episodes of published results succeeded."""
     results = published.load(claims.PUBLISHED / f"{name}.json").results
-    successes = results.success(condition, phase)
-    errors = [heading_errors(robots, seed, successes.shape[1]) for seed in results.seeds(condition)]
+    return counts(robots, results.seeds(condition), results.success(condition, phase))
+
+
+def scripted(robots: int, seeds: int, episodes: int) -> tuple[list[str], str]:
+    """Return by bin how often the scripted controller succeeds, and in words what that took."""
+    scenario, begun, taken = BoxPushingSettings(robots=robots).build(), process_time(), []
+    for seed, k in product(range(seeds), range(episodes)):
+        world = world_seed(seed, EVALUATION_WORLDS + k)
+        taken.append(decisions_to_goal(scenario, world, STEPS))
+    seconds = (process_time() - begun) / len(taken)
+    successes = np.array([[steps is not None] for steps in taken], dtype=int)
+    success, solved = rate(successes), [steps for steps in taken if steps is not None]
+    typical = ""
+    if solved:
+        typical = f", {median(solved):.0f} decisions in the median, {max(solved)} at most"
+    words = (
+        f"{robots} robots, scripted: {success.value:.2f} [{success.low:.2f}, {success.high:.2f}]"
+        f"{typical}; {seconds:.1f} s an episode"
+    )
+    return counts(robots, range(seeds), successes.reshape(seeds, episodes)), words
+
+
+def counts(robots: int, seeds: Iterable[int], successes: IntArray) -> list[str]:
+    """Return by bin how many of how many episodes succeeded, of ``(n_seeds, n_episodes)``."""
+    errors = [heading_errors(robots, seed, successes.shape[1]) for seed in seeds]
     which = np.digitize(errors, EDGES[1:-1])
     return [
         f"{successes[which == k].sum():.0f} of {(which == k).sum()}" for k in range(len(EDGES) - 1)
@@ -62,12 +97,21 @@ def counts(robots: int, name: str, phase: str, condition: str) -> list[str]:
 
 def main() -> None:
     """Print the table."""
-    argparse.ArgumentParser(prog="python -m benchmarks.steering", description=__doc__).parse_args()
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.steering", description=__doc__)
+    parser.add_argument("--scripted", type=int, nargs="+", default=(), metavar="N", help="robots")
+    parser.add_argument("--seeds", type=int, default=3, help="of its worlds")
+    parser.add_argument("--episodes", type=int, default=10, help="of each seed")
+    options = parser.parse_args()
     bins = [f"{low:.0f}-{high:.0f}" for low, high in pairwise(EDGES)]
     table = Table("robots", *bins, title="Successes by initial heading error [deg]")
-    for title, robots, name, phase, condition in TEAMS:
-        table.add_row(title, *counts(robots, name, phase, condition))
-    Console(width=80).print(table)
+    console = Console(width=80)
+    for robots in options.scripted:
+        cells, words = scripted(robots, options.seeds, options.episodes)
+        table.add_row(f"{robots}, scripted", *cells)
+        console.print(words, highlight=False, soft_wrap=True)
+    for title, *of_results in TEAMS:
+        table.add_row(title, *trained(*of_results))
+    console.print(table)
 
 
 if __name__ == "__main__":

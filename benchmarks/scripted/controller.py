@@ -218,7 +218,9 @@ class ScriptedController:
         return cost
 
 
-def decisions_to_goal(scenario: BoxPushing, seed: int, steps: int) -> int | None:
+def decisions_to_goal(
+    scenario: BoxPushing, seed: int | np.random.SeedSequence, steps: int
+) -> int | None:
     """Return after how many decisions the controller has the box at the goal.
 
     Parameters

@@ -138,7 +138,8 @@ class Drivers:
 
 def _distinct(speeds: FloatArray) -> Any:
     """Return which of ``(m, k, w)`` wheel speeds no earlier option gives, ``(m, k)``."""
-    same = (speeds[:, :, None] == speeds[:, None]).all(axis=-1)
+    by_wheel = np.ascontiguousarray(speeds.transpose(2, 0, 1))  # not to reduce along a short axis
+    same = (by_wheel[..., None] == by_wheel[:, :, None]).all(axis=0)
     return same.argmax(axis=2) == np.arange(speeds.shape[1])
 
 

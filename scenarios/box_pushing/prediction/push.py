@@ -102,18 +102,12 @@ def pushed(robots, box, twists, choices, seconds, model):  # type: ignore[no-unt
     m, n = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     dt = seconds / SUBSTEPS
-    # How far robots may move in a substep, and what is left of their gaps before they may touch.
-    way, spare = np.empty(n), np.empty(n)
+    gaps, way, spare = np.empty(n), np.empty(n), np.empty(n)
     cos, sin = np.cos(box[2]), np.sin(box[2])
     for r in range(n):
-        way[r] = 0.0
-        for k in range(twists.shape[1]):
-            half = 0.5 * dt * twists[r, k, 2]
-            longer = np.sqrt(1.0 + 0.25 * half**4)  # as chords are drawn, see `lanes.move`
-            way[r] = max(way[r], longer * dt * np.hypot(twists[r, k, 0], twists[r, k, 1]))
         dx, dy = robots[r, 0] - box[0], robots[r, 1] - box[1]
         apart = surface(model.edges, model.rounding, cos * dx + sin * dy, cos * dy - sin * dx)[0]
-        spare[r] = apart - model.radii[r] - 2.0 * way[r] - MARGIN - ROUNDED
+        gaps[r] = apart - model.radii[r]
     bodies, shared = np.zeros((n, BODY_SIZE)), np.zeros(BOX_SIZE)
     near = np.zeros(n, np.bool_)
     for first in range(0, m, LANES):
@@ -123,12 +117,20 @@ def pushed(robots, box, twists, choices, seconds, model):  # type: ignore[no-unt
         for j in range(3):
             for k in range(width):
                 shared[j * LANES + k] = box[j]
+        # How far robots may move in a substep, and what is left of their gaps until they may touch.
         for r in range(n):
+            fastest, last = 0.0, -1
             for k in range(width):
                 choice = choices[first + min(k, used - 1), r]
                 for j in range(3):
                     bodies[r, j * LANES + k] = robots[r, j]
                     bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, choice, j]
+                if choice != last:
+                    last, ahead, left = choice, twists[r, choice, 0], twists[r, choice, 1]
+                    half = 0.5 * dt * twists[r, choice, 2]  # makes chords longer, see `lanes.move`
+                    fastest = max(fastest, (1.0 + 0.25 * half**4) * (ahead * ahead + left * left))
+            way[r] = dt * np.sqrt(fastest)
+            spare[r] = gaps[r] - 2.0 * way[r] - MARGIN - ROUNDED
         moved = 0.0
         for substep in range(SUBSTEPS):
             moved = _substep(bodies, shared, near, substep, way, spare, moved, dt, model, width)

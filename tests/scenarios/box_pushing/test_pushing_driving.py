@@ -3,7 +3,7 @@
 import numpy as np
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.pushing_points import Drivers
+from nested_agents.scenarios.box_pushing.pushing_points import Drivers, _distinct
 
 BOX = np.zeros(3)
 
@@ -33,3 +33,8 @@ def test_it_keeps_clear_of_a_robot_in_its_way_and_those_far_off_do_not_count() -
     near = drivers(2).drive(0, np.array([at, [-0.52, 0.0, 0.0]]), BOX, speeds, target)
     assert far == free
     assert near != free
+
+
+def test_of_wheel_speeds_that_several_actions_give_only_the_first_is_tried() -> None:
+    speeds = np.array([[[0.0, 0.1], [0.1, 0.1], [0.0, 0.1]], [[0.1, 0.0], [0.0, 0.1], [0.1, 0.1]]])
+    np.testing.assert_array_equal(_distinct(speeds), [[True, True, False], [True] * 3])
