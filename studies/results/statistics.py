@@ -290,11 +290,18 @@ def paired_permutation(
     # Whole numbers differ exactly; others are off by rounding, some units in the last place each.
     is_whole = (one == np.rint(one)) & (other == np.rint(other))
     rounding = np.where(is_whole, 0.0, 2 * np.finfo(float).eps * (abs(one) + abs(other)))
+    reaching = _reaching(difference, rounding, _flips(n, permutations, seed))
     if 2**n <= permutations:
-        flipped = (np.arange(2**n)[:, None] >> np.arange(n) & 1) == 1
-        return float(_reaching(difference, rounding, flipped).mean())
-    flipped = np.random.default_rng(seed).integers(0, 2, size=(permutations, n)) == 0
-    return float((1 + _reaching(difference, rounding, flipped).sum()) / (1 + permutations))
+        return float(reaching.mean())
+    return float((1 + reaching.sum()) / (1 + permutations))
+
+
+@lru_cache(maxsize=2)
+def _flips(n: int, permutations: int, seed: int) -> NDArray[np.bool_]:
+    """Return patterns of flipped signs ``(m, n)``, all of them or so many; not to be modified."""
+    if 2**n <= permutations:
+        return (np.arange(2**n)[:, None] >> np.arange(n) & 1) == 1
+    return np.random.default_rng(seed).integers(0, 2, size=(permutations, n)) == 0
 
 
 def _reaching(difference: Array, rounding: Array, flipped: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -306,9 +313,9 @@ def _reaching(difference: Array, rounding: Array, flipped: NDArray[np.bool_]) ->
     """
     n = difference.size
     rounding = rounding + n * np.finfo(float).eps * abs(difference) * (rounding > 0.0)
-    return (flipped @ difference <= flipped @ rounding) | (
-        ~flipped @ difference <= ~flipped @ rounding
-    )
+    both = np.stack([difference, rounding], axis=1)  # one product of each pattern, not two
+    sums = [patterns.astype(float) @ both for patterns in (flipped, ~flipped)]
+    return np.logical_or(*(values <= allowed for values, allowed in (each.T for each in sums)))
 
 
 def holm(ps: ArrayLike) -> Array:
