@@ -69,7 +69,7 @@ def disturb(backend: str, kills: int, seed: int, seeds: int, folder: Path) -> Ta
     rng = random.Random(seed)
     spec = folder / "spec.toml"
     spec.write_text(dumps(spec_of(seeds).table()))
-    assert _begin(["run", spec, "--out", folder / "whole"], "loky").wait() == 0
+    assert _begin(["run", spec, "--out", folder / "whole"], "loky", jobs=1).wait() == 0
     expected = _digest(folder / "whole")
     tally = Tally()
     while tally.kills.total() < kills:
@@ -106,10 +106,10 @@ def disturb(backend: str, kills: int, seed: int, seeds: int, folder: Path) -> Ta
     return tally
 
 
-def _begin(command: list[object], backend: str) -> subprocess.Popen[bytes]:
+def _begin(command: list[object], backend: str, jobs: int = 2) -> subprocess.Popen[bytes]:
     line = [sys.executable, "-m", "nested_agents", *map(str, command)]
     return subprocess.Popen(
-        [*line, "--jobs", "2", "--backend", backend],
+        [*line, "--jobs", str(jobs), "--backend", backend],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
 

@@ -8,6 +8,7 @@ for independent and normal.
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
+from functools import cache
 from itertools import combinations
 from textwrap import wrap
 
@@ -191,7 +192,7 @@ def power_of_t(freedom: int, shift: float, beyond: float) -> float:
     >>> round(power_of_t(9, 0.0, 2.262), 3), round(power_of_t(9, 3.0, 2.262), 3)
     (0.05, 0.761)
     """
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = _quadrature(NODES)
     reach = WIDEST / math.sqrt(2.0 * freedom)
     low = max(0.0, 1.0 - reach)
     s = low + 0.5 * (1.0 + reach - low) * (1.0 + nodes)
@@ -200,6 +201,10 @@ def power_of_t(freedom: int, shift: float, beyond: float) -> float:
     return float(density @ outside / density.sum())
 
 
+_quadrature = cache(np.polynomial.legendre.leggauss)
+
+
+@cache
 def _simulated(effect: float, seeds: int, extreme: int) -> float:
     """Return the share of simulated studies whose observed signs are among the most extreme.
 

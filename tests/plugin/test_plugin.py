@@ -73,7 +73,7 @@ def test_a_study_of_what_a_package_offers(
     installed: Path, tmp_path: Path, spec: str, conditions: int
 ) -> None:
     (tmp_path / "spec.toml").write_text(spec)
-    run = call(installed, "run", "spec.toml", "--out", "out", cwd=tmp_path)
+    run = call(installed, "run", "spec.toml", "--out", "out", "--jobs", "1", cwd=tmp_path)
     assert (run.returncode, run.stderr.count("failed")) == (0, 0), run.stderr
     with Store.open(tmp_path / "out") as store:
         assert len(store.columns()) == conditions

@@ -66,7 +66,7 @@ def test_what_is_written_is_whole_or_not_there(command, whole, tmp_path):
     option = out if command == "export" else out / "page.html"
     out.mkdir()
     line = [command, whole, "--out", option, *(["--overwrite"] if command == "export" else [])]
-    assert finish(start("measure", *line))[0] == 0
+    assert run_here(made_up.measure, *line)[0] == 0
     expected = {name: (out / name).read_bytes() for name in targets}
     before = content(whole)
     for name in targets:
@@ -75,7 +75,7 @@ def test_what_is_written_is_whole_or_not_there(command, whole, tmp_path):
         kill_after(start("measure", *line), seconds)
         found = {n: (out / n).read_bytes() for n in targets if (out / n).exists()}
         assert all(found[name] == expected[name] for name in found)
-    assert finish(start("measure", *line))[0] == 0
+    assert run_here(made_up.measure, *line)[0] == 0
     assert {name: (out / name).read_bytes() for name in targets} == expected
     assert content(whole) == before
 
@@ -88,7 +88,7 @@ def test_a_killed_retry_is_continued_by_the_same_command(spec_file, whole, tmp_p
         with Store.open(tmp_path) as store:
             store.verify()
             assert store.counts()["done"] >= 5
-    assert finish(start("measure", "retry", tmp_path))[0] == 0
+    assert run_here(made_up.measure, "retry", tmp_path, "--jobs", 1)[0] == 0
     assert content(tmp_path) == content(whole)
 
 
