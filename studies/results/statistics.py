@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.numerics import special, stats
+from ...core.numerics import IntArray, special, stats
 
 Array = NDArray[np.float64]
 
@@ -296,16 +296,23 @@ def paired_permutation(
     return float((1 + reaching.sum()) / (1 + permutations))
 
 
+BITS = 10
+"""Signs of which all patterns are summed up once; longer patterns are put together of these."""
+
+
 @lru_cache(maxsize=2)
-def _flips(n: int, permutations: int, seed: int) -> NDArray[np.bool_]:
-    """Return patterns of flipped signs ``(m, n)``, all of them or so many; not to be modified."""
+def _flips(n: int, permutations: int, seed: int) -> IntArray:
+    """Return patterns of flipped signs, all of them or so many, as numbers ``(n / BITS, m)``."""
     if 2**n <= permutations:
-        return (np.arange(2**n)[:, None] >> np.arange(n) & 1) == 1
-    return np.random.default_rng(seed).integers(0, 2, size=(permutations, n)) == 0
+        flipped = np.arange(2**n)[:, None] >> np.arange(n) & 1
+    else:
+        flipped = 1 - np.random.default_rng(seed).integers(0, 2, size=(permutations, n))
+    parts = np.split(flipped, range(BITS, n, BITS), axis=1)
+    return np.stack([part @ 2 ** np.arange(part.shape[1]) for part in parts])
 
 
-def _reaching(difference: Array, rounding: Array, flipped: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which patterns of flipped signs ``(m, n)`` reach the sum of the differences, S >= 0.
+def _reaching(difference: Array, rounding: Array, flipped: IntArray) -> NDArray[np.bool_]:
+    """Return which patterns of flipped signs, see `_flips`, reach the sum of differences, S >= 0.
 
     With the flipped ones summing up to F, the pattern's sum is S - 2 F: its size is S or more if
     F <= 0, or if what is left, S - F, is. Either is a sum over its own differences alone, so that a
@@ -313,9 +320,15 @@ def _reaching(difference: Array, rounding: Array, flipped: NDArray[np.bool_]) ->
     """
     n = difference.size
     rounding = rounding + n * np.finfo(float).eps * abs(difference) * (rounding > 0.0)
-    both = np.stack([difference, rounding], axis=1)  # one product of each pattern, not two
-    sums = [patterns.astype(float) @ both for patterns in (flipped, ~flipped)]
-    return np.logical_or(*(values <= allowed for values, allowed in (each.T for each in sums)))
+    both = np.zeros((2, len(flipped) * BITS))
+    both[:, :n] = difference, rounding
+    patterns = np.arange(2**BITS)[:, None] >> np.arange(BITS) & 1
+    sums = both.reshape(2, -1, BITS) @ patterns.T
+    (moved, moved_rounding), (left, left_rounding) = (
+        sum(of.take(numbers, axis=1) for of, numbers in zip(sums.swapaxes(0, 1), each, strict=True))
+        for each in (flipped, 2**BITS - 1 - flipped)
+    )
+    return (moved <= moved_rounding) | (left <= left_rounding)
 
 
 def holm(ps: ArrayLike) -> Array:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from nested_agents.studies.cli.main import main
+
 ROOT = Path(__file__).resolve().parents[3]
 SPEC = """
 seeds = 2
@@ -24,8 +26,7 @@ preset = ["default", "frozen", "random"]
 
 def rows(study: Path) -> list[str]:
     """Return what `export` writes of every episode."""
-    command = [sys.executable, "-m", "nested_agents", "export", str(study)]
-    subprocess.run(command, check=True, capture_output=True)
+    assert main(["export", str(study)]) == 0
     return (study / "export" / "episodes.csv").read_text().splitlines()[1:]
 
 
@@ -47,7 +48,7 @@ def test_an_array_that_is_killed_and_put_back_ends_with_the_same_rows(tmp_path: 
     killed.send_signal(signal.SIGKILL)
     assert killed.wait() == -signal.SIGKILL
     assert [job(task).wait() for task in (0, 1)] == [0, 0]
-    whole = [sys.executable, "-m", "nested_agents", "run", "study.toml", "--out", "whole"]
-    subprocess.run(whole, cwd=tmp_path, check=True, capture_output=True)
+    whole = ["run", str(tmp_path / "study.toml"), "--out", str(tmp_path / "whole"), "--jobs", "1"]
+    assert main(whole) == 0
     parts = [row for task in (0, 1) for row in rows(tmp_path / "out" / f"part-{task}")]
     assert sorted(parts) == sorted(rows(tmp_path / "whole"))
