@@ -12,9 +12,11 @@ A class with a nested ``Settings`` stands for the model that builds it; a functi
 fields are its annotated keyword-only parameters, documented as its docstring does.
 """
 
+import os
 import re
 import sys
 from collections.abc import Callable, Mapping
+from functools import cache
 from inspect import getdoc, isfunction, signature
 from pathlib import Path
 from pkgutil import resolve_name
@@ -28,6 +30,20 @@ from .settings import Settings, closest, tuples
 
 MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
 """A parameter in a docstring: its name, and what is said of it, indented."""
+
+
+def _folders() -> tuple[tuple[str, int], ...]:
+    """Return where packages are looked for, and when something was last installed there [ns]."""
+    places = map(os.path.abspath, sys.path)  # "" is where the process is
+    return tuple((place, os.stat(place).st_mtime_ns) for place in places if os.path.exists(place))
+
+
+@cache
+def _offered(
+    entry_points: Callable[..., Any], group: str, folders: tuple[tuple[str, int], ...]
+) -> tuple[Any, ...]:
+    """Return the entry points of a group: a hundred packages are read for them, so once only."""
+    return tuple(entry_points(group=group))
 
 
 class Registry:
@@ -77,7 +93,7 @@ class Registry:
         from importlib.metadata import entry_points
 
         places: dict[str, str] = {}
-        for point in entry_points(group=self.group):
+        for point in _offered(entry_points, self.group, _folders()):
             known = self.built_in.get(point.name) or places.get(point.name)
             if known is not None and known != point.value:
                 raise ValueError(f"{point.name!r} is offered twice: {known}, {point.value}")

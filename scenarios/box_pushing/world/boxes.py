@@ -16,7 +16,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from heapq import heapify, heappop, heappush
 from itertools import combinations
 from math import cos, pi, sin, sqrt
@@ -71,11 +71,14 @@ def moments(edges: FloatArray) -> Moments:
     ends = a + b
     first = (cross[:, None] * ends).sum(axis=0) / 6
     outer = sum(np.einsum("n,ni,nj->ij", cross, p, p) for p in (a, b, ends)) / 24
-    nodes, weights = np.polynomial.legendre.leggauss(64)
+    nodes, weights = _quadrature(64)
     t = (nodes + 1) / 2
     points = a[:, None] + t[:, None] * (b - a)[:, None]
     mean_distance = np.hypot(points[..., 0], points[..., 1]) @ weights / 2
     return Moments(float(area), first, outer, float((cross * mean_distance).sum() / 3))
+
+
+_quadrature = cache(np.polynomial.legendre.leggauss)
 
 
 def polygon_edges(polygon: Polygon) -> FloatArray:
