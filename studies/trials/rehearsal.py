@@ -1,9 +1,9 @@
 """Compiles the kernels of a spec's trials before there is all that a trial needs.
 
-``python -m nested_agents.studies.trials.rehearsal SPEC MODULE`` runs a few steps of the first trial,
-in which nothing moves: in place of the module, which need not be installed, there is a `Still`. What
-a kernel is compiled for are the types of its arguments, and these are the same. Other trials take
-the kernels from the cache; what they call beside these they compile as ever.
+``python -m nested_agents.studies.trials.rehearsal SPEC MODULE`` runs a few steps of the first
+trial, in which nothing moves: the module need not be installed, a `Still` stands in for it. A
+kernel is compiled for the types of its arguments, which are the same as ever. The trials then take
+it from the cache, and compile what else they call.
 """
 
 import sys
