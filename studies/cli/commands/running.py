@@ -1,5 +1,6 @@
 """Commands that run trials: ``demo``, ``run``, ``tune``, ``plan`` and ``retry``."""
 
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -30,23 +31,24 @@ def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
 
     spec = Spec.parse(text)
     first = spec.conditions()[0].label, spec.seeds[0]
-    replays: dict[str, Path] = {}
+    replays: dict[str, Future[Path]] = {}
 
-    def draw(study: api.StudyResults, episode: str) -> Path:
+    def draw(episode: str) -> Path:
         path = out / "replay" / f"{episode}-episode.gif"
         path.parent.mkdir(exist_ok=True)
-        return study.replay(*first, episode, path).path
+        return api.load(out).replay(*first, episode, path).path
 
     def draw_first(outcome: Outcome) -> None:
         if (outcome.trial.condition, outcome.trial.seed) == first and outcome.error is None:
-            replays["last"] = draw(api.load(out), "last")
-            terminal.note(f"what the first trial has learned: {replays['last']}")
+            replays.update((name, drawing.submit(draw, name)) for name in ("last", "first"))
+            terminal.note(f"what the first trial has learned: {replays['last'].result()}")
 
     terminal = Terminal(draw_first)
-    study = api.run(spec, out, jobs=jobs, observer=terminal)
+    with ThreadPoolExecutor(1) as drawing:  # trials go on while the first episode is drawn
+        study = api.run(spec, out, jobs=jobs, observer=terminal)
     status = show_results(study)
-    for episode in ("first", "last") if not study.failed else ():
-        print(f"replay  {replays.get(episode) or draw(study, episode)}")
+    for name in ("first", "last") if not study.failed else ():
+        print(f"replay  {replays[name].result() if name in replays else draw(name)}")
     return status
 
 

@@ -1,0 +1,47 @@
+"""Compiles the kernels of a spec's trials before there is all that a trial needs.
+
+``python -m nested_agents.studies.trials.rehearsal SPEC MODULE`` runs a few steps of the first
+trial, in which nothing moves: the module need not be installed, a `Still` stands in for it. A
+kernel is compiled for the types of its arguments, which are the same as ever. The trials then take
+it from the cache, and compile what else they call.
+"""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..spec.spec import Spec
+from .trial import trials_of
+
+EPISODES = 2
+"""Episodes of training: in the second one learns from the first."""
+STEPS = 3
+
+
+class Still(float):
+    """Zero, which is also each of its attributes and what it returns when it is called."""
+
+    def __getattr__(self, name: str) -> "Still":
+        """Return the same."""
+        return self
+
+    def __call__(self, *args: Any, **named: Any) -> "Still":
+        """Return the same."""
+        return self
+
+
+def rehearse(spec: Spec) -> None:
+    """Train and evaluate the team of the first trial of a spec for a few steps."""
+    from .session import Session
+
+    trial = replace(trials_of(spec)[0], episodes=EPISODES, steps=STEPS, evaluation=1)
+    session = Session(trial)
+    session.train(EPISODES)
+    session.finish()
+
+
+if __name__ == "__main__":
+    file, module = sys.argv[1:]
+    sys.modules[module] = Still()  # type: ignore[assignment]
+    rehearse(Spec.parse(Path(file).read_text(encoding="utf-8")))
