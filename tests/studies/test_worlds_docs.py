@@ -53,6 +53,7 @@ SPEEDS = {"speed [m/s]": "evaluation", "actions sampled": "evaluation:sampled ac
                 "32 joints": "evaluation:thirty_two",
             },
         ),
+        ("swimmer-n", {"speed [m/s]": "evaluation"}),
     ],
 )
 def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:

@@ -329,6 +329,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "spread-ppo",
         "swimmer",
         "swimmer-4",
+        "swimmer-n",
         "swimmer-transfer",
         "multiwalker",
         "aloha",
