@@ -163,6 +163,13 @@ def wrap(angle: Any) -> Any:
     return shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi
 
 
+@cache
+def quadrature(n: int) -> tuple[FloatArray, FloatArray]:
+    """Return the n nodes and weights of Gauss and Legendre on [-1, 1]; not to be modified."""
+    nodes, weights = np.polynomial.legendre.leggauss(n)
+    return nodes, weights
+
+
 class Kernel:
     """A function that is compiled when it is first called.
 

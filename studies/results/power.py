@@ -15,7 +15,7 @@ from textwrap import wrap
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.numerics import special
+from ...core.numerics import quadrature, special
 from ..errors import WIDTH
 from .statistics import EXACT, LEVEL, Array, two_figures
 
@@ -192,16 +192,13 @@ def power_of_t(freedom: int, shift: float, beyond: float) -> float:
     >>> round(power_of_t(9, 0.0, 2.262), 3), round(power_of_t(9, 3.0, 2.262), 3)
     (0.05, 0.761)
     """
-    nodes, weights = _quadrature(NODES)
+    nodes, weights = quadrature(NODES)
     reach = WIDEST / math.sqrt(2.0 * freedom)
     low = max(0.0, 1.0 - reach)
     s = low + 0.5 * (1.0 + reach - low) * (1.0 + nodes)
     density = weights * np.exp((freedom - 1) * np.log(s) - 0.5 * freedom * (s**2 - 1.0))
     outside = special.ndtr(shift - beyond * s) + special.ndtr(-shift - beyond * s)
     return float(density @ outside / density.sum())
-
-
-_quadrature = cache(np.polynomial.legendre.leggauss)
 
 
 @cache

@@ -16,7 +16,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 from heapq import heapify, heappop, heappush
 from itertools import combinations
 from math import cos, pi, sin, sqrt
@@ -29,7 +29,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
-from ....core.numerics import FloatArray, nx
+from ....core.numerics import FloatArray, nx, quadrature
 from ....core.plugins.settings import closest
 from .geometry import Outline, ring_edges
 from .settings import GRAVITY, BoxSettings
@@ -71,14 +71,11 @@ def moments(edges: FloatArray) -> Moments:
     ends = a + b
     first = (cross[:, None] * ends).sum(axis=0) / 6
     outer = sum(np.einsum("n,ni,nj->ij", cross, p, p) for p in (a, b, ends)) / 24
-    nodes, weights = _quadrature(64)
+    nodes, weights = quadrature(64)
     t = (nodes + 1) / 2
     points = a[:, None] + t[:, None] * (b - a)[:, None]
     mean_distance = np.hypot(points[..., 0], points[..., 1]) @ weights / 2
     return Moments(float(area), first, outer, float((cross * mean_distance).sum() / 3))
-
-
-_quadrature = cache(np.polynomial.legendre.leggauss)
 
 
 def polygon_edges(polygon: Polygon) -> FloatArray:
