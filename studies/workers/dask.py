@@ -19,7 +19,7 @@ from distributed.comm.core import CommClosedError
 
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .runner import ONE_THREAD, Outcome, RunTrial, Workers, attempt, ignore_interrupts, versions
+from .runner import ONE_THREAD, Outcome, RunTrial, Workers, attempt, beginning_processes, versions
 
 CONNECT = 10.0
 """How long to try to reach a scheduler [s]."""
@@ -77,7 +77,7 @@ class DaskWorkers(Workers):
     def local(cls, jobs: int) -> Iterator[DaskWorkers]:
         """Start a cluster of `jobs` workers on this machine; it ends with the context."""
         with _quiet():
-            with ignore_interrupts():
+            with beginning_processes():
                 cluster = LocalCluster(
                     n_workers=jobs,
                     threads_per_worker=1,

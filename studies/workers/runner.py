@@ -15,6 +15,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from itertools import chain, islice
+from multiprocessing import resource_tracker
 from pathlib import Path
 from platform import python_version
 from queue import Empty, SimpleQueue
@@ -129,30 +130,29 @@ def installed(package: str) -> str:
 @contextmanager
 def undisturbed() -> Iterator[None]:
     """Put off Ctrl-C until what is being kept is kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python tells the main thread only, and lets no other change that
+        return
     pressed: list[int] = []
-    with _handling(lambda number, _: pressed.append(number)):
+    usual = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    try:
         yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
     if pressed:
         raise KeyboardInterrupt
 
 
 @contextmanager
-def ignore_interrupts() -> Iterator[None]:
-    """Ignore Ctrl-C, as the processes started meanwhile will do for ever: it is for the parent."""
-    with _handling(signal.SIG_IGN):
-        yield
-
-
-@contextmanager
-def _handling(handler: Any) -> Iterator[None]:
-    if threading.current_thread() is not threading.main_thread():
-        yield  # Python tells the main thread only, and lets no other change that
-        return
-    usual = signal.signal(signal.SIGINT, handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, usual)
+def beginning_processes() -> Iterator[None]:
+    """Put off Ctrl-C; the processes begun meanwhile never hear of it: it is for the parent."""
+    resource_tracker.ensure_running()  # would unblock the signal when the first process begins
+    with undisturbed():
+        usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, usual)
 
 
 Backend = Literal["loky", "dask"]
@@ -288,9 +288,9 @@ class Workers(ABC):
         try:
             while left:
                 for trial in islice(waiting, max(self.processes - len(running), 0)):
-                    with ignore_interrupts():
+                    with beginning_processes():
                         future = self.submit(run_trial, trial)
-                    running[future] = trial
+                        running[future] = trial
                     started(trial.identity)
                     future.add_done_callback(finished.put)
                 try:

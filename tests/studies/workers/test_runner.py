@@ -1,6 +1,7 @@
 """Trials run on workers, whatever happens to them; a trial fails with its traceback."""
 
 import os
+import signal
 import subprocess
 import sys
 import textwrap
@@ -60,6 +61,23 @@ def test_results_are_kept_one_by_one_and_the_rest_runs_later(tmp_path, uninterru
     outcomes, rows, _ = run(tmp_path, made_up.measure)
     assert [o.trial for o in outcomes if o.trial not in left] == []
     assert rows == uninterrupted
+
+
+def test_an_interrupt_while_a_trial_is_handed_to_a_worker_is_for_the_parent(tmp_path, monkeypatch):
+    submit, futures = LokyWorkers.submit, []
+
+    def interrupted(self, *arguments):
+        os.kill(os.getpid(), signal.SIGINT)
+        futures.append(submit(self, *arguments))
+        for process in list(self._executor._processes):
+            os.kill(process, signal.SIGINT)
+        return futures[-1]
+
+    monkeypatch.setattr(LokyWorkers, "submit", interrupted)
+    with made_up.opened(tmp_path) as store, pytest.raises(KeyboardInterrupt):
+        list(run_trials(pending(store, made_up.TRIALS), store, made_up.endless, LokyWorkers(2)))
+    (future,) = futures
+    assert "SIGINT" not in str(future.exception())  # stopped, not interrupted
 
 
 def test_a_failed_trial_is_kept_with_its_traceback_and_the_others_go_on(tmp_path):
