@@ -241,6 +241,8 @@ PRIVATE_WORDS = {
 def definitions(folder: str) -> Iterator[tuple[str, str, bool]]:
     """Yield place and name of what is defined or assigned below a folder, and whether a class."""
     for path in sorted((ROOT / folder).rglob("*.py")):
+        if path.is_relative_to(ROOT / "docs/_build") or path.is_relative_to(ROOT / "docs/gallery"):
+            continue  # made by ./dev docs
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ClassDef | ast.FunctionDef):
                 name, is_class = node.name, isinstance(node, ast.ClassDef)
