@@ -238,10 +238,7 @@ class Settings(BaseModel, metaclass=_Made):
     'wheels'? known: wheels
     """
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True,
-        use_attribute_docstrings=True,
-    )  # fmt: skip
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     @classmethod
     def made(cls, **table: Any) -> Any:

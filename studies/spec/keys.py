@@ -5,11 +5,15 @@ spec is validated, meanings and units from the docstrings of their fields. What 
 walked as well, so a new scenario or learner has its keys here from the first day.
 """
 
+import ast
 import inspect
 import json
 import math
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
+from itertools import pairwise
+from textwrap import dedent
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
@@ -160,7 +164,7 @@ def _table(
 ) -> Table:
     laid = _laid_by_preset(name, kinds[0])
     keys = tuple(
-        _key(field, info, laid.get(field))
+        _key(field, info, _meaning(model, field), laid.get(field))
         for field, info in model.model_fields.items()
         if field != "kind" and not (field in base and base[field].default == info.default)
     )
@@ -196,9 +200,34 @@ def nearest(prefix: str) -> str:
     return near(prefix, names) or f"known: {', '.join(tops)}"
 
 
-def _key(name: str, info: FieldInfo, laid: Any) -> Key:
+def _meaning(model: type[Settings], field: str) -> str:
+    """Return the docstring of a field, in one line."""
+    declaring = (cls for cls in model.__mro__ if field in inspect.get_annotations(cls))
+    written = _docstrings(next(declaring, model)).get(field)
+    return " ".join((model.model_fields[field].description or written or "").split())
+
+
+@cache
+def _docstrings(cls: type) -> Mapping[str, str]:
+    """Return the text beside the fields that a class declares; none if it was written nowhere.
+
+    pydantic would read them whenever the class is imported, which takes a fifth of that time.
+    """
+    try:
+        source = inspect.getsource(cls)
+    except (OSError, TypeError):
+        return {}
+    body = ast.parse(dedent(source)).body[0].body  # type: ignore[attr-defined]
+    return {
+        field.target.id: str(text.value.value)
+        for field, text in pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+    }
+
+
+def _key(name: str, info: FieldInfo, meaning: str, laid: Any) -> Key:
     """Return a key; `laid` is what the preset has in place of its default, if anything."""
-    meaning = " ".join((info.description or "").split())
     plugged, default, unit = registry_of(info), _shown(info), UNIT.search(meaning)
     if plugged is not None:
         type_, allowed = "table", f"kind: {', '.join(plugged.built_in)}"
