@@ -86,7 +86,9 @@ def postures_of(angles, length):  # type: ignore[no-untyped-def]
     """Return the joints and tips ``(m, n + 1, 2)`` of postures ``(m, n)``."""
     places = np.empty((len(angles), angles.shape[1] + 1, 2))
     for k in range(len(angles)):
-        places[k] = ends_of(angles[k], length)
+        ends = ends_of(angles[k], length)
+        for i in range(len(ends)):
+            places[k, i, 0], places[k, i, 1] = ends[i, 0], ends[i, 1]
     return places
 
 

@@ -222,8 +222,11 @@ def many_strengths(j: int, values: FloatArray, lay: Layout, out: FloatArray) -> 
             fresh, times = k == 0 or not even, lay.series[j, k] if even else 1.0
             _rise(x, fresh, lay.slopes[j, k], lay.bounds[j, k], times, power, rising)
             _fall(level, rising, strengths[k % m])
-        strengths[last % m] += level
-        out[:m, first : first + n] = strengths[:, :n]
+        for i in range(n):
+            strengths[last % m, i] += level[i]
+        for s in range(m):
+            for i in range(n):
+                out[s, first + i] = strengths[s, i]
 
 
 _FAST = {"reassoc", "contract"}
@@ -258,7 +261,8 @@ def _own_strengths(t: int, own, lay: Layout, heads, levels, level) -> int:  # ty
                 levels[n_levels, 0] = 1.0
             else:
                 strengths_of(j, own[b, j], lay, strengths[j], room)
-                levels[n_levels, : lay.counts[j]] = strengths[j, : lay.counts[j]]
+                for s in range(lay.counts[j]):
+                    levels[n_levels, s] = strengths[j, s]
             n_levels += 1
     return n_levels
 
@@ -293,7 +297,9 @@ def contract(theta, own, peaks, lay: Layout, partial) -> None:  # type: ignore[n
             _add_five(slab, heads, levels, level, peak[:parts], out)
         else:
             _blend_and_add(slab, heads, levels, level, n_levels, peak[:parts], out)
-        partial[:, start : start + columns] = out[:count]
+        for b in range(count):
+            for k in range(columns):
+                partial[b, start + k] = out[b, k]
         start += columns
 
 

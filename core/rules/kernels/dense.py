@@ -111,7 +111,9 @@ def values_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> Float
             every[s], first[s] = s, 0
             while first[s] < s and (own[first[s]] != own[s]).any():
                 first[s] += 1
-        out[begin : begin + CHUNK] = folded(theta, (own, first, shared, none, 1), every, lay)
+        values = folded(theta, (own, first, shared, none, 1), every, lay)
+        for s in range(len(chunk)):
+            out[begin + s] = values[s]
     return out
 
 
