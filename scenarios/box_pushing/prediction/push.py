@@ -220,7 +220,10 @@ def believing(belief, constants):  # type: ignore[no-untyped-def]
     compliance = np.empty_like(belief.ahead)
     for r in range(len(compliance)):
         resists = belief.ahead[r] / factors[0] + belief.sideways[r] / factors[1]
-        compliance[r] = np.linalg.inv(resists)
+        inverse = np.linalg.inv(resists)
+        for i in range(3):
+            for j in range(3):
+                compliance[r, i, j] = inverse[i, j]
     return PushModel(
         model.edges, model.rounding, model.reach, model.radii, compliance,
         model.friction_force, model.friction_radius, model.contact_friction * factors[2],
