@@ -243,17 +243,18 @@ class LearnedPredictor:
         """Return the shared variables ``(G, m, s)`` that drivers ``(m, b, k)`` lead to."""
         bodies, m = self.bodies, self.memory
         columns = bodies.columns[0]
-        present, ranges = states[bodies.agents, bodies.columns], m["seen"][:, columns]
+        present = states[bodies.agents, bodies.columns]
+        ranges = np.ascontiguousarray(m["seen"][:, columns])
         # Before anything is learned the present is all that has been seen.
         ranges[0] = np.minimum(ranges[0], present.min(axis=0))
         ranges[1] = np.maximum(ranges[1], present.max(axis=0))
         passes = PASSES if self.settings.midpoint else 1
         moved = driven_states(
-            present, drivers, m["weights"], m["keep"],
+            present, np.ascontiguousarray(drivers), m["weights"], m["keep"],
             ranges, self.periods[columns], self.horizon, passes, bodies.rules.layout,
         )  # fmt: skip
         body, place = bodies.places
-        return np.moveaxis(moved[:, body, place], 0, 1)
+        return np.ascontiguousarray(np.moveaxis(moved[:, body, place], 0, 1))
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return sums over all experience, and the weights that follow from them."""

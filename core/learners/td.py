@@ -194,9 +194,9 @@ class TDLambda(Online):
         lengths: FloatArray = np.ones(len(states))
         if self.settings.normalised:
             lengths = self.rules.squared_lengths(states)
+        states, to = map(np.ascontiguousarray, (states, states if entered is None else entered))
         td_update(
-            self.weights, self.rows, self.trace, self.reach, states,
-            states if entered is None else entered, rewards,
+            self.weights, self.rows, self.trace, self.reach, states, to, rewards,
             0.0 if entered is None else self.discount, self.settings.step_size, lengths,
             self.discount * self.settings.trace_decay, self.rules.layout,
         )  # fmt: skip

@@ -228,6 +228,7 @@ class BoxPrediction:
         choices = self._choices(joint_action[None])[0]
         twists = self.wheel_commands.twists[np.arange(len(choices)), choices]
         now, premises = self.situation, self.premises
+        constants = np.ascontiguousarray(constants)
         return outcomes(now.robots, now.box, twists, premises.hold, premises.belief, constants)
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:

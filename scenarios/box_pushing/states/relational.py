@@ -120,7 +120,7 @@ class View:
         friction radius per metre, as in `prediction.push`. The last one is at most the angle at
         which they push the centre of the box, see `contact_push`.
         """
-        inward = _inward(self._contact, self.box, self.outline.edges, self.outline.rounding)
+        inward = self._into_box(self._contact)
         x, y = np.cos(inward), np.sin(inward)
         push = self.box[:, :2] - self._contact
         depth, lever = push[:, 0] * x + push[:, 1] * y, push[:, 1] * x - push[:, 0] * y
@@ -143,7 +143,11 @@ class View:
 
     def inward(self, robot: int) -> FloatArray:
         """Direction ``(m,)`` into the box at the point of its surface next to a robot [rad]."""
-        return _inward(self.robots[:, robot], self.box, self.outline.edges, self.outline.rounding)
+        return self._into_box(self.robots[:, robot])
+
+    def _into_box(self, points: FloatArray) -> FloatArray:
+        points, boxes = np.ascontiguousarray(points), np.ascontiguousarray(self.box)
+        return _inward(points, boxes, self.outline.edges, self.outline.rounding)
 
 
 def _direction(ways: FloatArray) -> FloatArray:
