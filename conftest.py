@@ -1,5 +1,6 @@
 """What pytest leaves out: examples in modules that need an extra which is not installed."""
 
+import gc
 from importlib.util import find_spec
 
 NEEDED = {
@@ -7,3 +8,8 @@ NEEDED = {
     "mujoco": "nested_agents/scenarios/swimmers.py",
 }
 collect_ignore_glob = [pattern for extra, pattern in NEEDED.items() if not find_spec(extra)]
+
+
+def pytest_collection_finish() -> None:
+    """Keep what has been imported and collected out of every later garbage collection."""
+    gc.freeze()
