@@ -1,12 +1,10 @@
-"""The house rules: import direction, symlinks, what may be committed, what a wheel holds."""
+"""The house rules: import direction, symlinks, what may be committed."""
 
 import ast
 import os
 import re
 import shutil
 import subprocess
-import sys
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -351,31 +349,3 @@ def test_dev_refuses_an_unknown_command() -> None:
     run = subprocess.run([ROOT / "dev", "tset"], capture_output=True, text=True, check=False)
     assert run.returncode == 2
     assert run.stderr.splitlines()[-1] == "dev: unknown command 'tset'"
-
-
-@pytest.mark.slow
-def test_the_wheel_holds_the_four_packages(tmp_path: Path, tracked: list[Path]) -> None:
-    checkout = tmp_path / "checkout"
-    for path in tracked:  # a copy, so that the build leaves nothing in the checkout
-        copy = checkout / path.relative_to(ROOT)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_bytes(path.read_bytes())
-    (checkout / "nested_agents").mkdir(exist_ok=True)
-    for package in ALLOWED:
-        (checkout / "nested_agents" / package).symlink_to(f"../{package}")
-    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index"]
-    command += ["--no-build-isolation", "--wheel-dir", str(tmp_path), str(checkout)]
-    subprocess.run(command, check=True, stdin=subprocess.DEVNULL, timeout=120)
-    (wheel,) = tmp_path.glob("nested_agents-*.whl")
-    names = set(zipfile.ZipFile(wheel).namelist())
-    sources = {
-        f"nested_agents/{path.relative_to(ROOT).as_posix()}"
-        for path in tracked
-        if path.suffix == ".py" and path.relative_to(ROOT).parts[0] in ALLOWED
-    }
-    assert sources
-    assert sources <= names
-    assert {"nested_agents/__main__.py", "nested_agents/py.typed"} <= names
-    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"nested_agents"}
-    assert [name for name in names if "/published/" in name] == []
-    assert "nested_agents/studies/claims/quick/shapes.toml" in names

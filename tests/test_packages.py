@@ -1,12 +1,14 @@
 """Wheel and sdist, each installed by itself, run a study outside of the checkout, with equal rows.
 
 Dependencies are those of the environment that runs the tests, so that nothing is fetched or
-compiled; ``python -m benchmarks.packages`` installs these, too.
+compiled; ``python -m benchmarks.packages`` installs these, too. Kernels are interpreted: rows are
+equal by what the packages hold, and every fresh installation would compile the same ones.
 """
 
 import os
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -51,14 +53,25 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
-def test_wheel_and_sdist_run_where_there_is_no_checkout(checkout: Path, tmp_path: Path) -> None:
-    rows = []
+@pytest.fixture(scope="module")
+def packages(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Wheel and sdist, each alone in a folder."""
+    built = {}
     for kind in ("wheel", "sdist"):
+        place = tmp_path_factory.mktemp(kind)
+        call(sys.executable, "-c", BUILD, f"build_{kind}", place, cwd=checkout)
+        (built[kind],) = place.iterdir()
+    return built
+
+
+@pytest.mark.slow
+def test_wheel_and_sdist_run_where_there_is_no_checkout(
+    packages: dict[str, Path], tmp_path: Path
+) -> None:
+    rows = []
+    for kind, package in packages.items():
         place = tmp_path / kind
         place.mkdir()
-        call(sys.executable, "-c", BUILD, f"build_{kind}", place, cwd=checkout)
-        (package,) = place.iterdir()
         call(
             sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
             "--no-build-isolation", "--target", place / "env", package, cwd=place,
@@ -66,10 +79,26 @@ def test_wheel_and_sdist_run_where_there_is_no_checkout(checkout: Path, tmp_path
         (place / "spec.toml").write_text(SPEC)
         program = [sys.executable, "-P", "-m", "nested_agents"]
         where = "import nested_agents; print(nested_agents.__file__)"
-        alone = {"PYTHONPATH": str(place / "env")}
+        alone = {"PYTHONPATH": str(place / "env"), "NUMBA_DISABLE_JIT": "1"}
         said = call(sys.executable, "-P", "-c", where, cwd=place, **alone)
         assert Path(said.strip()).is_relative_to(place / "env")
         call(*program, "run", "spec.toml", "--out", "out", "--jobs", "1", cwd=place, **alone)
         rows.append(call(*program, "results", "out", "--format", "csv", cwd=place, **alone))
     assert rows[0] == rows[1]
     assert rows[0].count("\n") > 1
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_the_four_packages(packages: dict[str, Path], checkout: Path) -> None:
+    names = set(zipfile.ZipFile(packages["wheel"]).namelist())
+    sources = {
+        f"nested_agents/{path.relative_to(checkout).as_posix()}"
+        for package in ("core", "topologies", "scenarios", "studies")
+        for path in (checkout / package).rglob("*.py")
+    }
+    assert sources
+    assert sources <= names
+    assert {"nested_agents/__main__.py", "nested_agents/py.typed"} <= names
+    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"nested_agents"}
+    assert [name for name in names if "/published/" in name] == []
+    assert "nested_agents/studies/claims/quick/shapes.toml" in names

@@ -373,10 +373,9 @@ class StudyResults:
             raise SpecError(f"--out {where}: is a directory")
         if where.suffix not in (".html", ".htm"):
             raise SpecError(f"--out {where}: suffix must be .html or .htm")
-        content = page(self.directory).encode()
         if not where.parent.is_dir():
             raise SpecError(f"--out {where}: there is no directory {where.parent}")
-        durable.write(where, content)
+        durable.write(where, page(self.directory).encode())
         return where
 
     @property

@@ -66,9 +66,8 @@ class Results:
 
     def numbers(self, condition: str) -> dict[str, Array]:
         """Return the numbers of whole trials that a condition has, ``(n_seeds,)`` by name."""
-        own = self._finished[condition].dropna(axis="columns")
-        others = {*TRIAL_COLUMNS, *self.columns.get(condition, ())}
-        return {name: own[name].to_numpy() for name in own if name not in others}
+        own, others = self._finished[condition], {*TRIAL_COLUMNS, *self.columns.get(condition, ())}
+        return {name: values for name, values in own.items() if name not in others}
 
     def has(self, condition: str, phase: str = "", measure: str = "") -> bool:
         """Tell whether a condition has finished trials, episodes of a phase, a measure of them."""
@@ -143,9 +142,14 @@ class Results:
         return dict(self.episodes.groupby(["phase", "condition"], sort=False).indices)
 
     @cached_property
-    def _finished(self) -> dict[str, pd.DataFrame]:
+    def _finished(self) -> dict[str, dict[str, Array]]:
+        """Columns of finished trials by condition, but for those that lack a value."""
         done = self.trials[self.trials["state"] == DONE]
-        return dict(iter(done.groupby("condition", sort=False)))
+        columns = {name: (own.to_numpy(), own.notna().to_numpy()) for name, own in done.items()}
+        return {
+            condition: {n: own[rows] for n, (own, known) in columns.items() if known[rows].all()}
+            for condition, rows in done.groupby("condition", sort=False).indices.items()
+        }
 
     @cached_property
     def _measured(self) -> dict[str, Array]:

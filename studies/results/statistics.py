@@ -253,8 +253,10 @@ def friedman(values: ArrayLike, permutations: int = 9999, seed: int = 0) -> Frie
         return Friedman(0.0, 1.0, 0.0)
     statistic = float((ranks.sum(axis=0) ** 2).sum() / spread)
     rng = np.random.default_rng(seed)
-    shuffled = (rng.permuted(ranks, axis=1).sum(axis=0) for _ in range(permutations))
-    reached = sum(float((sums**2).sum() / spread) >= statistic - 1e-9 for sums in shuffled)
+    sizes = np.diff([*range(0, permutations, 100), permutations])  # few at once fit into the cache
+    shuffled = (rng.permuted(np.broadcast_to(ranks, (m, n, k)), axis=2) for m in sizes)
+    squares = ((many.sum(axis=1) ** 2).sum(axis=1) / spread for many in shuffled)
+    reached = sum(int((some >= statistic - 1e-9).sum()) for some in squares)
     return Friedman(statistic, (1 + reached) / (1 + permutations), statistic / (n * (k - 1)))
 
 

@@ -59,26 +59,27 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def call(installed: Path, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    path = os.pathsep.join([str(installed), os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
-    return subprocess.run(
-        [sys.executable, "-m", "nested_agents", *arguments],
-        cwd=cwd, env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.DEVNULL,
-        capture_output=True, text=True, check=False, timeout=280,
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize(("spec", "conditions"), [(BOXES, 2), (MEETING, 2)])
 def test_a_study_of_what_a_package_offers(
-    installed: Path, tmp_path: Path, spec: str, conditions: int
+    installed: Path,
+    tmp_path: Path,
+    spec: str,
+    conditions: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (tmp_path / "spec.toml").write_text(spec)
-    run = call(installed, "run", "spec.toml", "--out", "out", "--jobs", "1", cwd=tmp_path)
+    path = os.pathsep.join([str(installed), os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
+    run = subprocess.run(  # workers of this process look for packages where it began
+        [sys.executable, "-m", "nested_agents", "run", "spec.toml", "--out", "out", "--jobs", "1"],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True, check=False, timeout=280,
+    )  # fmt: skip
     assert (run.returncode, run.stderr.count("failed")) == (0, 0), run.stderr
     with Store.open(tmp_path / "out") as store:
         assert len(store.columns()) == conditions
         assert store.counts() == {"done": 2 * conditions, "failed": 0}
-    assert call(installed, "report", "out", cwd=tmp_path).returncode == 0
+    monkeypatch.syspath_prepend(installed)
+    assert main(["report", str(tmp_path / "out")]) == 0
 
 
 def test_settings_of_a_package_are_checked_like_built_in_ones(

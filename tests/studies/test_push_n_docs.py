@@ -9,6 +9,7 @@ import pytest
 from nested_agents.studies.benchmark import push_n
 from nested_agents.studies.cli.main import main
 
+pytestmark = pytest.mark.usefixtures("entries_read_once")
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "push_n.md").read_text(encoding="utf-8")
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents.studies.claims import claims
+from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
 
@@ -19,9 +20,16 @@ def test_every_published_table_has_its_row() -> None:
     assert sorted(name for name, *_ in ROWS) == committed
 
 
-@pytest.mark.parametrize(("name", "spec", "trials", "minutes"), ROWS)
-def test_the_spec_gives_the_table(name: str, spec: str, trials: str, minutes: str) -> None:
-    rows = published.load(claims.PUBLISHED / f"{name}.json")
+@pytest.fixture(scope="module", params=ROWS, ids=lambda row: row[0])
+def row(request: pytest.FixtureRequest) -> tuple[Path, published.Published, str, str, str]:
+    """A published file, what it holds, and what the page says of it."""
+    name, *said = request.param
+    path = claims.PUBLISHED / f"{name}.json"
+    return path, published.load(path), *said
+
+
+def test_the_spec_gives_the_table(row: tuple[Path, published.Published, str, str, str]) -> None:
+    _, rows, spec, trials, minutes = row
     source = Spec.load(ROOT / "studies" / "catalogue" / spec)
     assert source.study == rows.outline.study
     table = source.table()
@@ -34,3 +42,16 @@ def test_the_spec_gives_the_table(name: str, spec: str, trials: str, minutes: st
     total = rows.results.trials.get("seconds.total")
     if total is not None and total.notna().any():
         assert float(minutes.replace(",", "")) == pytest.approx(total.sum() / 60, abs=0.51)
+
+
+def test_every_committed_file_is_of_this_version_and_has_a_table(
+    row: tuple[Path, published.Published, str, str, str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path, rows, *_ = row
+    monkeypatch.setattr(published, "load", {path: rows}.__getitem__)  # it is read once
+    assert main(["table", str(path), "--format", "markdown"]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("\n") > 2
+    assert err == ""

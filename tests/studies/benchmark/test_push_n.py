@@ -18,6 +18,7 @@ from nested_agents.studies.cli.commands import committed
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 
+pytestmark = pytest.mark.usefixtures("entries_read_once")
 ROOT = Path(__file__).resolve().parents[3]
 TEAM = {"robots": 2, "success": ["1" * 10] * 5, "steps": [[9] * 10] * 5, "decisions": [90] * 5}
 ENTRY = {"name": "mine", "about": "by hand", "given": "nothing", "teams": [TEAM]}

@@ -26,13 +26,14 @@ def keep(
     *,
     done: int = 6,
     failed: int = 0,
+    steps: int = STEPS,
 ) -> Path:
     """Keep a study of which some trials are done, and some of the next ones failed."""
     with made_up.opened(directory, spec) as store:
         for i, trial in enumerate(trials_of(spec)):
             if i < done:
                 result = made_up.measure(trial)
-                kept = dict.fromkeys(trial.recorded.values(), recording(STEPS + i))
+                kept = dict.fromkeys(trial.recorded.values(), recording(steps + i))
                 result = replace(result, recordings=kept)
                 save(store, trial, result, 1.0)
             elif i < done + failed:

@@ -18,12 +18,16 @@ def finished(kept, tmp_path_factory):
     return kept(tmp_path_factory.mktemp("study") / "here")
 
 
+@pytest.fixture(scope="module")
+def html(finished):
+    return page(finished)
+
+
 def sections(html):
     return re.findall(r'<section id="(\w+)"', html)
 
 
-def test_a_finished_study_has_everything(finished):
-    html = page(finished)
+def test_a_finished_study_has_everything(html):
     assert sections(html) == [
         "summary", "table", "figures", "replay", "spec", "versions",
     ]  # fmt: skip
@@ -48,15 +52,14 @@ def test_a_summary_of_many_lines_counts_what_is_not_significant():
     )
 
 
-def test_equal_results_give_equal_bytes_wherever_they_are(finished, tmp_path):
+def test_equal_results_give_equal_bytes_wherever_they_are(finished, html, tmp_path):
     copy = shutil.copytree(finished, tmp_path / "elsewhere")
-    html = page(finished)
     assert page(copy) == html
     assert str(finished.parent) not in html
 
 
-def test_it_asks_for_nothing_outside(finished):
-    html = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page(finished))
+def test_it_asks_for_nothing_outside(html):
+    html = re.sub(r'xmlns(:\w+)?="[^"]*"', "", html)
     assert re.findall(r"(?:https?:)?//[a-z][\w.]+\.[a-z]+", html) == []
     assert not re.search(r"<(link|iframe|object)\b|\bsrc=\"(?!data:)|@import", html)
 

@@ -45,7 +45,7 @@ def test_damaged_and_foreign_recordings_are_named(kept, tmp_path, monkeypatch):
 
 
 def test_what_the_canvas_cannot_play_is_drawn_by_its_scenario(kept, tmp_path, monkeypatch):
-    directory = kept(tmp_path)
+    directory = kept(tmp_path, steps=4)
     monkeypatch.setattr(rendering, "NEEDED", ("hat",))
     found = read(directory)
     assert [(film.condition, film.seed) for film in found.films] == [("default", 0), ("frozen", 0)]
