@@ -120,8 +120,9 @@ def _command(line: list[str]) -> None:
     os._exit(command_line(line))
 
 
-def _status(process: BaseProcess) -> int | None:
+def _status(process: BaseProcess) -> int:
     process.join()
+    assert process.exitcode is not None
     return process.exitcode
 
 
