@@ -39,8 +39,10 @@ import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
+from nested_agents.core.interface.scenario import Measure
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.api.study import load
@@ -66,11 +68,23 @@ SPEC = Spec.of(
 EXPLAIN = "explain"
 TEAM = "na.load(...).team()"
 """No command: what a user reads in Python."""
+LINES = (
+    "results --format csv", "status", "table --format csv", "compare", "compare --statistics",
+    "watch --once", "report", "export", TEAM,
+)  # fmt: skip
+"""The commands that read."""
 SLOW, BLOCKED = 10.0, 60.0
 """Seconds, of the processor and by the clock, after which an input counts as one that stalls."""
 
 Answer = tuple[int, str, str]
 """Exit status, output and errors of a command."""
+
+
+@cache
+def _run_once() -> tuple[tuple[Measure, ...], tuple[Trial, ...], dict[str, TrialResult]]:
+    """Return what the study measures, its trials, and by identity what they measured."""
+    measures, trials = check(SPEC), trials_of(SPEC)
+    return measures, trials, {trial.identity: run_trial(trial) for trial in trials}
 
 
 class Adversary:
@@ -82,24 +96,18 @@ class Adversary:
         Where to work.
     rng
         Draws the damage.
+    lines
+        The commands whose answers of the sound study are needed.
     """
 
-    def __init__(self, folder: Path, rng: random.Random) -> None:
+    def __init__(self, folder: Path, rng: random.Random, lines: Sequence[str] = LINES) -> None:
         self.sound, self.study, self.rng = folder / "sound", folder / "study", rng
-        self.measures, self.trials = check(SPEC), trials_of(SPEC)
-        self.results = {trial.identity: run_trial(trial) for trial in self.trials}
+        self.measures, self.trials, self.results = _run_once()
         self.finish(self.sound)
         self.expected = self.content(self.sound)
         shutil.copytree(self.sound, self.study)
-        self.answers = {line: self.command(line) for line in (*self.lines(), EXPLAIN)}
+        self.answers = {line: self.command(line) for line in lines}
         self.files = [p for p in sorted(self.sound.rglob("*")) if p.is_file() and p.stat().st_size]
-
-    def lines(self) -> list[str]:
-        """Return the commands that read."""
-        return [
-            "results --format csv", "status", "table --format csv", "compare",
-            "compare --statistics", "watch --once", "report", "export", TEAM,
-        ]  # fmt: skip
 
     def command(self, line: str) -> Answer:
         """Run a command on the study in this process."""
@@ -311,11 +319,11 @@ def _kept(directory: Path) -> set[str]:
 def flips(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Flip bits one by one, read the study, and mend it every fourth time; return what happened."""
     learning_curve.draw = lambda analysis: {}  # of rows that have been verified; takes most time
-    adversary, tally = Adversary(folder, rng), Counter[str]()
+    adversary, tally = Adversary(folder, rng, (*LINES, EXPLAIN)), Counter[str]()
     for attempt in range(number):
         tally["flips"] += 1
         path = adversary.damage()
-        lines = [*adversary.lines(), *([EXPLAIN] if attempt % 10 == 0 else [])]
+        lines = [*LINES, *([EXPLAIN] if attempt % 10 == 0 else [])]
         for line in lines:
             tally["reads"] += 1
             tally[_read(adversary, line, path)] += 1
@@ -336,7 +344,7 @@ def every_byte(rng: random.Random, folder: Path) -> Counter[str]:
         data = bytearray(sound)
         data[at] ^= 1 << rng.randrange(8)
         path.write_bytes(data)
-        for line in adversary.lines()[:2]:
+        for line in LINES[:2]:
             tally["reads"] += 1
             tally[_read(adversary, line, path)] += 1
     return tally
@@ -375,7 +383,7 @@ def obstacles(rng: random.Random, folder: Path) -> Counter[str]:
 
     def attack(path: Path, how: Callable[[], object]) -> None:
         how()
-        for line in adversary.lines():
+        for line in LINES:
             tally["reads"] += 1
             tally[_read(adversary, line, path)] += 1
         adversary.restore()

@@ -4,29 +4,34 @@ A real, small study runs once undisturbed. Then it runs again and again in new d
 its process or one of its workers is killed (SIGKILL) at random moments, and the same command
 continues it, until enough have been killed. What each of them ends with must be equal to the
 undisturbed one byte by byte, and nothing that was once kept may be missing after a kill.
+
+The command runs in a copy of this process, which has imported what it needs; its workers are
+processes that start from nothing, as ever.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import hashlib
 import json
+import multiprocessing
 import os
 import random
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from dataclasses import dataclass, field
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import MARK, Store
+from nested_agents.studies.trials.session import check
 
 
 def spec_of(seeds: int) -> Spec:
@@ -64,25 +69,19 @@ class Tally:
     """Studies that did not end with the bytes of the undisturbed one."""
 
 
-def disturb(backend: str, kills: int, seed: int, seeds: int, folder: Path) -> Tally:
-    """Kill `kills` processes of studies of `seeds` in `folder`, and return what happened."""
-    rng = random.Random(seed)
-    spec = folder / "spec.toml"
-    spec.write_text(dumps(spec_of(seeds).table()))
-    assert _begin(["run", spec, "--out", folder / "whole"], "loky", jobs=1).wait() == 0
-    expected = _digest(folder / "whole")
-    tally = Tally()
+def disturb(backend: str, kills: int, seed: int, spec: Path, expected: str) -> Tally:
+    """Kill `kills` processes of studies beside a spec that must end with a digest of `expected`."""
+    rng, tally = random.Random(seed), Tally()
     while tally.kills.total() < kills:
-        directory = folder / str(tally.studies)
+        directory = spec.parent / f"{backend}-{tally.studies}"
         tally.studies += 1
         command, status = ["run", spec, "--out", directory], -1
         while status != 0:
             tally.runs += 1
             process = _begin(command, backend)
-            while process.poll() is None and tally.kills.total() < kills:
+            while process.is_alive() and tally.kills.total() < kills:
                 _await(process, directory, another=rng.random() < 0.8)
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    process.wait(rng.uniform(0.0, LONGEST))
+                process.join(rng.uniform(0.0, LONGEST))
                 before = _kept(directory)
                 victim = rng.choice(["process", "worker"])
                 if _kill(process, victim, backend, rng):
@@ -90,7 +89,7 @@ def disturb(backend: str, kills: int, seed: int, seeds: int, folder: Path) -> Ta
                     after = _kept(directory)
                     tally.kept += len(before)
                     tally.lost += len(before - after)
-            status = process.wait()
+            status = _status(process)
             if status == 2:
                 raise RuntimeError(f"{directory}: {' '.join(map(str, command))} was refused")
             if status == 1:
@@ -106,15 +105,28 @@ def disturb(backend: str, kills: int, seed: int, seeds: int, folder: Path) -> Ta
     return tally
 
 
-def _begin(command: list[object], backend: str, jobs: int = 2) -> subprocess.Popen[bytes]:
-    line = [sys.executable, "-m", "nested_agents", *map(str, command)]
-    return subprocess.Popen(
-        [*line, "--jobs", str(jobs), "--backend", backend],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+def _begin(command: list[object], backend: str, jobs: int = 2) -> BaseProcess:
+    line = [*map(str, command), "--jobs", str(jobs), "--backend", backend]
+    process = multiprocessing.get_context("fork").Process(target=_command, args=(line,))
+    process.start()
+    return process
 
 
-def _await(process: subprocess.Popen[bytes], directory: Path, *, another: bool) -> None:
+def _command(line: list[str]) -> None:
+    """Be the command ``nested-agents``, in a copy of this process, which has imported much."""
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+    os._exit(command_line(line))
+
+
+def _status(process: BaseProcess) -> int:
+    process.join()
+    assert process.exitcode is not None
+    return process.exitcode
+
+
+def _await(process: BaseProcess, directory: Path, *, another: bool) -> None:
     """Wait until trials are handed out, and then perhaps until another one is kept."""
     recordings = directory / "recordings"
 
@@ -122,21 +134,21 @@ def _await(process: subprocess.Popen[bytes], directory: Path, *, another: bool) 
         return len(list(recordings.glob("[!.]*.npz"))) if recordings.exists() else 0
 
     before = count()
-    while process.poll() is None and not (
+    while process.is_alive() and not (
         (directory / MARK).exists() and (count() > before or not another)
     ):
         time.sleep(0.02)
 
 
-def _kill(process: subprocess.Popen[bytes], victim: str, backend: str, rng: random.Random) -> bool:
+def _kill(process: BaseProcess, victim: str, backend: str, rng: random.Random) -> bool:
     """Kill the process or one of its workers; tell whether there was one."""
-    if process.poll() is not None:
+    if not process.is_alive():
         return False
     if victim == "process":
         process.kill()
-        process.wait()
+        process.join()
         return True
-    workers = [pid for pid in _children(process.pid) if WORKERS[backend] in _line(pid)]
+    workers = [pid for pid in _children(process.pid or 0) if WORKERS[backend] in _line(pid)]
     if not workers:
         return False
     try:
@@ -194,23 +206,34 @@ def _digest(directory: Path) -> str:
 def main() -> int:
     """Kill, compare, print what happened; 1 if anything was lost."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.crashes", description=__doc__)
-    parser.add_argument("--kills", type=int, default=100, metavar="N")
-    parser.add_argument("--backend", choices=sorted(WORKERS), default="loky")
+    parser.add_argument("--backend", choices=sorted(WORKERS), nargs="+", default=["loky"])
+    parser.add_argument("--kills", type=int, nargs="+", default=[100], help="of each backend")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="of the study")
     options = parser.parse_args()
-    begin = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
-        tally = disturb(options.backend, options.kills, options.seed, options.seeds, Path(folder))
-    print(f"backend         {options.backend}, seed {options.seed}")
+        study, spec = spec_of(options.seeds), Path(folder) / "spec.toml"
+        spec.write_text(dumps(study.table()))
+        check(study)  # loads what every command needs, so that each is a copy that has it
+        assert _status(_begin(["run", spec, "--out", spec.parent / "whole"], "loky", jobs=1)) == 0
+        expected, is_fine = _digest(spec.parent / "whole"), True
+        for backend, kills in zip(options.backend, options.kills, strict=True):
+            begin = time.monotonic()
+            tally = disturb(backend, kills, options.seed, spec, expected)
+            _print(tally, backend, options.seed, time.monotonic() - begin)
+            is_fine &= not (tally.lost or tally.unequal)
+    return 0 if is_fine else 1
+
+
+def _print(tally: Tally, backend: str, seed: int, seconds: float) -> None:
+    print(f"backend         {backend}, seed {seed}")
     print(f"killed          {tally.kills['process']} processes, {tally.kills['worker']} workers")
     print(f"studies         {tally.studies}, the command begun {tally.runs} times")
     print(f"kept at a kill  {tally.kept / tally.kills.total():.1f} trials on average")
     print(f"lost            {tally.lost} trials that had been kept")
     print(f"given up        {tally.failed} trials, run again by nested-agents retry")
     print(f"unequal         {tally.unequal} studies of {tally.studies}")
-    print(f"time            {time.monotonic() - begin:.0f} s")
-    return 1 if tally.lost or tally.unequal else 0
+    print(f"time            {seconds:.0f} s", flush=True)
 
 
 if __name__ == "__main__":
