@@ -13,7 +13,7 @@ from types import ModuleType
 
 import made_up
 import pytest
-from made_up_commands import finish, heeding_interrupts, run_here, start, wait_for_results
+from made_up_commands import Command, finish, heeding_interrupts, run_here, wait_for_results
 
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
@@ -128,7 +128,7 @@ def test_interrupted_and_continued_is_as_if_never_interrupted(
     how, study, spec_file, tmp_path, capsys
 ):
     arguments = ["run", spec_file, "--out", tmp_path, "--jobs", 2]
-    process = start("endless", *arguments, start_new_session=True)
+    process = Command("endless", *arguments, start_new_session=True)
     wait_for_results(tmp_path, process)
     if how == signal.SIGINT:  # as a terminal does it: to the parent and its workers
         os.killpg(process.pid, how)
