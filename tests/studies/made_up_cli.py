@@ -26,7 +26,7 @@ from nested_agents.studies.cli.commands import (  # noqa: F401
 )
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import text  # noqa: F401
-from nested_agents.studies.presentation import figures  # noqa: F401
+from nested_agents.studies.presentation import figures
 from nested_agents.studies.report import page  # noqa: F401
 
 
@@ -72,6 +72,7 @@ if __name__ == "__main__":
     if task["measure"]:
         learning_curve.measure = getattr(made_up, task["measure"])
         studies_run.check = lambda spec, **_: made_up.MEASURES
+        figures.USUAL = ("svg",)  # nobody looks at them
         committed.studies_of = lambda paper: ("learning-curve",)
     sys.argv = ["nested-agents", *task["arguments"]]
     sys.exit(main())
