@@ -44,6 +44,15 @@ def kill_after(process, seconds):
     return process.communicate(timeout=60)[1]
 
 
+def kill_as_it_writes(process, folder):
+    """Kill a process as soon as there is another file below a folder."""
+    before = {*folder.rglob("*")}
+    while process.poll() is None and before >= {*folder.rglob("*")}:
+        time.sleep(0.0005)
+    process.kill()
+    process.communicate()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["export", "report"])
 def test_what_is_written_is_whole_or_not_there(command, whole, tmp_path):
@@ -59,8 +68,12 @@ def test_what_is_written_is_whole_or_not_there(command, whole, tmp_path):
     before = content(whole)
     for name in targets:
         (out / name).unlink()
-    for part in (0.2, 0.4, 0.6, 0.8):
-        kill_after(Command("measure", *line), part * whole_time)
+    for part in (0.2, 0.4, 0.7, None):
+        process = Command("measure", *line)
+        if part is None:
+            kill_as_it_writes(process, out)
+        else:
+            kill_after(process, part * whole_time)
         found = {n: (out / n).read_bytes() for n in targets if (out / n).exists()}
         assert all(found[name] == expected[name] for name in found)
     assert run_here(made_up.measure, *line)[0] == 0
@@ -104,13 +117,12 @@ def test_a_killed_explanation_is_begun_again(tmp_path):
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         assert main(["run", str(tmp_path / "spec.toml"), "--out", str(study), "--jobs", "1"]) == 0
     before = content(study)
-    for until in (lambda: True, lambda: any(study.glob("explain*/**/*"))):  # and as it writes
+    for is_writing in (False, True):
         process = Command("", "explain", study)
-        time.sleep(0.3)
-        while process.poll() is None and not until():
-            time.sleep(0.002)
-        process.kill()
-        process.communicate()
+        if is_writing:
+            kill_as_it_writes(process, study / "explain")
+        else:
+            kill_after(process, 0.3)
         for text in study.rglob("explanation.txt"):
             assert text.read_text().endswith("\n")
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
