@@ -13,12 +13,13 @@ from types import ModuleType
 
 import made_up
 import pytest
-from made_up_commands import finish, heeding_interrupts, run_here, start, wait_for_results
+from made_up_commands import Command, finish, heeding_interrupts, run_here, wait_for_results
 
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import commands
 from nested_agents.studies.cli.main import COMMANDS, main
+from nested_agents.studies.presentation import figures
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE
 
@@ -27,7 +28,8 @@ from nested_agents.studies.store.database import DATABASE
 def study(tmp_path_factory, spec_file):
     """A finished study, and what the run said."""
     directory = tmp_path_factory.mktemp("study") / "out"
-    return directory, run_here(made_up.measure, "run", spec_file, "--out", directory)
+    line = ["run", spec_file, "--out", directory]
+    return directory, run_here(made_up.measure, *line, usual=figures.USUAL)
 
 
 def results(directory, form="csv", *arguments, capsys=None):
@@ -128,7 +130,7 @@ def test_interrupted_and_continued_is_as_if_never_interrupted(
     how, study, spec_file, tmp_path, capsys
 ):
     arguments = ["run", spec_file, "--out", tmp_path, "--jobs", 2]
-    process = start("endless", *arguments, start_new_session=True)
+    process = Command("endless", *arguments, start_new_session=True)
     wait_for_results(tmp_path, process)
     if how == signal.SIGINT:  # as a terminal does it: to the parent and its workers
         os.killpg(process.pid, how)

@@ -4,32 +4,18 @@ import csv
 import hashlib
 import signal
 import subprocess
-import sys
+import time
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
-from pathlib import Path
 
 import made_up
 import pytest
-from made_up_commands import finish, run_here, start, wait_for_results
+from made_up_commands import Command, finish, run_here, wait_for_results
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.workers.runner import save
-
-CLAIMS = """
-import sys
-import made_up, made_up_cli
-from nested_agents.studies.api import running
-from nested_agents.studies.catalogue import learning_curve
-from nested_agents.studies.claims import claims
-from nested_agents.studies.cli.main import main
-learning_curve.measure = made_up.slow
-running.check = lambda spec, **_: made_up.MEASURES
-claims.studies_of = lambda paper: ("learning-curve",)
-sys.exit(main(sys.argv[1:]))
-"""
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +44,15 @@ def kill_after(process, seconds):
     return process.communicate(timeout=60)[1]
 
 
+def kill_as_it_writes(process, folder):
+    """Kill a process as soon as there is another file below a folder."""
+    before = {*folder.rglob("*")}
+    while process.poll() is None and before >= {*folder.rglob("*")}:
+        time.sleep(0.0005)
+    process.kill()
+    process.communicate()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["export", "report"])
 def test_what_is_written_is_whole_or_not_there(command, whole, tmp_path):
@@ -66,13 +61,19 @@ def test_what_is_written_is_whole_or_not_there(command, whole, tmp_path):
     option = out if command == "export" else out / "page.html"
     out.mkdir()
     line = [command, whole, "--out", option, *(["--overwrite"] if command == "export" else [])]
-    assert run_here(made_up.measure, *line)[0] == 0
+    begin = time.monotonic()
+    assert finish(Command("measure", *line))[0] == 0
+    whole_time = time.monotonic() - begin
     expected = {name: (out / name).read_bytes() for name in targets}
     before = content(whole)
     for name in targets:
         (out / name).unlink()
-    for seconds in (0.4, 0.8, 1.2, 2.0):
-        kill_after(start("measure", *line), seconds)
+    for part in (0.2, 0.4, 0.7, None):
+        process = Command("measure", *line)
+        if part is None:
+            kill_as_it_writes(process, out)
+        else:
+            kill_after(process, part * whole_time)
         found = {n: (out / n).read_bytes() for n in targets if (out / n).exists()}
         assert all(found[name] == expected[name] for name in found)
     assert run_here(made_up.measure, *line)[0] == 0
@@ -84,7 +85,7 @@ def test_what_is_written_is_whole_or_not_there(command, whole, tmp_path):
 def test_a_killed_retry_is_continued_by_the_same_command(spec_file, whole, tmp_path):
     assert run_here(made_up.failing, "run", spec_file, "--out", tmp_path)[0] == 1
     for seconds in (0.7, 1.5):
-        kill_after(start("slow", "retry", tmp_path), seconds)
+        kill_after(Command("slow", "retry", tmp_path), seconds)
         with Store.open(tmp_path) as store:
             store.verify()
             assert store.counts()["done"] >= 5
@@ -94,19 +95,18 @@ def test_a_killed_retry_is_continued_by_the_same_command(spec_file, whole, tmp_p
 
 @pytest.mark.slow
 def test_killed_claims_are_continued_by_the_same_command(tmp_path):
-    environment = {"cwd": Path(made_up.__file__).parent}
-    line = [sys.executable, "-c", CLAIMS, "claims", "--quick", "--out", str(tmp_path / "claims")]
-    process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **environment)
+    line = ["claims", "--quick", "--out", tmp_path / "claims"]
+    process = Command("slow", *line)
     wait_for_results(tmp_path / "claims" / "learning-curve", process)
     process.kill()
     process.communicate(timeout=60)
     with Store.open(tmp_path / "claims" / "learning-curve") as store:
         store.verify()
         done = store.counts()["done"]
-    again = subprocess.run(line, capture_output=True, text=True, timeout=240, **environment)
-    assert again.returncode == 0, again.stderr
-    assert f"{done} of" in again.stderr
-    assert "were run before" in again.stderr
+    status, _, error = finish(Command("measure", *line))
+    assert status == 0, error
+    assert f"{done} of" in error
+    assert "were run before" in error
 
 
 @pytest.mark.slow
@@ -117,10 +117,12 @@ def test_a_killed_explanation_is_begun_again(tmp_path):
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         assert main(["run", str(tmp_path / "spec.toml"), "--out", str(study), "--jobs", "1"]) == 0
     before = content(study)
-    line = [sys.executable, "-m", "nested_agents", "explain", str(study)]
-    for seconds in (1.5, 4.0):
-        process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        kill_after(process, seconds)
+    for is_writing in (False, True):
+        process = Command("", "explain", study)
+        if is_writing:
+            kill_as_it_writes(process, study / "explain")
+        else:
+            kill_after(process, 0.3)
         for text in study.rglob("explanation.txt"):
             assert text.read_text().endswith("\n")
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
@@ -130,7 +132,7 @@ def test_a_killed_explanation_is_begun_again(tmp_path):
 
 @pytest.mark.slow
 def test_a_killed_run_leaves_no_warnings(spec_file, tmp_path):
-    process = start("endless", "run", spec_file, "--out", tmp_path, "--jobs", 2)
+    process = Command("endless", "run", spec_file, "--out", tmp_path, "--jobs", 2)
     wait_for_results(tmp_path, process)
     process.kill()
     _, error = process.communicate(timeout=60)  # until all who could write to it have ended
@@ -142,7 +144,7 @@ def test_a_killed_run_leaves_no_warnings(spec_file, tmp_path):
 def test_run_retry_and_export_at_once(spec_file, whole, tmp_path, capsys, monkeypatch):
     study, gate = tmp_path / "study", tmp_path / "gate"
     monkeypatch.setenv("MADE_UP_GATE", str(gate))
-    process = start("gated", "run", spec_file, "--out", study, "--jobs", 2)
+    process = Command("gated", "run", spec_file, "--out", study, "--jobs", 2)
     wait_for_results(study, process)
     exports = 0
     while process.poll() is None:

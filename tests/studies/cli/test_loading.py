@@ -3,13 +3,11 @@
 import os
 import shutil
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 
 import made_up
 import pytest
-from made_up_commands import run_here
+from made_up_commands import Command, finish, run_here
 from rich.console import Console
 
 from nested_agents.studies.cli.commands.watch import curve, frame
@@ -158,22 +156,17 @@ def test_a_copy_of_the_spec_that_means_the_same_is_not_noted(study, tmp_path, ca
     ],
 )
 def test_what_a_terminal_cannot_write_has_a_sign_in_its_place(study, command, encoding) -> None:
-    line = [sys.executable, "-c", MAIN, command, str(study[0])]
-    environment = os.environ | {"PYTHONIOENCODING": encoding}
-    done = subprocess.run(line, capture_output=True, check=False, env=environment)
-    assert (done.returncode, done.stderr) == (0, b"")
+    status, out, err = finish(Command("measure", command, study[0], encoding=encoding))
+    assert (status, err) == (0, "")
     if command == "table":
-        assert ("0–" if encoding == "utf-8" else "0-") in done.stdout.decode(encoding)
+        assert ("0–" if encoding == "utf-8" else "0-") in out
 
 
 @pytest.mark.parametrize("command", ["table", "watch", "results"])
 def test_a_reader_that_goes_away_is_told_by_the_status(study, command) -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    line = [sys.executable, "-u", "-c", MAIN, command, str(study[0])]
-    done = subprocess.run(line, stdout=writing, stderr=subprocess.PIPE, check=False)
+    process = Command("measure", command, study[0], out=writing, buffered=False)
     os.close(writing)
-    assert (done.returncode, done.stderr) == (141, b"")
-
-
-MAIN = "import sys; from nested_agents.studies.cli.main import main; sys.exit(main())"
+    status, _, err = finish(process)
+    assert (status, err) == (141, "")

@@ -63,7 +63,7 @@ def test_a_mark_that_cannot_be_read_does_no_harm(study, content):
 
 
 def test_looking_does_not_keep_a_run_from_beginning(study):
-    for _ in range(50):
+    for _ in range(10):
         look(study)
         with made_up.opened(study):
             pass

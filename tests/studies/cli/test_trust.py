@@ -1,5 +1,6 @@
 """Code that came with a study is run only for who has run it from a spec, or says --trust."""
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -40,27 +41,34 @@ RUNNING = ("explain", "retry", "report", "table")
 HARMLESS = ("status", "results", "export")
 
 
+@pytest.fixture(scope="module")
+def theirs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Who has run a study: a folder with what they have written, trusted and made."""
+    folder = tmp_path_factory.mktemp("theirs")
+    (folder / "mine.py").write_text(MINE.format(mark=str(folder / "mark")))
+    (folder / "spec.toml").write_text(SPEC)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(folder / "state"))
+        line = ["run", str(folder / "spec.toml"), "--out", str(folder / "study"), "--jobs", "1"]
+        assert main(line) == 0
+    return folder
+
+
 @pytest.fixture
-def mark(tmp_path: Path) -> Path:
+def mark(theirs: Path) -> Path:
     """Exists once the file has been run."""
-    return tmp_path / "mark"
+    mark = theirs / "mark"
+    mark.unlink(missing_ok=True)
+    return mark
 
 
 @pytest.fixture
-def foreign(tmp_path: Path, mark: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def foreign(theirs: Path, mark: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A study that somebody else has run."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "theirs"))
-    home = tmp_path / "home"
-    home.mkdir()
-    (home / "mine.py").write_text(MINE.format(mark=str(mark)))
-    (home / "spec.toml").write_text(SPEC)
-    study = tmp_path / "study"
-    assert main(["run", str(home / "spec.toml"), "--out", str(study), "--jobs", "1"]) == 0
-    mark.unlink()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "ours"))
     monkeypatch.setattr(sources, "_here", set())
     forget_modules()
-    return study
+    return shutil.copytree(theirs / "study", tmp_path / "study")
 
 
 def forget_modules() -> None:
@@ -104,9 +112,9 @@ def test_trust_is_said_once_and_kept(
 
 
 def test_who_has_run_a_file_trusts_it_wherever_it_is(
-    foreign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    foreign: Path, theirs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "theirs"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(theirs / "state"))
     foreign.rename(tmp_path / "elsewhere")
     assert main(["table", str(tmp_path / "elsewhere")]) == 0
 

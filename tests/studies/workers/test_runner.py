@@ -2,9 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
-import textwrap
 import time
 import warnings
 from pathlib import Path
@@ -12,9 +9,11 @@ from pathlib import Path
 import made_up
 import pytest
 from joblib.externals.loky import get_reusable_executor
+from made_up_commands import Command
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers.runner import ATTEMPTS, MOST_ERROR, attempt, run_trials
@@ -127,31 +126,22 @@ def test_workers_compute_with_one_thread(tmp_path):
             assert [o.error for o in outcomes] == [None, None]
 
 
-def test_workers_do_not_outlive_a_killed_parent(tmp_path):
-    program = """
-        import sys
-        import made_up
-        from nested_agents.studies.workers.workers import LokyWorkers
-        from nested_agents.studies.workers.runner import run_trials
-        from pathlib import Path
-        with made_up.opened(Path(sys.argv[1])) as store:
-            for _ in run_trials(made_up.TRIALS, store, made_up.pids, LokyWorkers(2)):
-                pass
-    """
-    environment = {**os.environ, "PYTHONPATH": str(Path(made_up.__file__).parent),
-                   "MADE_UP_MARK": str(tmp_path / "pids")}  # fmt: skip
-    command = [sys.executable, "-c", textwrap.dedent(program), str(tmp_path / "study")]
-    parent = subprocess.Popen(command, env=environment)
+def test_workers_do_not_outlive_a_killed_parent(tmp_path, monkeypatch):
+    (tmp_path / "spec.toml").write_text(dumps(made_up.SPEC.table()))
+    monkeypatch.setenv("MADE_UP_MARK", str(tmp_path / "pids"))
+    arguments = ["run", tmp_path / "spec.toml", "--out", tmp_path / "study", "--jobs", 2]
+    parent = Command("pids", *arguments)
     deadline = time.monotonic() + 60
     while not (tmp_path / "pids").exists() and time.monotonic() < deadline:
         time.sleep(0.05)
     parent.kill()
-    parent.wait()
+    parent.wait(60)
     workers = {int(line) for line in (tmp_path / "pids").read_text().split()}
     assert workers
     while any(Path(f"/proc/{pid}").exists() for pid in workers) and time.monotonic() < deadline:
         time.sleep(0.1)
     assert [pid for pid in workers if Path(f"/proc/{pid}").exists()] == []
+    parent.communicate()
 
 
 def test_never_more_trials_are_said_to_run_than_there_are_processes():
