@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from ...core.agents.loop import world_seed
 from ...core.plugins.settings import Settings, tuples
@@ -44,9 +44,14 @@ FREE = ("state_space", "predictor", "belief", "prediction_horizon", "reward", "s
 Outcomes = Annotated[str, Field(pattern=f"^[01]{{{EPISODES}}}$")]
 Steps = Annotated[int, Field(ge=1, le=STEPS)]
 
+EXPLAINED = ConfigDict(use_attribute_docstrings=True)
+"""For models whose schema is printed, with the text beside their fields."""
+
 
 class TeamScores(Settings):
     """What teams of one size did, by seed; seeds count from 0."""
+
+    model_config = EXPLAINED
 
     robots: Literal[SIZES]  # type: ignore[valid-type]
     """How many there are."""
@@ -70,6 +75,8 @@ class TeamScores(Settings):
 
 class Entry(Settings):
     """What one learner did."""
+
+    model_config = EXPLAINED
 
     benchmark: Literal["push-n"] = "push-n"
     version: Literal[1] = 1
