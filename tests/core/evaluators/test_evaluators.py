@@ -66,7 +66,7 @@ class Tabled:
 
     def blocks(self, agent: int) -> Blocks:
         own = np.zeros((1, 0))
-        return Blocks(own, self.table[agent], 1)
+        return Blocks(own, np.ascontiguousarray(self.table[agent]), 1)
 
     def reward_table(self) -> np.ndarray:
         return self.rewarded
