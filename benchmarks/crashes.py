@@ -211,6 +211,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="of the study")
     options = parser.parse_args()
+    if len(options.kills) != len(options.backend):
+        parser.error("--kills: must be one number for each backend")
     with tempfile.TemporaryDirectory() as folder:
         study, spec = spec_of(options.seeds), Path(folder) / "spec.toml"
         spec.write_text(dumps(study.table()))
