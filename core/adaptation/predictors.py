@@ -237,12 +237,15 @@ def driven_states(  # type: ignore[no-untyped-def]
     """
     (m, b, k), v = drivers.shape, present.shape[1]
     begun, moved = np.empty((m * b, v)), np.empty((b, 2 * v))
-    for c in range(m):
-        begun[c * b : (c + 1) * b] = present
+    for at in range(m * b):
+        for x in range(v):
+            begun[at, x] = present[at % b, x]
     middle, states = begun.copy(), begun.copy()
     for ahead in range(horizon * passes):
         if ahead % passes == 0:
-            begun[:], middle[:] = states, states
+            for at in range(m * b):
+                for x in range(v):
+                    begun[at, x] = middle[at, x] = states[at, x]
         rules, strengths = active_compact(middle, packed)
         for c in range(m):
             moved[:] = 0.0
