@@ -4,7 +4,7 @@ import gc
 from importlib.util import find_spec
 
 NEEDED = {
-    "torch": "nested_agents/core/policies/*.py",
+    "torch": "nested_agents/core/networks/*.py",
     "mujoco": "nested_agents/scenarios/swimmers.py",
 }
 collect_ignore_glob = [pattern for extra, pattern in NEEDED.items() if not find_spec(extra)]

@@ -32,7 +32,7 @@ from nested_agents.core.evaluators.evaluator import (
     Evaluator,
     Teammates,
 )
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.learner import Decision
 from nested_agents.core.numerics import FloatArray

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from nested_agents.core.agents.team import Team
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import Prediction
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.td import TDLambda

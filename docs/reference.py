@@ -55,13 +55,14 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
         "interface.hierarchy", "interface.spaces", "interface.scenario", "agents.team",
-        "adaptation.predictors", "agents.loop", "decision.exploration",
+        "adaptation.predictors", "agents.loop", "agents.joint", "decision.exploration",
         "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
         "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",
         "evaluators.best_response", "evaluators.coordination", "coordination.graphs",
         "adaptation.self_model",
-        "agents.cost", "plugins.registry", "plugins.settings", "numerics",
-        "policies.settings", "policies.peer",
+        "agents.cost", "plugins.registry", "plugins.settings", "numerics.arrays",
+        "numerics.random", "numerics.compiler", "numerics.libraries",
+        "networks.settings", "networks.peer",
     )),
     "topologies": ("Who is above whom.", ("builders", "config", "drawing", )),
     "scenarios": ("Where agents act.", (

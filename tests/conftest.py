@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, Blocks, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label

@@ -1,6 +1,6 @@
 """Who is above whom: builders, specs, checks and pictures of hierarchies."""
 
-from ..core.interface.hierarchy import Hierarchy
+from ..core.hierarchy.hierarchy import Hierarchy
 from .builders import from_networkx
 from .config import TOPOLOGIES, Topology, TopologySettings, build, parse
 

@@ -20,7 +20,7 @@ from typing_extensions import TypeAliasType
 
 from ..core.coordination import graphs
 from ..core.coordination.graphs import Shape
-from ..core.interface.hierarchy import Hierarchy
+from ..core.hierarchy.hierarchy import Hierarchy
 from ..core.numerics import nx
 from ..core.plugins.settings import Fraction, unwritten
 

@@ -23,9 +23,9 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import model_validator
 
-from ..core.agents.failures import AbsentAgents, AnyMessageFailure
 from ..core.coordination.graphs import Shape, oriented
-from ..core.interface.hierarchy import Considers, Hierarchy, Told
+from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure
+from ..core.hierarchy.hierarchy import Considers, Hierarchy, Told
 from ..core.numerics import nx
 from ..core.plugins import registry, sources
 from ..core.plugins.registry import Plugged, SettingsRegistry

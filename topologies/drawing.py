@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
-from ..core.interface.hierarchy import Hierarchy
+from ..core.hierarchy.hierarchy import Hierarchy
 from ..core.numerics import FloatArray, nx
 
 COLUMNS = 6

@@ -11,9 +11,9 @@ from textwrap import wrap
 from typing import Literal
 
 from ..core.agents.cost import below_counts
-from ..core.agents.failures import MessageFailure
-from ..core.agents.loop import Agents, joint_blocks
-from ..core.interface.hierarchy import Hierarchy
+from ..core.agents.joint import Granularity, joint_blocks
+from ..core.hierarchy.failures import MessageFailure
+from ..core.hierarchy.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, parse
 from .builders import check_legible, names_of
 from .config import ARGUMENTS, read
@@ -71,7 +71,7 @@ class HierarchyView:
 
 
 def view(
-    text: str, agents: int | None, robots: int | None, actions: int, per: Agents = "actuator"
+    text: str, agents: int | None, robots: int | None, actions: int, per: Granularity = "actuator"
 ) -> HierarchyView:
     """Build the topology written as `text`, over as many agents as asked for.
 

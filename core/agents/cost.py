@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from ..interface.hierarchy import Hierarchy
+from ..hierarchy.hierarchy import Hierarchy
 
 PAPER_RULES = 5**7
 """|S_n|: seven state variables of five membership functions (Section VII)."""

@@ -13,13 +13,13 @@ from ..adaptation.predictors import GivenPredictor, Mirror
 from ..adaptation.self_model import Calibration, SelfModel
 from ..decision.exploration import Explorer
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
-from ..interface.hierarchy import Hierarchy
+from ..hierarchy.failures import MessageFailure, Messages
+from ..hierarchy.hierarchy import Hierarchy
 from ..interface.scenario import Actors, EmbodiedScenario, Scenario, Transition, groups_of, rows_of
 from ..interface.spaces import NOT_EXPLORING, Prediction
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics import FloatArray, IntArray, greatest, set_words, words_of
-from .failures import MessageFailure, Messages
 
 
 class Team:

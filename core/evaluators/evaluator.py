@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from ..interface.hierarchy import Hierarchy
+from ..hierarchy.hierarchy import Hierarchy
 from ..interface.spaces import Prediction, states_by_group
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry

@@ -10,7 +10,7 @@ from ..interface.scenario import Scenario
 from ..plugins.registry import SettingsRegistry
 from .learner import LearnerSettings, TeamSettings
 
-PEERS = f"{__name__.rpartition('.')[0]}.policies.settings"
+PEERS = f"{__name__.rpartition('.')[0]}.networks.settings"
 
 LEARNERS = SettingsRegistry(
     "learner",

@@ -91,7 +91,7 @@ class TeamSettings(PartSettings):
     """What stands in the ``[learner]`` table of a spec: how those who act learn.
 
     `LearnerSettings` are of a hierarchy of fuzzy agents, built by `core.agents.team`; those of
-    whoever acts for all by itself are built as they are, see `core.policies`.
+    whoever acts for all by itself are built as they are, see `core.networks`.
     """
 
     uses_hierarchy: ClassVar[bool] = False

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import networkx as nx
 
 from nested_agents.core.agents.cost import PAPER_ACTIONS, Problem, below_counts
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 
 
 class Question(Protocol):

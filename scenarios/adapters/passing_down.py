@@ -24,7 +24,7 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import AgentSelector
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
-from ...core.interface.hierarchy import Hierarchy
+from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.numerics import FloatArray
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field, create_model
 
-from ...core.agents.failures import Scheduled
+from ...core.hierarchy.failures import Scheduled
 from ...core.numerics import BoolArray, FloatArray, stream_of
 
 

@@ -35,7 +35,7 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo.utils import BaseParallelWrapper
 
-from ...core.agents.failures import Names
+from ...core.hierarchy.failures import Names
 from ...core.numerics import BoolArray, FloatArray
 from . import settings
 from .settings import Failures, FailureSettings, befalling

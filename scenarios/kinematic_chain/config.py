@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
 from pydantic import Field
 
-from ...core.agents.failures import Names
+from ...core.hierarchy.failures import Names
 from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings, team_size
 from ..faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
 from ..state_variables import referred

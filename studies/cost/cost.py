@@ -23,12 +23,13 @@ from itertools import chain
 from statistics import median
 
 from ...core.agents.cost import Problem, below_counts
-from ...core.agents.loop import control_loop, join_agents, policy_seed
+from ...core.agents.joint import join_agents
+from ...core.agents.loop import control_loop, policy_seed
 from ...core.agents.team import Team
 from ...core.evaluators.best_response import CUTS
 from ...core.evaluators.coordination import MaxPlusSettings
 from ...core.evaluators.evaluator import Counts
-from ...core.interface.hierarchy import Hierarchy
+from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners.learner import Decision
 from ...core.learners.td import TDLambdaSettings

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from ...core.agents.loop import body_of
+from ...core.agents.joint import body_of
 from ...core.numerics import pd
 from ..errors import WIDTH
 from ..presentation import figures

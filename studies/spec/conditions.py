@@ -18,8 +18,8 @@ from typing import Annotated, Any, NamedTuple, cast
 
 from pydantic import AfterValidator, Field, ValidationError
 
-from ...core.agents.loop import Agents, join_agents
-from ...core.interface.hierarchy import Hierarchy
+from ...core.agents.joint import Granularity, join_agents
+from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario, groups_of
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
@@ -97,7 +97,7 @@ class ConditionSettings(Settings):
     scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = Field(
         default_factory=lambda: cast(ScenarioSettings, SCENARIOS.parsed(DEFAULT))
     )
-    agents: Annotated[Agents, unwritten("actuator")] = "actuator"
+    agents: Annotated[Granularity, unwritten("actuator")] = "actuator"
     topology: Topology = parse("chain")
     learner: Annotated[TeamSettings, Plugged(LEARNERS)] = BatchTDSettings()
 
@@ -149,7 +149,7 @@ class Override(Settings):
     """The preset under its tables; none: the spec's."""
     scenario: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the spec's scenario."""
-    agents: Agents | None = None
+    agents: Granularity | None = None
     """In place of the spec's; none: the spec's."""
     topology: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the spec's topology."""

@@ -22,10 +22,10 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
-from ...core.agents.loop import Agents
+from ...core.agents.joint import Granularity
 from ...core.decision.exploration import EXPLORATIONS
 from ...core.evaluators import EVALUATORS
-from ...core.interface.hierarchy import Hierarchy
+from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.learners import LEARNERS, LearnerSettings
 from ...core.numerics import nx
 from ...core.plugins.registry import Registry
@@ -165,7 +165,7 @@ class Spec(Settings):
     without training anew."""
     scenario: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's scenario."""
-    agents: Agents | None = None
+    agents: Granularity | None = None
     """What there is one agent for: each actuator (the default), each body, the team."""
     topology: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's topology; may be written as a string."""

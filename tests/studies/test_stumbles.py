@@ -8,7 +8,7 @@ from made_up_results import hierarchies, wheel_failure
 from matplotlib.figure import Figure
 
 import nested_agents as na
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import SUCCESS
 from nested_agents.studies.api import running
 from nested_agents.studies.catalogue.learning_curve import metrics_of

@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.loop import control_loop, join_agents, policy_seed
+from nested_agents.core.agents.joint import join_agents
+from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.learners.td import FrozenSettings
-from nested_agents.core.policies.settings import DQNSettings
+from nested_agents.core.networks.settings import DQNSettings
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.studies.cli.main import main

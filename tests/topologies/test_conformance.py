@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from nested_agents.core.agents.loop import control_loop, join_agents, policy_seed
+from nested_agents.core.agents.joint import join_agents
+from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.evaluator import Deliberation
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.rules.rule_base import RuleBaseSettings

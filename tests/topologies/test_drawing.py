@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.textpath import TextPath
 
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.topologies import build, parse
 from nested_agents.topologies.drawing import ACROSS, DOWN, HEIGHT, WIDTH, draw, positions
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ....core.agents.failures import Names
+from ....core.hierarchy.failures import Names
 from ....core.numerics import BoolArray, FloatArray
 from ....core.plugins.settings import NonNegative, Positive, Settings, unwritten
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling

@@ -12,7 +12,8 @@ from nested_agents.core.adaptation.predictors import (
     Persistence,
     StaticPredictor,
 )
-from nested_agents.core.agents.loop import control_loop, join_agents
+from nested_agents.core.agents.joint import join_agents
+from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.scenario import Scenario, Transition, groups_of
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable, states_by_group

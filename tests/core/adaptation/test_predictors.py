@@ -7,7 +7,7 @@ import pytest
 
 from nested_agents.core.adaptation.predictors import Mirror
 from nested_agents.core.agents.team import Team
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.rules.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings

@@ -12,18 +12,11 @@ import numpy as np
 import pytest
 
 from nested_agents.core.adaptation.self_model import SelfModelSettings
-from nested_agents.core.agents.loop import (
-    Agents,
-    JointPrediction,
-    StepRecord,
-    control_loop,
-    join_agents,
-    policy_seed,
-    world_seed,
-)
+from nested_agents.core.agents.joint import Granularity, JointPrediction, join_agents
+from nested_agents.core.agents.loop import StepRecord, control_loop, policy_seed, world_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import EmbodiedScenario, Scenario, roles_of
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.learner import Decision
@@ -325,7 +318,7 @@ def test_robots_whose_wheels_have_the_same_roles_are_of_one_role(line_world) -> 
 
 
 @pytest.mark.parametrize(("agents", "n"), [("body", 2), ("team", 1)])
-def test_rewards_of_wheels_are_joined(agents: Agents, n: int) -> None:
+def test_rewards_of_wheels_are_joined(agents: Granularity, n: int) -> None:
     settings = BoxPushingSettings.model_validate({"reward": {"of": "robot"}})
     world = BoxPushing(settings)
     scenario = join_agents(BoxPushing(settings), agents)

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.failures import AbsentAgents, LostMessages
-from nested_agents.core.agents.loop import control_loop, join_agents
+from nested_agents.core.agents.joint import join_agents
+from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
 from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
 from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.failures import AbsentAgents, LostMessages
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import carried_rows
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings

@@ -6,7 +6,7 @@ import pytest
 from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.best_response import BestResponse
 from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import FrozenSettings
 

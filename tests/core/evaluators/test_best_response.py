@@ -21,7 +21,7 @@ from nested_agents.core.evaluators.evaluator import (
     ValueOf,
     concerned,
 )
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.numerics import FloatArray
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings

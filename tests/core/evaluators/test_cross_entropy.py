@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from nested_agents.core.evaluators.coordination import CrossEntropySettings
 from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation, Evaluator
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings

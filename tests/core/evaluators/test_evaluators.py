@@ -18,7 +18,7 @@ from nested_agents.core.evaluators.enumeration import (
     probabilities_of,
 )
 from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation, Rule, Teammates
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import Blocks, StateSpace, Variable
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 

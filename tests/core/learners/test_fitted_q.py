@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.failures import LostMessages
 from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.evaluator import Deliberation
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.failures import LostMessages
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import REWARD_SCALE
 from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings

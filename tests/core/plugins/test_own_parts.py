@@ -7,11 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.loop import control_loop, join_agents, policy_seed
+from nested_agents.core.agents.joint import join_agents
+from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.evaluators import EVALUATORS
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.plugins.sources import Sources

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import pytest
 
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.plugins.registry import Plugged, Registry, SettingsRegistry
 from nested_agents.core.plugins.settings import Settings, SettingsError
 from nested_agents.core.plugins.sources import Sources
@@ -213,7 +213,7 @@ def module_of(monkeypatch: pytest.MonkeyPatch, name: str, path: Path | None, tex
 def test_an_object_becomes_the_name_of_its_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    things = Registry("thing", {"hierarchy": "nested_agents.core.interface.hierarchy:Hierarchy"})
+    things = Registry("thing", {"hierarchy": "nested_agents.core.hierarchy.hierarchy:Hierarchy"})
     monkeypatch.chdir(tmp_path)
     text = "class Thing:\n    pass\n"
     inside = module_of(monkeypatch, "inside", tmp_path / "inside.py", text)

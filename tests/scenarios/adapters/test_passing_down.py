@@ -9,7 +9,7 @@ import pytest
 from pettingzoo import ParallelEnv
 from pettingzoo.test import api_test, seed_test
 
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.scenarios.adapters.passing_down import PassingDownEnv
 from nested_agents.scenarios.box_pushing.environments import RobotsEnv, WheelsEnv
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from nested_agents import View, state_variable
-from nested_agents.core.agents.loop import join_agents
+from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.interface.scenario import SUCCESS, Measure, Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, Blocks, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings

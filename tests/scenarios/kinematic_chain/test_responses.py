@@ -7,7 +7,7 @@ import pytest
 
 from nested_agents.core.agents.loop import policy_seed, world_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.scenarios.kinematic_chain.scenario import ChainPrediction

@@ -1,6 +1,6 @@
 """The peers study: evaluations on the way, comparison and figure; of ours alone, as they are quick.
 
-What stable-baselines3 learns is in tests/core/policies.
+What stable-baselines3 learns is in tests/core/networks.
 """
 
 from pathlib import Path

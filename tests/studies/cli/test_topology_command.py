@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.core.agents.loop import join_agents
+from nested_agents.core.agents.joint import join_agents
 from nested_agents.studies.cli.main import main
 from nested_agents.topologies import TOPOLOGIES, build
 from nested_agents.topologies.view import readable, team_of

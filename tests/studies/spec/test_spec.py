@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.scenarios.line_up import LineUp
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.presets import PRESETS

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 
 CHAIN = Hierarchy("abcd", [("a", "b"), ("b", "c"), ("c", "d")])
 TREE = Hierarchy("abcde", [("a", "b"), ("a", "c"), ("b", "d"), ("b", "e")])

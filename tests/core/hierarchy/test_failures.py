@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.failures import (
+from nested_agents.core.hierarchy.failures import (
     AbsentAgents,
     DelayedMessages,
     LostMessages,
@@ -14,7 +14,7 @@ from nested_agents.core.agents.failures import (
     NoisyMessages,
     ReparentedAgents,
 )
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 
 CHAIN = Hierarchy("abcd", list(pairwise("abcd")))
 DECIDED = np.array([3, 1, 0, 2])

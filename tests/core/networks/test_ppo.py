@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.learners import LEARNERS
-from nested_agents.core.policies.peer import Passing, Seen
+from nested_agents.core.networks.peer import Passing, Seen
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec

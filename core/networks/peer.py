@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from ..interface.hierarchy import Hierarchy
+from ..hierarchy.hierarchy import Hierarchy
 from ..interface.scenario import Actors, Scenario, groups_of
 from ..numerics import FloatArray, IntArray
 

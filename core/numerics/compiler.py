@@ -1,6 +1,4 @@
-"""The numerical ground: arrays, libraries that take their time, random streams, kernels.
-
-Kernels are compiled at their first call, by one process at a time, and cached on disk.
+"""Kernels: compiled at their first call, by one process at a time, and cached on disk.
 
 numba takes a second to import and a kernel seconds to compile, so that neither is done before a
 kernel is called: commands that only read never do. Of several processes that need the same kernel
@@ -34,22 +32,11 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property, update_wrapper
-from math import pi
 from pathlib import Path
 from types import CodeType, FunctionType
-from typing import TYPE_CHECKING, Any, TypeVar, cast
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
-FloatArray = NDArray[np.floating[Any]]
-IntArray = NDArray[np.integer[Any]]
-BoolArray = NDArray[np.bool_]
-"""Arrays of any precision, and masks."""
-
-SAME = 1e-12
-"""Values that differ by less, times their size if that is above 1, are equal."""
 
 IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
 """An import inside the package; the house rules know no other."""
@@ -61,113 +48,6 @@ INNER = "-inner"
 """What tells cached kernels for kernels from those for Python."""
 
 _threads = threading.RLock()
-
-
-class Deferred:
-    """A module that is imported when something of it is first asked for.
-
-    Parameters
-    ----------
-    name
-        Its full name.
-
-    Examples
-    --------
-    >>> math = Deferred("math")
-    >>> math.floor(2.5)
-    2
-    """
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-
-    def __getattr__(self, attribute: str) -> Any:
-        """Return what the module has by this name."""
-        if attribute.startswith("__"):  # asked by who inspects the object, not by who uses it
-            raise AttributeError(attribute)
-        return getattr(importlib.import_module(self._name), attribute)
-
-
-if TYPE_CHECKING:
-    import networkx as nx
-    import pandas as pd
-    from scipy import optimize, special, stats
-else:
-    nx, pd = Deferred("networkx"), Deferred("pandas")
-    optimize, special, stats = map(Deferred, ("scipy.optimize", "scipy.special", "scipy.stats"))
-
-__all__ = ["nx", "optimize", "pd", "special", "stats"]
-"""Libraries that take their time are imported when something of them is first asked for."""
-
-
-def greatest(values: FloatArray, rng: np.random.Generator) -> int:
-    """Return the index of the greatest value, ties (see `SAME`) broken at random.
-
-    Raises
-    ------
-    ArithmeticError
-        If the first value is not a number, or the greatest is infinite.
-    """
-    listed = values.tolist()  # four numbers: plain Python is faster
-    top = max(listed)
-    least = top - SAME * max(1.0, abs(top))
-    best = [action for action, value in enumerate(listed) if value >= least]
-    if not best:
-        raise ArithmeticError(f"none of {len(listed)} actions is worth most: not all are numbers")
-    return int(best[0] if len(best) == 1 else best[rng.integers(len(best))])
-
-
-def stream_of(seed: int | np.random.SeedSequence, key: int) -> np.random.Generator:
-    """Return the stream of a seed that has a key, whatever else is drawn from that seed.
-
-    Examples
-    --------
-    >>> one, same, other = (stream_of(7, key) for key in (0, 0, 1))
-    >>> float(one.random()) == float(same.random()) != float(other.random())
-    True
-    """
-    root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-    child = np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, key))
-    return np.random.default_rng(child)
-
-
-def words_of(rng: np.random.Generator) -> IntArray:
-    """Return the state of a generator of the kind PCG64 as six whole numbers, see `set_words`."""
-    state = rng.bit_generator.state
-    numbers = state["state"]["state"], state["state"]["inc"]
-    words = [number >> shift & (2**64 - 1) for number in numbers for shift in (64, 0)]
-    return np.array([*words, state["has_uint32"], state["uinteger"]], dtype=np.uint64)
-
-
-def set_words(rng: np.random.Generator, words: IntArray | FloatArray) -> None:
-    """Set a generator, which is modified, to the state that `words_of` returned."""
-    high, low, high_step, low_step, has_half, half = map(int, words)
-    rng.bit_generator.state = {
-        "bit_generator": "PCG64",
-        "state": {"state": high << 64 | low, "inc": high_step << 64 | low_step},
-        "has_uint32": has_half,
-        "uinteger": half,
-    }
-
-
-_TURN = 2.0 * pi
-_TURN_HIGH = 6.283185243606567
-"""The leading 26 bits of a turn: products with a few thousand turns are exact."""
-_TURN_LOW = _TURN - _TURN_HIGH
-
-
-def wrap(angle: Any) -> Any:
-    """Map angles [rad] to [-pi, pi): ``(angle + pi) % (2 pi) - pi`` to the last bit, but faster."""
-    shifted = angle + pi
-    turns = np.floor(shifted / _TURN)
-    return shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi
-
-
-@cache
-def quadrature(n: int) -> tuple[FloatArray, FloatArray]:
-    """Return the n nodes and weights of Gauss and Legendre on [-1, 1]; not to be modified."""
-    nodes, weights = np.polynomial.legendre.leggauss(n)
-    return nodes, weights
 
 
 class Kernel:

@@ -28,7 +28,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import MlpExtractor
 
-from ..interface.hierarchy import Hierarchy
+from ..hierarchy.hierarchy import Hierarchy
 from ..interface.scenario import Scenario, Transition, roles_of
 from ..numerics import FloatArray, IntArray
 from .peer import Inputs, Passing, Peer, RewardScale, Seen

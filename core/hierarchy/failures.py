@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import BeforeValidator, Field, NonNegativeInt, model_validator
 
-from ..interface.hierarchy import Hierarchy
+from ..hierarchy.hierarchy import Hierarchy
 from ..numerics import BoolArray, IntArray, stream_of
 from ..plugins.settings import Fraction, Settings
 

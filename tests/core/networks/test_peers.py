@@ -8,7 +8,7 @@ import pytest
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
-from nested_agents.core.policies.peer import FARTHEST, Inputs, Peer, RewardScale, Seen
+from nested_agents.core.networks.peer import FARTHEST, Inputs, Peer, RewardScale, Seen
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
@@ -85,7 +85,7 @@ def test_rewards_are_scaled_by_the_spread_of_returns() -> None:
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.policies.networks", None)
+    monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.networks.networks", None)
     with pytest.raises(SpecError, match=r"'ippo': needs the extra peers, pip install") as raised:
         check(spec_of("ippo"))
     assert "\n" not in str(raised.value)

@@ -1,0 +1,1 @@
+"""Who decides after whom: hierarchies, and what fails of their messages."""

@@ -1,0 +1,39 @@
+"""The numerical ground: arrays, random numbers, kernels, libraries that take their time."""
+
+from .arrays import (
+    SAME,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    greatest,
+    quadrature,
+    wrap,
+)
+from .compiler import INNER, LOCK, Kernel, njit, serve, stamp
+from .libraries import Deferred, nx, optimize, pd, special, stats
+from .random import set_words, stream_of, words_of
+
+__all__ = [
+    "INNER",
+    "LOCK",
+    "SAME",
+    "BoolArray",
+    "Deferred",
+    "FloatArray",
+    "IntArray",
+    "Kernel",
+    "greatest",
+    "njit",
+    "nx",
+    "optimize",
+    "pd",
+    "quadrature",
+    "serve",
+    "set_words",
+    "special",
+    "stamp",
+    "stats",
+    "stream_of",
+    "words_of",
+    "wrap",
+]
