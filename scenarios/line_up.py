@@ -21,8 +21,10 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..core.interface.scenario import SUCCESS, Measure, Transition
-from ..core.interface.spaces import ActionSet, Blocks, StateSpace, Variable
+from ..core.interface.measures import SUCCESS, Measure
+from ..core.interface.prediction import Blocks
+from ..core.interface.scenario import Transition
+from ..core.interface.spaces import ActionSet, StateSpace, Variable
 from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..interface.spaces import Blocks, first_alike
+from ..interface.prediction import Blocks, first_alike
 from ..numerics import FloatArray, IntArray
 
 

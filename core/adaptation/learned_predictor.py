@@ -20,7 +20,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..interface.scenario import Scenario, Transition, groups_of, rows_of
+from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
@@ -61,7 +61,7 @@ class LearnedPredictor:
 
     def __init__(self, settings: LearnedPredictorSettings, scenario: Scenario) -> None:
         self.settings, self.space = settings, scenario.state_space
-        self.groups, self.n_actions = groups_of(scenario), len(scenario.action_set)
+        self.groups, self.n_actions = scenario.groups, len(scenario.action_set)
         space = self.space
         if not space.shared:
             raise ValueError("learner.predictor: all state variables are an agent's own")

@@ -21,7 +21,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..interface.scenario import Scenario, groups_of, roles_of
+from ..interface.scenario import Scenario
 from ..numerics import FloatArray, IntArray, njit
 from ..plugins.settings import PartSettings, Positive, unwritten
 from ..rules.kernels.fuzzy import Packed, Partition
@@ -182,7 +182,7 @@ class DrivenBodies:
     """
 
     def __init__(self, scenario: Scenario, *, products: str, memberships: int | None) -> None:
-        space, groups, roles = scenario.state_space, groups_of(scenario), roles_of(scenario)
+        space, groups, roles = scenario.state_space, scenario.groups, scenario.roles
         common = {j for j, v in enumerate(space.variables) if v.name in space.common}
         columns = range(space.n_own, space.n_variables)
         alike = len({tuple(roles[i] for i in group) for group in groups}) == 1

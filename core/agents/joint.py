@@ -22,15 +22,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..interface.scenario import (
-    EmbodiedScenario,
-    Scenario,
-    Transition,
-    groups_of,
-    measures_of,
-    roles_of,
-)
-from ..interface.spaces import ActionSet, Blocks, Prediction, StateSpace
+from ..interface.measures import measures_of
+from ..interface.prediction import Blocks, Prediction
+from ..interface.scenario import EmbodiedScenario, Scenario, Transition
+from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 
 Granularity = Literal["actuator", "body", "team"]
@@ -116,10 +111,10 @@ class JointAgents:
     """
 
     def __init__(self, scenario: Scenario, each: Granularity) -> None:
-        single, space, groups = scenario.action_set, scenario.state_space, groups_of(scenario)
+        single, space, groups = scenario.action_set, scenario.state_space, scenario.groups
         self.agents, self.blocks = joint_blocks(scenario.agents, groups, len(single), each)
         self.scenario, self.whole, n_block = scenario, each == "team", len(self.blocks[0])
-        self.measures = measures_of(scenario)
+        self.measures = measures_of(scenario.measures)
         self.horizon = getattr(scenario, "horizon", 1)
         self.groups = tuple((i,) for i in range(len(self.agents)))
         self._n_each = space.n_variables if self.whole else space.n_own
@@ -128,7 +123,7 @@ class JointAgents:
             self.roles = self.agents
         else:
             of_block = [agent.rpartition(".")[2] for agent in of_block]
-            roles = roles_of(scenario)
+            roles = scenario.roles
             self.roles = tuple("+".join(roles[i] for i in block) for block in self.blocks)
         repeated, shared = space.variables[: self._n_each], space.variables[self._n_each :]
         own = [replace(v, name=f"{agent}.{v.name}") for agent in of_block for v in repeated]

@@ -15,8 +15,8 @@ from ..decision.exploration import Explorer
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from ..hierarchy.failures import MessageFailure, Messages
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.scenario import Actors, EmbodiedScenario, Scenario, Transition, groups_of, rows_of
-from ..interface.spaces import NOT_EXPLORING, Prediction
+from ..interface.prediction import NOT_EXPLORING, Prediction
+from ..interface.scenario import Actors, EmbodiedScenario, Scenario, Transition, rows_of
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics import FloatArray, IntArray, greatest, set_words, words_of
@@ -112,7 +112,7 @@ class Team:
         decision = settings.decision
         if decision.rule != "random":
             problem = DecisionProblem(
-                self.rules, hierarchy, n_actions, groups_of(scenario),
+                self.rules, hierarchy, n_actions, scenario.groups,
                 discount=settings.discount,
                 handed_down=hierarchy.told == "ancestors" and not failures,
                 **{name: value for name, value in decision if name != "evaluator"},

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, Protocol
 import numpy as np
 from pydantic import Field
 
-from ..interface.spaces import Exploring
+from ..interface.prediction import Exploring
 from ..numerics import FloatArray, greatest
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import Fraction, NonNegative, PartSettings, Positive

@@ -26,7 +26,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..interface.spaces import BestResponses, Exploring, Prediction
+from ..interface.prediction import BestResponses, Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
 from .enumeration import combinations

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..interface.spaces import has_tables
+from ..interface.prediction import has_tables
 from ..numerics import FloatArray, IntArray
 from ..rules.kernels.dense import Tried
 from .evaluator import (

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.spaces import Prediction, states_by_group
+from ..interface.prediction import Prediction, states_by_group
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import PartSettings

@@ -29,7 +29,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import MlpExtractor
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.scenario import Scenario, Transition, roles_of
+from ..interface.scenario import Scenario, Transition
 from ..numerics import FloatArray, IntArray
 from .peer import Inputs, Passing, Peer, RewardScale, Seen
 from .settings import DQNSettings, MultiAgentPPOSettings, PolicyGradientSettings, PPOSettings
@@ -339,7 +339,7 @@ class HierarchyPPO(Peer):
                 f"learner.kind = {settings.kind!r}: neighbours decide at the same time and tell "
                 "each other nothing, use a topology without them"
             )
-        owners = {"all": ("all",) * n, "role": roles_of(scenario), "own": scenario.agents}
+        owners = {"all": ("all",) * n, "role": scenario.roles, "own": scenario.agents}
         names, rows = np.unique(owners[settings.weights], return_inverse=True)
         self.passing = Passing(hierarchy, n_actions, rows)
         self._n_joint = self.inputs.n_joint if settings.critic == "central" else 0

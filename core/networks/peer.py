@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.scenario import Actors, Scenario, groups_of
+from ..interface.scenario import Actors, Scenario
 from ..numerics import FloatArray, IntArray
 
 
@@ -92,7 +92,7 @@ class Inputs:
         # Which variable each input is of: all of them, then the cosines of the periodic.
         self._columns = np.append(np.arange(space.n_variables), np.flatnonzero(self._periodic))
         self._own = self._columns < space.n_own
-        self._firsts = [group[0] for group in groups_of(scenario)]
+        self._firsts = [group[0] for group in scenario.groups]
         n = len(scenario.agents)
         self._names = np.eye(n) if numbered else np.zeros((n, 0))
         self.n_own = len(self._columns) + self._names.shape[1]

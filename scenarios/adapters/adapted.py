@@ -17,7 +17,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from ...core.interface.scenario import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import Transition
 from ...core.interface.spaces import StateSpace
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.sources import format_error

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.agents.team import Team
-from ...core.interface.scenario import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet
 from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from .config import BoxPushingSettings

@@ -25,8 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.agents.loop import world_seed
-from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, lacking, roles_of
-from ...core.interface.spaces import has_tables
+from ...core.interface.prediction import has_tables
+from ...core.interface.scenario import RecordedScenario, Scenario, lacking
 from ...core.numerics import FloatArray, IntArray
 from .frames import Examination, Frame, at, bits, differences, fields, measured, opening
 from .predictions import apart, faults_of_prediction, faults_of_sharing, too_many
@@ -245,7 +245,7 @@ def _form(of: Examination) -> Iterator[str]:
     n, d = len(scenario.agents), scenario.state_space.n_variables
     if not n or len(set(scenario.agents)) != n:
         yield f"agents {scenario.agents} must be at least one, of different names"
-    groups, roles = groups_of(scenario), roles_of(scenario)
+    groups, roles = scenario.groups, scenario.roles
     if [i for group in groups for i in group] != list(range(n)):
         yield f"groups {groups} must hold the {n} agents once each, in order"
     if len(roles) != n:
@@ -299,7 +299,7 @@ def _values(of: Examination) -> Iterator[str]:
         for step, frame in enumerate(of.play(scenario, seed, episode)):
             for fault in _wrong_values(scenario, frame):
                 yield f"{fault} {at(step)} of seed {seed}"
-    roles = roles_of(of.factory())
+    roles = of.factory().roles
     if len(set(roles)) < len(roles):
         of.unchecked["roles"] = "whether agents of one role are alike is not seen from outside"
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.scenario import Scenario, groups_of
-from ...core.interface.spaces import Blocks, has_tables, states_by_group
+from ...core.interface.prediction import Blocks, has_tables, states_by_group
+from ...core.interface.scenario import Scenario
 from ...core.numerics import BoolArray, FloatArray, IntArray
 
 MOST_JOINT_ACTIONS = 4**8
@@ -65,7 +65,7 @@ def too_many(scenario: Scenario) -> str:
 def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> Iterator[str]:
     """Yield what is predicted in a wrong shape, or is not finite."""
     n, m, d = len(scenario.agents), len(joint_actions), scenario.state_space.n_variables
-    groups, n_own = groups_of(scenario), scenario.state_space.n_own
+    groups, n_own = scenario.groups, scenario.state_space.n_own
     wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
         f"states of agent {i}": (prediction.states(i, joint_actions), (m, d)) for i in range(n)
     }
@@ -85,7 +85,7 @@ def _wrong_groups(
     scenario: Scenario, prediction: Any, joint_actions: IntArray, states: FloatArray
 ) -> Iterator[str]:
     """Yield where the prediction of all agents at once differs from that of each."""
-    groups = groups_of(scenario)
+    groups = scenario.groups
     own, shared = states_by_group(prediction, joint_actions, groups, scenario.state_space.n_own)
     body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     wrong = differs(scenario, np.concatenate([own, shared[body]], axis=2), states)
@@ -102,7 +102,7 @@ def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator)
         return
     indices = np.sort(rng.choice(count, min(count, SAMPLED), replace=False))
     joint_actions = np.stack(np.unravel_index(indices, (n_actions,) * n), axis=-1)
-    for group in groups_of(scenario):
+    for group in scenario.groups:
         divisor = n_actions ** (n - 1 - group[-1])
         for agent in group:
             blocks, which = prediction.blocks(agent), f"blocks of agent {agent}:"
@@ -186,7 +186,7 @@ def faults_of_sharing(scenario: Scenario, states: FloatArray) -> Iterator[str]:
     """
     space = scenario.state_space
     names = [variable.name for variable in space.variables]
-    shared = [(group, names[space.n_own :], "shared by a group") for group in groups_of(scenario)]
+    shared = [(group, names[space.n_own :], "shared by a group") for group in scenario.groups]
     for agents, claimed, claim in [*shared, (range(len(states)), space.common, "common")]:
         first, columns = agents[0], [names.index(name) for name in claimed]
         wrong = differs(scenario, states[list(agents)], states[[first]])[..., columns]
@@ -207,7 +207,7 @@ def _own_variable_moved(
     """
     space = scenario.state_space
     drawn = rng.integers(len(scenario.action_set), size=joint_actions.shape)
-    for group in groups_of(scenario) if space.n_own else ():
+    for group in scenario.groups if space.n_own else ():
         changed = drawn.copy()
         changed[:, list(group)] = joint_actions[:, list(group)]
         for agent in group:

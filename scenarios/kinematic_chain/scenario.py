@@ -16,8 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.scenario import SUCCESS, Measure, Transition
-from ...core.interface.spaces import ActionSet, BestResponses, Exploring, first_alike
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.prediction import BestResponses, Exploring, first_alike
+from ...core.interface.scenario import Transition
+from ...core.interface.spaces import ActionSet
 from ...core.numerics import FloatArray, IntArray
 from ...core.rules.rule_base import RuleBase
 from ..faults.settings import Failures

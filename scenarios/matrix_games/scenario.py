@@ -36,7 +36,8 @@ from pydantic import AfterValidator, Field
 
 from ...core.agents.loop import EpisodeSummary
 from ...core.agents.team import Team
-from ...core.interface.scenario import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.settings import ScenarioSettings, closest

@@ -24,7 +24,8 @@ import numpy as np
 from pydantic import Field
 
 from ...core.coordination.graphs import Elimination, Shape, shaped
-from ...core.interface.scenario import Measure, Transition
+from ...core.interface.measures import Measure
+from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings

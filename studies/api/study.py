@@ -24,7 +24,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core.interface.scenario import SUCCESS, Actors, Scenario, can_draw
+from ...core.interface.measures import SUCCESS
+from ...core.interface.scenario import Actors, Scenario, can_draw
 from ...core.numerics import pd
 from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources

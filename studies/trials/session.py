@@ -16,16 +16,9 @@ import numpy as np
 
 from ...core.agents.loop import StepRecord, control_loop, policy_seed, world_seed
 from ...core.agents.team import Team, of_fuzzy_agents
-from ...core.interface.scenario import (
-    Actors,
-    EpisodeRecorder,
-    Measure,
-    RecordedScenario,
-    Scenario,
-    carried_rows,
-    lacking,
-    measures_of,
-)
+from ...core.interface.measures import Measure, measures_of
+from ...core.interface.recording import EpisodeRecorder
+from ...core.interface.scenario import Actors, RecordedScenario, Scenario, carried_rows, lacking
 from ...core.learners import LearnerSettings, TeamSettings, check_prediction
 from ...core.numerics import IntArray
 from ...core.plugins.sources import format_error, place
@@ -178,7 +171,9 @@ def check(
         for condition in conditions:
             where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
             try:
-                measures += [measures_of(there.world) for there in _arrangements(condition)]
+                measures += [
+                    measures_of(there.world.measures) for there in _arrangements(condition)
+                ]
                 if spec.keep_teams:
                     _check_saved(condition.settings)
             except ValueError as error:
@@ -279,7 +274,7 @@ class Session:
         self.world, self.scenario, self.team = self._own
         self._stages = trial.curriculum  # those that the team has not gone through
         self._rows: list[EpisodeRow] = []
-        self._measures = measures_of(self.world)
+        self._measures = measures_of(self.world.measures)
         self._recordings: dict[str, Recording] = {}
         self._watch = Stopwatch()
         self.deciding = self._watch.decisions
@@ -417,7 +412,7 @@ class Session:
         The number of an episode in its row is counted from `counted_from`. If nobody needs to see
         the steps, whole episodes may be run `at_once`, compiled.
         """
-        measures = measures_of(there.world)
+        measures = measures_of(there.world.measures)
         self._measures = joined((self._measures, measures))
         if at_once and self._at_once(there, phase, counted_from, **loop):
             return

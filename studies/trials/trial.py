@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...core.interface.scenario import Measure, Scenario, Transition
+from ...core.interface.measures import Measure
+from ...core.interface.scenario import Scenario, Transition
 from ...core.plugins.sources import Sources, named
 from ..errors import SpecError
 from ..spec.conditions import ConditionSettings, Stage

@@ -14,7 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.spaces import ActionSet, Blocks, first_alike
+from ....core.interface.prediction import Blocks, first_alike
+from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
 from ..states.state_spaces import BoxStateSpace

@@ -18,7 +18,6 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.agents.team import of_fuzzy_agents
-from ....core.interface.scenario import groups_of
 from ....core.numerics import FloatArray, pd
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, shared
 from ...results.results import Results, Sizes
@@ -64,7 +63,7 @@ def measure(trial: Trial) -> TrialResult:
     hierarchy = team.hierarchy
     tried = team.evaluator.counts.joint_actions if team.evaluator is not None else 0
     numbers = {
-        "robots": float(len(groups_of(session.world))),
+        "robots": float(len(session.world.groups)),
         "agents": float(len(hierarchy)),
         "messages": float(hierarchy.messages),
         "joint_actions": tried / len(session.deciding),

@@ -357,7 +357,7 @@ def _of_spec(path: str) -> list[HierarchyView] | None:
         return None  # whoever reads it as a topology says why
     if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
         return None
-    from ....core.interface.scenario import groups_of
+
     from ....topologies.view import HierarchyView
     from ...spec.spec import Spec
 
@@ -370,7 +370,7 @@ def _of_spec(path: str) -> list[HierarchyView] | None:
                 with refused(after=f" (condition {label!r})"):
                     scenario, hierarchy = settings.arrange(settings.scenario.build())
                 own, failures = len(scenario.action_set), settings.topology.failures
-                shown = HierarchyView(label, hierarchy, groups_of(scenario), own, failures)
+                shown = HierarchyView(label, hierarchy, scenario.groups, own, failures)
                 parts = hierarchy.told, hierarchy.considers, failures, own
                 distinct.setdefault((hierarchy.agents, hierarchy.edges, *parts), shown)
     return list(distinct.values())
