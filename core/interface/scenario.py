@@ -196,10 +196,21 @@ class Scenario(ABC):
         """Return what is kept once an episode: numbers, texts, arrays."""
         return {}
 
-    def show_policy(self, choose: Callable[[Prediction], IntArray]) -> PolicyMap | None:
-        """Return what those do who choose so by a prediction; None: it shows no policies.
+    def show_policy(
+        self,
+        choose: Callable[[Prediction], IntArray],
+        predict: Callable[[], Prediction | None],
+    ) -> PolicyMap | None:
+        """Return what those do who choose and predict so; None: it shows no policies.
 
         The scenario begins another episode.
+
+        Parameters
+        ----------
+        choose
+            Returns the joint action ``(n,)`` that they choose by a prediction.
+        predict
+            Returns what they predict from the scenario's present state.
 
         Raises
         ------

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...core.interface.measures import Measure
+from ...core.interface.plain import as_scenario
 from ...core.interface.scenario import Scenario, Transition
 from ...core.plugins.sources import Sources, named
 from ..errors import SpecError
@@ -264,8 +265,7 @@ class Trial:
     def world(self) -> Scenario:
         """Return its scenario as the settings describe it, built anew."""
         with self.sources.active():
-            built: Scenario = self.settings.scenario.build()
-        return built
+            return as_scenario(self.settings.scenario.build())
 
     @property
     def planned(self) -> Planned:
