@@ -263,11 +263,12 @@ class Bare:
             setattr(self, name, getattr(prediction, name))
 
 
-def capabilities(prediction) -> set[str]:
+def capabilities(prediction, n: int) -> set[str]:
     """What a prediction knows beside next states."""
     tables = prediction.tables()
+    joint = np.zeros((1, n), dtype=int)
     known = {
-        "rewards": prediction.rewards(np.zeros((1, 2), dtype=int)) is not None,
+        "rewards": prediction.rewards(joint) is not None,
         "blocks": tables is not None,
         "reward_table": tables is not None and tables.rewarded,
     }
@@ -289,7 +290,8 @@ def test_predictions_can_do_what_the_scenarios_can(
         scenario = join_agents(line_world(2, 1), agents)
         scenario.reset(0)
         plain = as_prediction(Bare(scenario.scenario.predict(), *names))
-        assert capabilities(JointPrediction(plain, scenario)) == expected
+        found = JointPrediction(plain, scenario)
+        assert capabilities(found, len(scenario.agents)) == expected
 
 
 def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
