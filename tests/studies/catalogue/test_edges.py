@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, SEEDS, Arrays, shapes
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import edges as module
 from nested_agents.studies.catalogue.edges import TRAINED, analyse, check, draw, measure
 from nested_agents.studies.catalogue.hierarchies import DECIDING
@@ -115,8 +116,8 @@ def test_the_same_team_acts_as_if_it_had_been_built_under_the_other_hierarchy() 
 
 
 def test_the_specs_can_be_run() -> None:
-    folder = Path(module.__file__).parent
-    for path in sorted(folder.glob("*.toml")):
+    own = Path(module.__file__).parent / "edges.toml"
+    for path in (own, *sorted((SPECS / "edges").glob("*.toml"))):
         spec = Spec.load(path)
         check(spec)
         assert len(spec.seeds) >= 5

@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, SEEDS, Arrays, games
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import fit as module
 from nested_agents.studies.catalogue.fit import analyse, check, draw, measure
 from nested_agents.studies.catalogue.study import drawn
@@ -42,9 +43,12 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     assert drawn(module, analyse(NOTHING)) == {}
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.toml")))
-def test_every_spec_can_be_run(name: str) -> None:
-    check(Spec.load(FOLDER / f"{name}.toml"))
+PATHS = [FOLDER / "fit.toml", *sorted((SPECS / "fit").glob("*.toml"))]
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+def test_every_spec_can_be_run(path: Path) -> None:
+    check(Spec.load(path))
 
 
 def test_a_study_without_a_condition_of_no_edges_is_refused() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import peers as module
-from nested_agents.studies.catalogue import wheel_failure
 from nested_agents.studies.catalogue.peers import analyse, check, draw, measure, stops
 from nested_agents.studies.catalogue.study import drawn, load_study
 from nested_agents.studies.errors import SpecError
@@ -19,7 +19,7 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 
-SPECS = sorted(Path(wheel_failure.__file__).parents[1].glob("peers/*.toml"))
+PATHS = [Path(module.__file__).parent / "peers.toml", *sorted((SPECS / "peers").glob("*.toml"))]
 SEEDS = 10
 
 
@@ -92,6 +92,6 @@ def test_studies_of_rule_bases_refuse_peers_before_they_begin(study: str, tmp_pa
     assert "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 def test_specs(path: Path) -> None:
     assert all(c.settings.learner.kind for c in Spec.load(path).conditions())

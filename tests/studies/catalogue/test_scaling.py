@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, Arrays, scaling
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
 from nested_agents.studies.catalogue.study import drawn
@@ -105,8 +106,9 @@ def test_a_trial_is_measured_without_being_changed() -> None:
 
 
 def test_the_spec_reaches_from_2_to_64_robots() -> None:
-    folder = Path(module.__file__).parent
-    specs = [Spec.load(folder / f"{name}.toml") for name in ("costs", "scaling", "crowds")]
+    own = Path(module.__file__).parent / "scaling.toml"
+    paths = (SPECS / "scaling" / "costs.toml", own, SPECS / "scaling" / "crowds.toml")
+    specs = list(map(Spec.load, paths))
     for reached, sizes in ((specs[:1], {2, 4, 8, 16}), (specs[1:], {2, 4, 8, 16, 32, 64})):
         conditions = [condition for spec in reached for condition in spec.conditions()]
         assert sizes <= {c.settings.scenario.robots for c in conditions}
