@@ -11,7 +11,7 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import click
@@ -24,7 +24,9 @@ IN_ASCII = "nested-agents-ascii"
 """Name of the error handler of the streams: a terminal that lacks dashes shows ``-`` for them."""
 
 PUBLISHED = "...results.commands"
-"""Module of the commands on what has been published, which the repository has, and no package."""
+"""Module of the commands on what has been published."""
+RESULTS = Path(__file__).parents[2] / "results"
+"""Where that is in a checkout; an installed package does not have it."""
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": (".commands.running", "Train two e-Pucks to push a box: table, figures and replay."),
     "run": (".commands.running", "Run the study of a spec, or continue it."),
@@ -56,7 +58,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
 def load_command(name: str) -> click.Command | None:
     """Return one of `COMMANDS`; None if the repository has it, and this is an installed package."""
     place = COMMANDS[name][0]
-    if place == PUBLISHED and find_spec(place.rpartition(".")[0], __package__) is None:
+    if place == PUBLISHED and not RESULTS.is_dir():
         return None
     command: click.Command = getattr(import_module(place, __package__), name)
     return command

@@ -250,8 +250,10 @@ def test_options_that_run_need_a_directory(capsys) -> None:
 
 
 @pytest.mark.parametrize("command", ["claims", "benchmark"])
-def test_an_installed_package_says_where_the_results_are(command, capsys, monkeypatch) -> None:
-    monkeypatch.setattr("nested_agents.studies.cli.main.find_spec", lambda *_: None)
+def test_an_installed_package_says_where_the_results_are(
+    command, tmp_path, capsys, monkeypatch
+) -> None:
+    monkeypatch.setattr("nested_agents.studies.cli.main.RESULTS", tmp_path / "results")
     assert main([command]) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
