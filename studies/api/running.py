@@ -127,7 +127,7 @@ def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
     """
     measures = check(spec, may_fail=may_fail)
     with spec.sources.active():
-        getattr(load_study(spec.study), "check", lambda spec: None)(spec)
+        load_study(spec.study).check(spec)
     return measures
 
 

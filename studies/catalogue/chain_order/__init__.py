@@ -45,14 +45,15 @@ def analyse(results: Results) -> Analysis:
 
 def equivalence(group: Group) -> str:
     """Return whether the orders of a group are equal but for `MARGIN`, in words."""
-    lows, highs = zip(*((d.estimate.low, d.estimate.high) for d in group.differences), strict=True)
-    low, high = min(lows), max(highs)
+    low = min(float(d.estimate.low) for d in group.differences)
+    high = max(float(d.estimate.high) for d in group.differences)
     if any(d.p < LEVEL for d in group.differences):
         verdict = "the order matters"
     else:
         verdict = "equal" if max(-low, high) <= MARGIN else "not decided"
+    orders = len(group.differences) + 1
     ends = f"{two_figures(low)} to {two_figures(high)}"
-    return f"{group.setting}, {len(lows) + 1} orders, within {MARGIN:g}: {verdict} ({ends})"
+    return f"{group.setting}, {orders} orders, within {MARGIN:g}: {verdict} ({ends})"
 
 
 class OrderTest(NamedTuple):
@@ -83,14 +84,15 @@ class OrderTest(NamedTuple):
 def order_tests(results: Results) -> tuple[OrderTest, ...]:
     """Return the tests of all orders together, one for each measure that all of them have."""
     conditions = results.of_phase("training")
-    made = []
+    tests = []
     for title, phase in phases_of(results).items() if len(conditions) > 1 else ():
         means = [results.means(condition, phase) for condition in conditions]
         values = np.stack(shared(means), axis=1)
         if len(values) >= 2:
-            made.append((title, len(conditions), len(values), friedman(values)))
-    ps = holm([test.p for *_, test in made])
-    return tuple(OrderTest(*own, float(p)) for own, p in zip(made, ps, strict=True))
+            test = friedman(values)
+            tests.append(OrderTest(title, len(conditions), len(values), test, test.p))
+    adjusted = holm([test.p for test in tests])
+    return tuple(test._replace(p=float(p)) for test, p in zip(tests, adjusted, strict=True))
 
 
 def shortened(orders: Sequence[str]) -> list[str]:

@@ -86,7 +86,7 @@ def test_studies_of_rule_bases_refuse_peers_before_they_begin(study: str, tmp_pa
     path = tmp_path / "spec.toml"
     path.write_text(f'study = "{study}"\n[learner]\nkind = "ppo"\n')
     with pytest.raises(SpecError, match=rf"'ppo': {study} needs agents with rule bases") as raised:
-        load_study(study).check(Spec.load(path))  # type: ignore[attr-defined]
+        load_study(study).check(Spec.load(path))
     assert "allowed batch-td, " in str(raised.value)
     assert "ippo" not in str(raised.value)
     assert "\n" not in str(raised.value)
