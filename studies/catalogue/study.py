@@ -126,7 +126,7 @@ def check_rule_bases(spec: Spec, why: str) -> None:
             )
 
 
-def analysed(name: str, results: Results) -> Any:
+def analyse_as(name: str, results: Results) -> Any:
     """Return what a study makes of results, which may be those of another study.
 
     Raises
@@ -149,7 +149,7 @@ def analysed(name: str, results: Results) -> Any:
     return analysis
 
 
-def published_part(name: str, results: Results) -> Results:
+def select_published(name: str, results: Results) -> Results:
     """Return what a study's results are published with, see `PUBLISHED` and `TIMED` above."""
     study = load_study(name)
     measures = results.measures
@@ -175,7 +175,7 @@ def system_of(results: Results, condition: str) -> tuple[str, dict[str, object]]
     return name, {key: value for key, value in columns.items() if value != ""}
 
 
-def drawn(study: Study, analysis: Any) -> Figures:
+def draw_figures(study: Study, analysis: Any) -> Figures:
     """Return the figures of an analysis by name, as all figures look; none of an empty table."""
     from ..presentation.figures import styled  # matplotlib takes its time
 
@@ -183,6 +183,6 @@ def drawn(study: Study, analysis: Any) -> Figures:
         return study.draw(analysis) if analysis.table else {}
 
 
-def measured(trial: Trial) -> TrialResult:
+def measure_by_name(trial: Trial) -> TrialResult:
     """Run a trial by the study that it names; imported by name in worker processes."""
     return load_study(trial.study).measure(trial)

@@ -37,7 +37,7 @@ def analyse(results: Results) -> Analysis:
         groups = [group for group in by_order.groups if group.differences]
         notes = (*map(equivalence, groups), *by_order.notes)
         return Analysis(by_order.table, notes, (), {g.setting: g.differences for g in groups})
-    compared = ablation.compared_with_first(results, shortened(conditions))
+    compared = ablation.compared_with_first(results, shorten_orders(conditions))
     tests = order_tests(results)
     notes = (*(test.verdict for test in tests), *compared.notes, *_legend(conditions))
     return replace(compared, notes=notes, cases=tests)
@@ -95,14 +95,14 @@ def order_tests(results: Results) -> tuple[OrderTest, ...]:
     return tuple(test._replace(p=float(p)) for test, p in zip(tests, adjusted, strict=True))
 
 
-def shortened(orders: Sequence[str]) -> list[str]:
+def shorten_orders(orders: Sequence[str]) -> list[str]:
     """Return labels of orders with agents by number, as in the first one that names them.
 
     Examples
     --------
-    >>> shortened(("chain:r1.a,r1.b", "chain:r1.b,r1.a"))
+    >>> shorten_orders(("chain:r1.a,r1.b", "chain:r1.b,r1.a"))
     ['1 2', '2 1']
-    >>> shortened(("chain", "chain:reversed"))
+    >>> shorten_orders(("chain", "chain:reversed"))
     ['chain', 'reversed']
     """
     named = [order.removeprefix("chain:").split(",") for order in orders]

@@ -57,15 +57,15 @@ def analyse(results: Results) -> Analysis:
             optimal[int(steps[0, 0])] = rate(results.success(condition, AFTER_ONE))
         optimal[int(steps[0].sum())] = rate(results.success(condition, "evaluation"))
         cases.append(Case(system, setting, optimal))
-        estimates = {titled(plays): estimate for plays, estimate in optimal.items()}
+        estimates = {title_of(plays): estimate for plays, estimate in optimal.items()}
         table.append(Summary(condition, len(steps), estimates))
     return Analysis(tuple(table), tuple(_side_by_side(cases)), cases)
 
 
-def titled(plays: int) -> str:
+def title_of(plays: int) -> str:
     """Return the title of an estimate.
 
-    >>> titled(5000)
+    >>> title_of(5000)
     'optimal, 5,000 plays'
     """
     return f"optimal, {plays:,} plays"

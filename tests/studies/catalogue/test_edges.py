@@ -9,7 +9,7 @@ from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import edges as module
 from nested_agents.studies.catalogue.edges import TRAINED, analyse, check, draw, measure
 from nested_agents.studies.catalogue.hierarchies import DECIDING
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -47,7 +47,7 @@ def test_every_hierarchy_is_compared_with_that_of_training() -> None:
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(made_up().frames())), tmp_path)
     assert [path.name for path in paths] == ["differences.png", "differences.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 def test_the_legend_fits_a_narrow_figure() -> None:

@@ -6,7 +6,7 @@ from made_up_results import NOTHING, SEEDS, Arrays, games
 from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import fit as module
 from nested_agents.studies.catalogue.fit import analyse, check, draw, measure
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -40,7 +40,7 @@ def test_edges_are_compared_with_none_in_their_game() -> None:
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(made_up().frames())), tmp_path)
     assert [path.name for path in paths] == ["fit.png", "fit.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 PATHS = [FOLDER / "fit.toml", *sorted((SPECS / "fit").glob("*.toml"))]

@@ -12,7 +12,7 @@ from made_up_results import NOTHING, Arrays
 from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import peers as module
 from nested_agents.studies.catalogue.peers import analyse, check, draw, measure, stops
-from nested_agents.studies.catalogue.study import drawn, load_study
+from nested_agents.studies.catalogue.study import draw_figures, load_study
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -60,7 +60,7 @@ def test_success_against_experience_and_time(tmp_path: Path) -> None:
     assert max(len(line) for note in analysis.notes for line in note.splitlines()) <= 80
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["peers.png", "peers.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 def test_evaluations_on_the_way_leave_no_trace() -> None:

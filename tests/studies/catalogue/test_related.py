@@ -7,7 +7,7 @@ from made_up_results import NOTHING, Arrays
 from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import related as module
 from nested_agents.studies.catalogue.related import analyse, check, draw, measure
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.results.results import Results
@@ -60,7 +60,7 @@ def test_it_is_tabulated_and_drawn(results: Results, tmp_path: Path) -> None:
     assert list(analysis.table[0].estimates)[:3] == ["evaluation success", "decisions", "ms"]
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["related.png", "related.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize("name", ["climbing", "arms", "boxes"])

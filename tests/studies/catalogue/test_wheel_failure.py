@@ -7,7 +7,7 @@ from made_up_results import NOTHING, wheel_failure
 
 from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import wheel_failure as module
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.catalogue.wheel_failure import (
     AT_END,
     KEPT,
@@ -108,7 +108,7 @@ def test_twins_are_found_by_what_is_swept(columns: dict, faults: list | None) ->
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(wheel_failure(ENDS).frames())), tmp_path)
     assert [path.name for path in paths] == ["wheel-failure.png", "wheel-failure.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 def test_training_goes_through_the_failure_and_a_copy_keeps_its_weights() -> None:
