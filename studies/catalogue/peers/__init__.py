@@ -39,7 +39,6 @@ def stops(episodes: int) -> list[int]:
 def measure(trial: Trial) -> TrialResult:
     """Train, with evaluations on the way; imported by name in workers."""
     session = Session.compiled(trial)
-    generator = session.team.rng.bit_generator
     done = 0
     seconds = 0.0
     usage = {}
@@ -50,9 +49,8 @@ def measure(trial: Trial) -> TrialResult:
         done = count
         usage[f"{CPU}{count}"] = seconds
         if count < trial.episodes:
-            state = generator.state
-            session.evaluate(phase=f"{AFTER}{count}")
-            generator.state = state
+            with session.team.drawing_apart():
+                session.evaluate(phase=f"{AFTER}{count}")
     return session.finish(usage=usage)
 
 
