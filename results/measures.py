@@ -111,8 +111,10 @@ def contact_gained(results: Results) -> Measured | None:
 
 def cost_error(results: Results) -> Measured:
     """Compute how far the paper's two costs are from its formulas."""
-    nested, single = Problem().nested(range(4)), Problem().single_agent(4)
-    return _computed(max(nested / PAPER_NESTED - 1.0, single / PAPER_SINGLE - 1.0, key=abs))
+    problem = Problem()
+    nested = problem.nested(range(4)) / PAPER_NESTED - 1.0
+    single = problem.single_agent(4) / PAPER_SINGLE - 1.0
+    return _computed(max(nested, single, key=abs))
 
 
 def tried_beside_joint_action_learners(results: Results) -> Measured:

@@ -76,11 +76,12 @@ def analyse(results: Results) -> Analysis:
         steps = results.values(condition, "steps").astype(float)
         numbers = results.numbers(condition)
         episodes = steps.shape[1]
-        success = {
-            count: rate(results.success(condition, f"{AFTER}{count}"))
-            for count in stops(episodes)
-            if results.has(condition, f"{AFTER}{count}")
+        earlier = {
+            int(phase.removeprefix(AFTER)): rate(results.success(condition, phase))
+            for phase in results.phases
+            if phase.startswith(AFTER) and results.has(condition, phase)
         }
+        success = dict(sorted(earlier.items()))
         estimates = {f"success, {count}": estimate for count, estimate in success.items()}
         estimates |= evaluated(results, condition)
         estimates["decisions"] = bootstrap(steps.sum(axis=1), bounds=NOT_NEGATIVE)
