@@ -5,7 +5,6 @@ commands and modules. Little on these pages is written by hand: what columns of 
 """
 
 from collections.abc import Iterable, Iterator
-from importlib import import_module
 from pathlib import Path
 
 import click
@@ -18,7 +17,7 @@ from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLE
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
-from nested_agents.studies.cli.main import COMMANDS
+from nested_agents.studies.cli.main import COMMANDS, load_command
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.results.results import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
 from nested_agents.studies.spec.keys import tables
@@ -84,7 +83,10 @@ MODULES = {
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
         "results.power", "results.contrasts", "results.published", "catalogue.study",
-        "cost.cost", "cost.table", "claims.claims",
+        "cost.cost", "cost.table",
+    )),
+    "results": ("What has been published, and what is said of it.", (
+        "claims", "measures", "push_n",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""
@@ -225,8 +227,8 @@ def commands() -> Iterator[str]:
     yield from table(
         ("command", "purpose"), ((f"[`{n}`](#{n})", t) for n, (_, t) in COMMANDS.items())
     )
-    for name, (module, _) in COMMANDS.items():
-        command = getattr(import_module(f"nested_agents.studies.cli.commands.{module}"), name)
+    for name in COMMANDS:
+        command = load_command(name)
         yield f"## {name}\n"
         if isinstance(command, click.Group):
             for below, one in command.commands.items():

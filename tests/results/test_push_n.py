@@ -11,15 +11,14 @@ import pytest
 
 import nested_agents as na
 from nested_agents.core.agents.loop import world_seed
+from nested_agents.results import commands, push_n
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
-from nested_agents.studies.benchmark import push_n
-from nested_agents.studies.cli.commands import committed
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 
 pytestmark = pytest.mark.usefixtures("entries_read_once")
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 TEAM = {"robots": 2, "success": ["1" * 10] * 5, "steps": [[9] * 10] * 5, "decisions": [90] * 5}
 ENTRY = {"name": "mine", "about": "by hand", "given": "nothing", "teams": [TEAM]}
 
@@ -47,7 +46,7 @@ def test_entries_by_number_of_robots(entry: Any, capsys: pytest.CaptureFixture[s
 
 def test_published_rows_are_entries() -> None:
     ours = push_n.committed_entries()[0]
-    published = na.load(ROOT / "studies/claims/published/scaling.json").results
+    published = na.load(ROOT / "results/rows/scaling.json").results
     assert [team.robots for team in ours.teams] == list(push_n.SIZES)
     assert ours.teams[0].success[0] == "".join(
         str(int(reached)) for reached in published.success("2", "evaluation")[0]
@@ -161,5 +160,5 @@ def test_a_learner_of_another_library_is_entered(
 
 
 def test_the_command_offers_what_entries_may_be() -> None:
-    assert tuple(map(int, committed.sizes.choices)) == push_n.SIZES
-    assert tuple(committed.given.choices) == get_args(push_n.Entry.model_fields["given"].annotation)
+    assert tuple(map(int, commands.sizes.choices)) == push_n.SIZES
+    assert tuple(commands.given.choices) == get_args(push_n.Entry.model_fields["given"].annotation)

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import pytest
 
-from nested_agents.studies.claims import claims
+from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import main
 
 
 def print_table(name: str, columns: Sequence[str], capsys: pytest.CaptureFixture[str]) -> str:
     """Return columns of the table of published results, in Markdown."""
-    path = claims.PUBLISHED / f"{name}.json"
+    path = ROWS / f"{name}.json"
     assert main(["table", str(path), "--columns", *columns, "--format", "markdown"]) == 0
     return capsys.readouterr().out

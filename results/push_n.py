@@ -16,31 +16,42 @@ import json
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import ConfigDict, Field, model_validator
 
-from ...core.agents.loop import world_seed
-from ...core.plugins.settings import Settings, tuples
-from ...scenarios.box_pushing.config import BoxPushingSettings
-from ..api.study import run
-from ..claims.claims import PUBLISHED
-from ..errors import SpecError
-from ..results import published
-from ..results.analysis import Summary
-from ..results.results import Results
-from ..results.statistics import NOT_NEGATIVE, bootstrap, rate
-from ..spec.spec import Spec
-from ..trials.session import EVALUATION_WORLDS
+from ..core.agents.loop import world_seed
+from ..core.numerics import FloatArray
+from ..core.plugins.settings import Settings, tuples
+from ..scenarios.box_pushing.config import BoxPushingSettings
+from ..studies.api.study import run
+from ..studies.errors import SpecError
+from ..studies.results import published
+from ..studies.results.analysis import Summary
+from ..studies.results.results import Results
+from ..studies.results.statistics import NOT_NEGATIVE, bootstrap, rate
+from ..studies.spec.spec import Spec
+from ..studies.trials.session import EVALUATION_WORLDS
+from . import ROWS
 
-SIZES = (2, 4, 8, 16, 32, 64)
+if TYPE_CHECKING:
+    from ..scenarios.box_pushing.environments import BoxPushingEnv
+
+Size = Literal[2, 4, 8, 16, 32, 64]
+SIZES: tuple[int, ...] = get_args(Size)
 """Numbers of robots."""
-EPISODES, STEPS, LEAST_SEEDS = 10, 450, 5
-"""Episodes of evaluation, the most decisions of an episode, and the fewest seeds."""
+EPISODES = 10
+"""Episodes of evaluation."""
+STEPS = 450
+"""The most decisions of an episode."""
+LEAST_SEEDS = 5
+"""The fewest seeds."""
 FREE = ("state_space", "predictor", "belief", "prediction_horizon", "reward", "speed_increment")
 """Keys of the scenario that an entry may choose."""
 
+Given = Literal["nothing", "predictor", "predictor and reward"]
 Outcomes = Annotated[str, Field(pattern=f"^[01]{{{EPISODES}}}$")]
 Steps = Annotated[int, Field(ge=1, le=STEPS)]
 
@@ -53,7 +64,7 @@ class TeamScores(Settings):
 
     model_config = EXPLAINED
 
-    robots: Literal[SIZES]  # type: ignore[valid-type]
+    robots: Size
     """How many there are."""
     success: Annotated[tuple[Outcomes, ...], Field(min_length=LEAST_SEEDS)]
     """The episodes of evaluation: 1 where the box was brought to its goal, else 0."""
@@ -84,7 +95,7 @@ class Entry(Settings):
     """What tables call it."""
     about: Annotated[str, Field(min_length=1)]
     """How it learns, in a line."""
-    given: Literal["nothing", "predictor", "predictor and reward"]
+    given: Given
     """What it is given of the world, beside what its agents perceive."""
     teams: Annotated[tuple[TeamScores, ...], Field(min_length=1)]
     """Its results, by number of robots."""
@@ -107,19 +118,16 @@ def load_entry(path: Path) -> Entry:
 
 
 def committed_entries() -> list[Entry]:
-    """Return the entries whose rows are committed, see ``push_n.toml``; none but in a checkout."""
-    if not PUBLISHED.is_dir():
-        return []
-    entries = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-    for entry in entries["entries"]:
+    """Return the entries whose rows are committed, see ``push_n.toml``."""
+    table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    for entry in table["entries"]:
         entry["teams"] = tuple(
-            team_of(published.load(PUBLISHED / row.pop("file")).results, **row)
-            for row in entry["teams"]
+            team_of(published.load(ROWS / row.pop("file")).results, **row) for row in entry["teams"]
         )
-    return [Entry(**entry) for entry in entries["entries"]]
+    return [Entry(**entry) for entry in table["entries"]]
 
 
-def team_of(results: Results, robots: int, condition: str, phase: str = "evaluation") -> Any:
+def team_of(results: Results, robots: int, condition: str, phase: str = "evaluation") -> TeamScores:
     """Return the trials of a condition as the part of an entry, by an evaluation of them."""
     outcomes = results.success(condition, phase).astype(int)
     stages = [p for p in results.phases if p.startswith("training") and results.has(condition, p)]
@@ -132,7 +140,9 @@ def team_of(results: Results, robots: int, condition: str, phase: str = "evaluat
     )
 
 
-def run_spec(path: Path, out: Path, robots: Sequence[int], seeds: int, jobs: int | None) -> Any:
+def run_spec(
+    path: Path, out: Path, robots: Sequence[int], seeds: int, jobs: int | None
+) -> tuple[TeamScores, ...]:
     """Return what the one condition of a spec does, trained anew with each number of robots.
 
     Raises
@@ -159,7 +169,9 @@ def run_spec(path: Path, out: Path, robots: Sequence[int], seeds: int, jobs: int
     )
 
 
-def evaluate(policy: Callable[[Any], Any], env: Any, seed: int) -> tuple[str, tuple[int, ...]]:
+def evaluate(
+    policy: Callable[[FloatArray], ArrayLike], env: "BoxPushingEnv", seed: int
+) -> tuple[str, tuple[int, ...]]:
     """Return success and steps of a seed, as `TeamScores` has them.
 
     Parameters
@@ -171,15 +183,18 @@ def evaluate(policy: Callable[[Any], Any], env: Any, seed: int) -> tuple[str, tu
     seed
         Whose worlds they are.
     """
-    success, steps = "", list[int]()
+    success = ""
+    steps: list[int] = []
     for k in range(EPISODES):
         world = world_seed(seed, EVALUATION_WORLDS + k)
         observation, _ = env.reset(options={"world": world})
-        reached = over = False
-        steps.append(0)
-        while not over:
+        reached = False
+        truncated = False
+        count = 0
+        while not (reached or truncated):
             observation, _, reached, truncated, _ = env.step(policy(observation))
-            steps[-1], over = steps[-1] + 1, reached or truncated
+            count += 1
+        steps.append(count)
         success += str(int(reached))
     return success, tuple(steps)
 
@@ -196,11 +211,12 @@ def table_of(entries: Iterable[Entry], measure: str) -> list[Summary]:
     """
     lines = []
     for entry in entries:
-        cells = {
-            f"{team.robots} robots": rate([list(map(int, row)) for row in team.success])
-            if measure == "success"
-            else bootstrap(team.decisions, bounds=NOT_NEGATIVE)
-            for team in entry.teams
-        }
+        cells = {}
+        for team in entry.teams:
+            if measure == "success":
+                value = rate([list(map(int, row)) for row in team.success])
+            else:
+                value = bootstrap(team.decisions, bounds=NOT_NEGATIVE)
+            cells[f"{team.robots} robots"] = value
         lines.append(Summary(entry.name, min(len(team.success) for team in entry.teams), cells))
     return lines

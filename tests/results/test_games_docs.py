@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from nested_agents.results import ROWS
 from nested_agents.studies.catalogue.games import analyse
-from nested_agents.studies.claims import claims
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
@@ -18,7 +18,7 @@ GRAPHS = (DOCS / "coordination_graphs.md").read_text(encoding="utf-8")
 
 
 def games():
-    return analyse(published.load(claims.PUBLISHED / "games.json").results)
+    return analyse(published.load(ROWS / "games.json").results)
 
 
 @pytest.mark.parametrize("text", [GAMES, GRAPHS], ids=["games", "coordination graphs"])

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.studies.claims import claims
+from nested_agents.results import ROWS, SPECS
+from nested_agents.results.commands import CATALOGUE
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import check
@@ -26,7 +27,8 @@ def test_commands_name_specs_that_can_be_built(path: str) -> None:
 
 def test_specs_that_are_named_exist() -> None:
     named = set(re.findall(r"\w+/\w+\.toml", TEXT))
-    assert [path for path in named if not (ROOT / "studies/catalogue" / path).exists()] == []
+    folders = (SPECS, CATALOGUE)
+    assert [p for p in named if not any((folder / p).exists() for folder in folders)] == []
 
 
 @pytest.mark.parametrize(
@@ -40,7 +42,7 @@ def test_specs_that_are_named_exist() -> None:
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(claims.PUBLISHED / f"{name}.json")
+    path = str(ROWS / f"{name}.json")
     assert main(["table", path, "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in TEXT, f"docs/related.md: put in\n{table}"

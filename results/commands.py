@@ -1,20 +1,27 @@
-"""Commands on committed results: claims of a paper, and entries of the benchmark push-n."""
+"""Commands on published results: claims of a paper, and entries of the benchmark push-n."""
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import get_args
 
 import click
 
-from ....core.plugins.settings import closest
-from ...api.study import run as run_study
-from ...claims.claims import PAPERS, PUBLISHED, QUICK, SPECS, judge, print_claims, studies_of
-from ...errors import SpecError
-from ...presentation.progress import Terminal, say
-from ...results import published
-from ...store import durable
-from .. import options
-from ..display import print_table, print_wrapped
+from ..core.plugins.settings import closest
+from ..studies import catalogue
+from ..studies.api.study import run as run_study
+from ..studies.cli import options
+from ..studies.cli.display import print_table, print_wrapped
+from ..studies.errors import SpecError
+from ..studies.presentation.progress import Terminal, say
+from ..studies.presentation.tables import tabulate
+from ..studies.results import published
+from ..studies.store import durable
+from . import QUICK, ROWS
+from .claims import OWN, PAPERS, Format, judge, print_claims, studies_of
+from .push_n import SIZES, Entry, Given, committed_entries, load_entry, run_spec, table_of
+
+CATALOGUE = Path(catalogue.__file__).parent
+"""Where the specs of the studies are, one folder for each."""
 
 
 @click.command()
@@ -27,13 +34,13 @@ from ..display import print_table, print_wrapped
 )
 @click.option(
     "--of",
-    default="nested-agents",
+    default=OWN,
     metavar="PAPER",
     help="Whose claims: this paper's, or those of action-dependency-graphs (arXiv 2506.00797).",
 )
 @options.jobs
 @options.formats("table", "json", "markdown")
-def claims(out: Path | None, quick: bool, of: str, jobs: int | None, form: Any) -> int:
+def claims(out: Path | None, quick: bool, of: str, jobs: int | None, form: Format) -> int:
     """Print one table: each claim of a paper, its measure, the result, the verdict.
 
     Without --out the table is made from the results that are committed in the repository.
@@ -46,13 +53,8 @@ def claims(out: Path | None, quick: bool, of: str, jobs: int | None, form: Any) 
         raise SpecError(
             f"{'--quick' if quick else '--jobs'}: needs --out, where to run the studies"
         )
-    elif PUBLISHED.is_dir():
-        results = published.read(PUBLISHED, studies_of(of))
     else:
-        raise SpecError(
-            "claims: the committed results are in the repository, in studies/claims/published, "
-            "not in the installed package; with --out DIR the studies are run"
-        )
+        results = published.read(ROWS, studies_of(of))
     for study, of_study in results.items():
         if of_study.note:
             say(f"{study}: {of_study.note}")
@@ -65,7 +67,7 @@ def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, publ
     results = {}
     for study in studies_of(of):
         name = study.replace("-", "_")
-        folder = QUICK if quick else SPECS / name
+        folder = QUICK if quick else CATALOGUE / name
         ran = run_study(folder / f"{name}.toml", out / study, jobs=jobs, observer=Terminal())
         if ran.failed:
             raise SpecError(
@@ -77,8 +79,8 @@ def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, publ
 
 
 entries = click.argument("entries", type=options.PATH, metavar="ENTRY.json...", nargs=-1)
-sizes = click.Choice(["2", "4", "8", "16", "32", "64"])
-given = click.Choice(["nothing", "predictor", "predictor and reward"])
+sizes = click.Choice([str(robots) for robots in SIZES])
+given = click.Choice(get_args(Given))
 measures = click.Choice(["success", "decisions"])
 
 
@@ -97,17 +99,23 @@ def benchmark() -> None:
 @click.option("--given", type=given, default="predictor", help="What it is given of the world.")
 @options.jobs
 def run(
-    spec: Path, out: Path, robots: tuple[str, ...], seeds: int, jobs: int | None, **entry: Any
+    spec: Path,
+    out: Path,
+    robots: tuple[str, ...],
+    seeds: int,
+    name: str,
+    about: str,
+    given: str,
+    jobs: int | None,
 ) -> int:
     """Train and evaluate a spec by the rules.
 
     It has one condition. Its entry is DIR/entry.json; the same command again goes on with what is
     missing.
     """
-    from ...benchmark.push_n import Entry, run_spec
-
     teams = run_spec(spec, out, list(dict.fromkeys(map(int, robots))), seeds, jobs)
-    text = Entry(teams=teams, **entry).model_dump_json(indent=1)
+    entry = Entry(name=name, about=about, given=given, teams=teams)
+    text = entry.model_dump_json(indent=1)
     durable.write(out / "entry.json", f"{text}\n".encode())
     print(out / "entry.json")
     return 0
@@ -118,8 +126,6 @@ def run(
 @click.option("--schema", is_flag=True, help="Print the JSON schema of entries.")
 def check(entries: tuple[Path, ...], schema: bool) -> int:
     """Check the rules that a file can show."""
-    from ...benchmark.push_n import Entry, load_entry
-
     if schema:
         print(json.dumps(Entry.model_json_schema(), indent=1))
     for path in entries:
@@ -135,16 +141,13 @@ def check(entries: tuple[Path, ...], schema: bool) -> int:
 @options.form
 def table(entries: tuple[Path, ...], measure: str, form: str) -> int:
     """Print entries by number of robots: the committed ones, then others."""
-    from ...benchmark.push_n import committed_entries, load_entry, table_of
-    from ...presentation.tables import tabulate
-
-    shown = [*committed_entries(), *map(load_entry, entries)]
-    printed = tabulate(table_of(shown, measure))
+    compared = [*committed_entries(), *map(load_entry, entries)]
+    printed = tabulate(table_of(compared, measure))
     if form != "table":
         print(getattr(printed, form), end="")
         return 0
     print_table(printed)
     print()
-    for entry in shown:
+    for entry in compared:
         print_wrapped(f"{entry.name}: {entry.about}; is given {entry.given}")
     return 0

@@ -6,7 +6,7 @@ import pytest
 from published_tables import print_table
 
 import nested_agents as na
-from nested_agents.studies.claims.claims import PUBLISHED
+from nested_agents.results import ROWS, SPECS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.results.analysis import Summary
@@ -57,7 +57,7 @@ SPEEDS = {"speed [m/s]": "evaluation", "actions sampled": "evaluation:sampled ac
     ],
 )
 def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
-    results, lines = na.load(PUBLISHED / f"{name}.json").results, []
+    results, lines = na.load(ROWS / f"{name}.json").results, []
     for condition in results.of_phase("evaluation"):
         own = {t: p for t, p in phases.items() if results.has(condition, p, "total_reward")}
         each = {t: results.values(condition, "total_reward", p) for t, p in own.items()}
@@ -77,7 +77,7 @@ def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
     ],
 )
 def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixture[str]) -> None:
-    path, by = str(PUBLISHED / f"{name}.json"), ("--phase", "evaluation", "--reference", reference)
+    path, by = str(ROWS / f"{name}.json"), ("--phase", "evaluation", "--reference", reference)
     of = ("--measure", "total_reward", "--format", "markdown")
     assert main(["compare", path, *of, *by]) == 0
     table = capsys.readouterr().out
@@ -104,7 +104,7 @@ def test_specs_of_worlds_of_others_run(
 ) -> None:
     for extra in extras:
         pytest.importorskip(extra, reason="extras mpe, mujoco, peers")
-    path = ROOT / "studies" / "catalogue" / "learning_curve" / f"{spec}.toml"
+    path = SPECS / "learning_curve" / f"{spec}.toml"
     few = ["seeds=1", "episodes=2", "steps=3", "evaluation=1"]
     teams = set()
     for trial in trials_of(Spec.load(path, few)):

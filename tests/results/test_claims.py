@@ -20,10 +20,8 @@ from made_up_results import (
     wheel_failure,
 )
 
-from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies.catalogue.study import load_study
-from nested_agents.studies.claims import claims
-from nested_agents.studies.claims.claims import (
+from nested_agents.results import QUICK, ROWS, claims, commands
+from nested_agents.results.claims import (
     OWN,
     PAPERS,
     Finding,
@@ -35,7 +33,8 @@ from nested_agents.studies.claims.claims import (
     print_claims,
     within,
 )
-from nested_agents.studies.cli.commands import committed
+from nested_agents.scenarios.box_pushing.scenario import MEASURES
+from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import Results
@@ -45,9 +44,7 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.studies import STUDIES
 from nested_agents.studies.trials.session import check
 
-QUICK = Path(claims.__file__).parent / "quick"
-CATALOGUE = QUICK.parents[1] / "catalogue"
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "claims.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "claims.md"
 
 
 def found(value: float, low: float, high: float, p: float | None = None) -> Measured:
@@ -190,7 +187,7 @@ def test_few_seeds_decide_nothing() -> None:
 def spec_of(study: str, folder: Path | None = None) -> Spec:
     """The spec of a study as it comes with it, or as it stands in a folder."""
     name = study.replace("-", "_")
-    return Spec.load((folder or CATALOGUE / name) / f"{name}.toml")
+    return Spec.load((folder or commands.CATALOGUE / name) / f"{name}.toml")
 
 
 def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
@@ -237,12 +234,12 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
 
 
 def test_results_of_another_version_are_told(tmp_path: Path, capsys, monkeypatch) -> None:
-    old = claims.PUBLISHED / "chain-order.json"
+    old = ROWS / "chain-order.json"
     monkeypatch.setattr(published, "RESULTS_VERSION", 99)
     assert main(["table", str(old)]) == 0
     assert "chain-order.json: results of version 4, this is version 99" in capsys.readouterr().err
     shutil.copy(old, tmp_path)
-    monkeypatch.setattr(committed, "PUBLISHED", tmp_path)
+    monkeypatch.setattr(commands, "ROWS", tmp_path)
     assert main(["claims", "--format", "markdown"]) == 0
     assert "chain-order: results of version 4, this is version 99" in capsys.readouterr().err
 
@@ -252,16 +249,19 @@ def test_options_that_run_need_a_directory(capsys) -> None:
     assert "--quick: needs --out" in capsys.readouterr().err
 
 
-def test_an_installed_package_says_where_the_results_are(tmp_path, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(committed, "PUBLISHED", tmp_path / "published")
-    assert main(["claims"]) == 2
+@pytest.mark.parametrize("command", ["claims", "benchmark"])
+def test_an_installed_package_says_where_the_results_are(
+    command, tmp_path, capsys, monkeypatch
+) -> None:
+    monkeypatch.setattr("nested_agents.studies.cli.main.RESULTS", tmp_path / "results")
+    assert main([command]) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
-    assert "in the repository, in studies/claims/published" in err
+    assert f"{command}: is a command on published results, which are in the repository, in " in err
 
 
 def test_the_committed_results_make_the_page(capsys) -> None:
-    files = list(claims.PUBLISHED.glob("*.json"))
+    files = list(ROWS.glob("*.json"))
     assert {path.stem for path in files} == {
         *claims.studies_of(),
         "fit",
@@ -417,8 +417,8 @@ def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch)
         episodes = 10 if study == "wheel-failure" else 1
         text = TINY.format(study=study, episodes=episodes, rest=rest)
         (tmp_path / "quick" / f"{study.replace('-', '_')}.toml").write_text(text)
-    monkeypatch.setattr(committed, "QUICK", tmp_path / "quick")
-    monkeypatch.setattr(committed, "PUBLISHED", tmp_path / "published")
+    monkeypatch.setattr(commands, "QUICK", tmp_path / "quick")
+    monkeypatch.setattr(commands, "ROWS", tmp_path / "published")
     arguments = ["claims", "--quick", "--out", str(tmp_path / "out"), "--jobs", "1"]
     arguments += ["--format", "markdown"]
     assert main(arguments) == 0

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from nested_agents.studies.benchmark import push_n
+from nested_agents.results import push_n
 from nested_agents.studies.cli.main import main
 
 pytestmark = pytest.mark.usefixtures("entries_read_once")

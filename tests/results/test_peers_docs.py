@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.studies.claims import claims
+from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 
@@ -39,7 +39,7 @@ LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    path = claims.PUBLISHED / f"{name}.json"
+    path = ROWS / f"{name}.json"
     assert main(["table", str(path), "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in TEXT, f"docs/peers.md: put in\n{table}"

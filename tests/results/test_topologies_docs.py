@@ -8,8 +8,8 @@ import pytest
 from published_tables import print_table
 
 import nested_agents as na
+from nested_agents.results import ROWS
 from nested_agents.studies.catalogue.chain_order import equivalence
-from nested_agents.studies.claims.claims import PUBLISHED
 from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.statistics import two_figures
@@ -83,7 +83,7 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
 )
 def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
     for name in names:
-        for group in contrasts(na.load(PUBLISHED / f"{name}.json").results, by="topology").groups:
+        for group in contrasts(na.load(ROWS / f"{name}.json").results, by="topology").groups:
             rates = [line.estimates["success"].value for line in group.table]
             learner, orders, verdict, ends = re.findall(
                 r"(.+), (\d+) orders, within 0.1: (.+) \((.+)\)", equivalence(group)
@@ -96,7 +96,7 @@ def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
 
 def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
     fitted, ppo = (
-        contrasts(na.load(PUBLISHED / f"orders-line{own}.json").results, by="topology").table
+        contrasts(na.load(ROWS / f"orders-line{own}.json").results, by="topology").table
         for own in ("", "-ppo")
     )
     for own, other in zip(fitted, ppo, strict=True):

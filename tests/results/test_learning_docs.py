@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from published_tables import print_table
 
-from nested_agents.studies.claims import claims
+from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -44,14 +44,14 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
 
 
 def test_the_planner(capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(claims.PUBLISHED / "controls.json")
+    path = str(ROWS / "controls.json")
     choice = ["--where", "preset == 'planner'", "--columns", "evaluation success"]
     assert main(["table", path, *choice, "--format", "markdown"]) == 0
     assert capsys.readouterr().out in PAGE.read_text(encoding="utf-8")
 
 
 def test_failures_of_large_teams(capsys: pytest.CaptureFixture[str]) -> None:
-    path = claims.PUBLISHED / "large-failures.json"
+    path = ROWS / "large-failures.json"
     assert main(["table", str(path), "--columns", "just after", "end", "--format", "csv"]) == 0
     rows: dict[str, list[str]] = {}
     for row in csv.DictReader(capsys.readouterr().out.splitlines()):

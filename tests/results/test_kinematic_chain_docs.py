@@ -37,6 +37,6 @@ def test_specs_can_be_built(spec: str) -> None:
     check(Spec.parse(spec))
 
 
-@pytest.mark.parametrize("path", re.findall(r"nested-agents run (studies/\S+)", TEXT))
+@pytest.mark.parametrize("path", re.findall(r"nested-agents run ((?:studies|results)/\S+)", TEXT))
 def test_the_catalogue_has_what_it_names(path: str) -> None:
     check(Spec.load(ROOT / path))

@@ -5,32 +5,34 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.studies.claims import claims
+from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "reproduce.md").read_text(encoding="utf-8")
-ROWS = re.findall(r"^\| `([\w-]+)` \| `([\w/]+\.toml)` \| ([\d,]+) \| ([\d,]*) ?\|", TEXT, re.M)
+LINES = re.findall(
+    r"^\| `([\w-]+)` \| `([\w/]+\.toml)` \| ([\d,]+) \| ([\d,]*) ?\|", TEXT, re.MULTILINE
+)
 
 
 def test_every_published_table_has_its_row() -> None:
-    committed = sorted(path.stem for path in claims.PUBLISHED.glob("*.json"))
-    assert sorted(name for name, *_ in ROWS) == committed
+    committed = sorted(path.stem for path in ROWS.glob("*.json"))
+    assert sorted(name for name, *_ in LINES) == committed
 
 
-@pytest.fixture(scope="module", params=ROWS, ids=lambda row: row[0])
+@pytest.fixture(scope="module", params=LINES, ids=lambda row: row[0])
 def row(request: pytest.FixtureRequest) -> tuple[Path, published.Published, str, str, str]:
     """A published file, what it holds, and what the page says of it."""
     name, *said = request.param
-    path = claims.PUBLISHED / f"{name}.json"
+    path = ROWS / f"{name}.json"
     return path, published.load(path), *said
 
 
 def test_the_spec_gives_the_table(row: tuple[Path, published.Published, str, str, str]) -> None:
     _, rows, spec, trials, minutes = row
-    source = Spec.load(ROOT / "studies" / "catalogue" / spec)
+    source = Spec.load(ROOT / spec)
     assert source.study == rows.outline.study
     table = source.table()
     same = ("episodes", "steps", "evaluation")
