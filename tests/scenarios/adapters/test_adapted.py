@@ -16,6 +16,7 @@ from nested_agents.core.interface.scenario import can_draw
 from nested_agents.core.learners import check_prediction
 from nested_agents.scenarios.adapters.adapted import from_gymnasium, from_pettingzoo
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings, PettingZooSettings
+from nested_agents.scenarios.adapters.simulators import ONLY, Played
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
@@ -317,7 +318,7 @@ def test_tables_and_discrete_observations() -> None:
     world = from_gymnasium(Odd(table), variables={"x": 0, "y": "goal1", "each": ("goal0", 1)})
     assert [v.name for v in world.state_space.variables] == ["x", "y", "each"]
     observed = {"goal": np.array([0.3, -0.4]), "odds": np.array([0, 1])}
-    states = world.states_of({"": observed})
+    states = world.states_of(Played({ONLY: observed}, {}, False, False, 0))
     assert states == pytest.approx(np.array([[0.3, -0.4, 0.3], [0.3, -0.4, -0.4]]))
     named = Dict({"height": Box(0.0, 1.0, (1,)), "side": Discrete(2)})
     names = [v.name for v in from_gymnasium(Odd(named)).state_space.variables]
