@@ -118,8 +118,8 @@ def _creator_of_pettingzoo(name: str) -> Callable[..., object]:
     if creator is not None:
         return creator
     module: Any = import_module(name.replace("/", "."))
-    found: Callable[..., object] = getattr(module, "parallel_env", None) or module.env
-    return found
+    of_module: Callable[..., object] = getattr(module, "parallel_env", None) or module.env
+    return of_module
 
 
 def _registered(name: str) -> Callable[..., object] | None:

@@ -113,11 +113,31 @@ def check(source: str, steps: int, changes: tuple[str, ...]) -> int:
                 print_wrapped(warning, "warning  ", 8)
             frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
             print("", frame.to_string(index=False, na_rep="", float_format=SHORT), "", sep="\n")
-    if not faults and not source.partition(":")[0].endswith(".py"):
+    is_spec = not source.partition(":")[0].endswith(".py")
+    if not faults and is_spec:
+        faults += _report_order(source, changes, steps)
+    if not faults and is_spec:
         for label, errors in _learned_errors(source, changes, steps):
             print_wrapped(f"{label}: what {LESSONS} episodes teach to predict", "learned  ", 8)
             print("", errors.to_string(float_format=SHORT), "", sep="\n")
     return 1 if faults else 0
+
+
+def _report_order(source: str, changes: tuple[str, ...], steps: int) -> bool:
+    """Say that trials depend on what ran before them; return whether they do."""
+    from ...spec.spec import Spec
+    from ...trials.order import fault_of_order, has_programs
+    from ...trials.trial import trials_of
+
+    trials = trials_of(Spec.load(Path(source), changes))
+    if not has_programs(trials[0]):
+        return False
+    fault = fault_of_order(trials, steps)
+    if fault:
+        print(f"FAULT   order of trials: {fault}")
+    else:
+        print_wrapped("order of trials: the same rows in two orders", "passed  ", 8)
+    return bool(fault)
 
 
 def _learned_errors(
@@ -155,7 +175,7 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
         if changes:
             raise SpecError("--set: lays values over a spec, not over a Python file")
         with refused():
-            factory = active().load(source)
+            factory = _with_default_settings(source, active().load(source))
         try:
             factory()
         except (Exception, SystemExit) as error:
@@ -174,6 +194,19 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
             failures = getattr(settings, "failures", ())
             episodes = sorted({0, *(failure.episode for failure in failures)})
             yield condition.label, settings.build, episodes
+
+
+def _with_default_settings(source: str, thing: Callable[..., Any]) -> Callable[[], Any]:
+    """Return what makes a scenario of one's own, by its own settings as they are by default."""
+    from ....scenarios import SCENARIOS
+
+    if not hasattr(thing, "Settings"):
+        return thing
+    try:
+        settings = SCENARIOS.adapted(source, thing)()
+    except ValueError as error:
+        raise ValueError(f"{source}: its Settings have no defaults for all keys, {error}") from None
+    return settings.build
 
 
 MOST_AGENTS = 10_000

@@ -10,6 +10,30 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict, Discrete, MultiDiscrete, Text
 from gymnasium.utils import EzPickle
+from made_up_environments import (
+    Ambiguous,
+    Blind,
+    BlindUnsaid,
+    Chosen,
+    KeyedApart,
+    Lacking,
+    Late,
+    Masked,
+    MaskedBeside,
+    MixedEnd,
+    Nameless,
+    OldCart,
+    OldParallel,
+    OldParallelStart,
+    OldStartCart,
+    PaidNothing,
+    PaidTwice,
+    Truncating,
+    UndecidedCart,
+    Uninvited,
+    Unpaid,
+    Unseeing,
+)
 from pettingzoo import ParallelEnv
 
 from nested_agents.core.interface.scenario import can_draw
@@ -222,8 +246,12 @@ class Odd(Carts):
 
     def __init__(self, observed: Any = None, done: Any = None) -> None:
         super().__init__()
+        self.observed = observed
         self.observation_space = observed or self.observation_space
         self.action_space = done or self.action_space
+
+    def _seen(self) -> Any:
+        return self.observed.sample() if self.observed else super()._seen()
 
 
 class Locked(Carts):
@@ -303,6 +331,69 @@ def test_what_cannot_be_adapted_is_refused_in_one_line(make: Any, message: str) 
     with pytest.raises(ValueError, match=message) as refused:
         make()
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("env", "message"),
+    [
+        (Blind, "observations of agent_1: o1 is nan at step 4, allowed: finite numbers"),
+        (BlindUnsaid, "observations of agent_1: o1 is nan at step 4, allowed: finite numbers"),
+        (KeyedApart, "of agent_0 keys are place, time, of agent_1 hour, place, allowed: the same"),
+        (Lacking, "observations of agent_0 at step 2: there is no 'time', which their space has"),
+        (Late, "'agent_1' observes nothing at the start, allowed: environments in which all"),
+        (Uninvited, "'agent_9' at step 1 is none of possible_agents"),
+        (Unseeing, "'agent_1' acts, and observations at step 3 do not have it"),
+        (Unpaid, "'agent_1' acts, and rewards at step 1 do not have it"),
+        (Nameless, "possible_agents is missing or empty: let __init__ set it to a list"),
+        (Ambiguous, "agents 1, 1: their names must differ"),
+        (Masked, "actions of agent_0: observations have action_mask, .* wrap it so that an"),
+        (MaskedBeside, "actions of agent_0: infos have action_mask, .* wrap it so that an"),
+        (PaidTwice, r"reward of agent_0 at step 1 of shape \(2,\), allowed: one number"),
+        (PaidNothing, "reward of agent_0 at step 3 is nan, allowed: a finite number"),
+        (OldParallel, "step returns 4 values: the old interface, .*; allowed: 5, what is obse"),
+        (OldParallelStart, "reset returns no pair of what is observed and infos: the old interf"),
+        (OldCart, "step returns 4 values: the old interface, .*; allowed: 5, what is observed"),
+        (OldStartCart, "reset returns no pair of what is observed and infos: the old interface"),
+        (UndecidedCart, "terminated at step 1 = None, allowed: true or false"),
+        (Chosen, r"observations of agent_0 at step 3: side: \[-1\] is outside of Discrete"),
+        (Truncating, r"observations of agent_0 at the start: .* are no numbers of Box\(-1, 1"),
+    ],
+)
+def test_what_an_environment_does_wrong_is_said_when_it_is_built(env: Any, message: str) -> None:
+    adapt = from_gymnasium if issubclass(env, gymnasium.Env) else from_pettingzoo
+    with pytest.raises(ValueError, match=message) as refused:
+        adapt(env)
+    assert "\n" not in str(refused.value)
+
+
+def test_steps_that_are_played_when_a_world_is_built_change_no_episode() -> None:
+    env = Carts(2, noise=0.1)
+    played = []
+    for _ in range(2):
+        world = from_gymnasium(env)
+        played.append([world.reset(4), *(world.step(np.array([1, 2])).states for _ in range(3))])
+    assert np.array_equal(*played)
+    plain = Carts(2, noise=0.1)
+    plain.reset(seed=int(np.random.SeedSequence(4).generate_state(1)[0]))
+    assert played[0][1][0, :2] == pytest.approx(plain.step(np.array([-0.5, 0.0]))[0][:2])
+
+
+def test_a_mixed_ending_truncates_once_each_has_ended() -> None:
+    world = from_pettingzoo(MixedEnd)
+    world.reset(0)
+    steps = [world.step(np.array([1, 1])) for _ in range(5)]
+    assert [step.truncated for step in steps] == [False] * 4 + [True]
+    assert not any(step.terminated for step in steps)
+
+
+def test_a_termination_may_be_the_success() -> None:
+    world = from_gymnasium(Carts(), success="terminated")
+    world.reset(0)
+    steps = [world.step(np.array([4, 4])) for _ in range(40)]
+    assert [step.info["succeeded"] for step in steps] == [step.terminated for step in steps]
+    assert any(step.terminated for step in steps)
+    world.reset(0)
+    assert world.measure()["succeeded"] is False
 
 
 @pytest.mark.parametrize("path", sorted(WORLDS.glob("*.toml")), ids=lambda path: path.stem)

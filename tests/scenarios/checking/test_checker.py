@@ -797,6 +797,19 @@ def test_what_the_documentation_calls_blind_is_not_noticed(name: str) -> None:
     assert not [*check_scenario(BLIND[name], steps=12).warnings()]
 
 
+@pytest.mark.parametrize("heads", [0.5, 0.9])
+def test_a_world_may_have_few_starts(heads: float) -> None:
+    """Only a coin differs between seeds."""
+
+    class Coin(Bare):
+        def reset(self, seed: Any, episode: int = 0) -> Any:
+            side = float(np.random.default_rng(seed).random() < heads)
+            self.places = np.full((2, 1), side)
+            return self.places
+
+    assert {check_scenario(Coin, seeds=(k, k + 1)).passed for k in range(4)}
+
+
 def test_what_could_not_be_checked_is_told_with_the_reason() -> None:
     unchecked = check_scenario(inexact(), steps=6).unchecked
     assert unchecked["sensed and predicted"].startswith("without with_exact_prediction")
