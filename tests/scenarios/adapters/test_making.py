@@ -72,8 +72,7 @@ def test_a_study_keeps_the_file_and_asks_for_trust(
     assert len(capsys.readouterr().out.splitlines()) == 1 + 2
     moved = folder / "elsewhere" / "out"
     shutil.copytree(out, moved)
-    text = (moved / "sources" / FILE).read_text(encoding="utf-8")
-    (moved / "sources" / FILE).write_text(text + "\nPAYLOAD = 1\n", encoding="utf-8")
+    monkeypatch.setattr("nested_agents.core.plugins.sources._here", set())
     monkeypatch.setenv("XDG_STATE_HOME", str(folder / "state"))
     assert main(["explain", str(moved)]) == 2
     assert "--trust runs it" in capsys.readouterr().err
