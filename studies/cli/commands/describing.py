@@ -167,14 +167,13 @@ def _learned_errors(
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
     from ....core.learners import check_prediction
-    from ....core.plugins.sources import active
     from ...spec.spec import Spec
 
     if ".py:" in source or source.endswith(".py"):
         if changes:
             raise SpecError("--set: lays values over a spec, not over a Python file")
         with refused():
-            factory = _with_default_settings(source, active().load(source))
+            factory = _factory_of(source)
         try:
             factory()
         except (Exception, SystemExit) as error:
@@ -195,17 +194,19 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
             yield condition.label, settings.build, episodes
 
 
-def _with_default_settings(source: str, thing: Callable[..., Any]) -> Callable[[], Any]:
+def _factory_of(source: str) -> Callable[[], object]:
     """Return what makes a scenario of one's own, by its own settings as they are by default."""
+    from ....core.plugins.sources import active
     from ....scenarios import SCENARIOS
 
+    thing: Callable[[], object] = active().load(source)
     if not hasattr(thing, "Settings"):
         return thing
     try:
-        settings = SCENARIOS.adapted(source, thing)()
+        build: Callable[[], object] = SCENARIOS.parsed(source).build
     except ValueError as error:
         raise ValueError(f"{source}: its Settings have no defaults for all keys, {error}") from None
-    return settings.build
+    return build
 
 
 MOST_AGENTS = 10_000

@@ -36,7 +36,6 @@ from made_up_environments import (
 )
 from pettingzoo import ParallelEnv
 
-from nested_agents.core.interface.scenario import can_draw
 from nested_agents.core.learners import check_prediction
 from nested_agents.scenarios.adapters.adapted import from_gymnasium, from_pettingzoo
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings, PettingZooSettings
@@ -179,7 +178,8 @@ def test_a_limit_of_time_truncates_and_the_return_can_be_the_success() -> None:
         id="CartPole-v1", options={"max_episode_steps": 3}, success={"return": 3.0}
     )
     world = settings.build()
-    assert not hasattr(world, "predict")
+    assert not world.predicts
+    assert world.predict() is None
     world.reset(0)
     steps = [world.step(np.array([k % 2])) for k in range(3)]
     assert [s.truncated for s in steps] == [False, False, True]
@@ -230,7 +230,7 @@ def test_a_spec_of_ten_lines_runs() -> None:
 def test_an_episode_is_drawn_by_playing_it_again(tmp_path: Path) -> None:
     pytest.importorskip("pygame", reason="extra [human]")
     world = GymnasiumSettings(**PENDULUM).build()
-    assert can_draw(world)
+    assert world.draws
     world.reset(4)
     first, seed = world.measure()["joint_action"], world.constants_of_episode()["seed"]
     world.step(np.array([4]))
