@@ -14,7 +14,6 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 
 from ...core.interface.measures import SUCCESS, Measure
@@ -29,7 +28,7 @@ from .copies import Copies, copies_of, fault_of_copies
 from .making import Make, maker_of
 from .perception import Numbers, Perception
 from .settings import AdaptedSettings, GymnasiumSettings, PettingZooSettings
-from .simulators import Played, Simulator, simulator_of
+from .simulators import Environment, Played, Simulator, simulator_of
 
 REHEARSED = 8
 """Steps that are played when a world is built: what does not fit is said then."""
@@ -137,11 +136,11 @@ class AdaptedWorld(Scenario):
             absorbing=False,
         )
 
-    def measure(self) -> Mapping[str, Any]:
+    def measure(self) -> Mapping[str, object]:
         """Return the last joint action, and whether the present state is a success."""
         return {"joint_action": self._last, "succeeded": self._has_succeeded()}
 
-    def constants_of_episode(self) -> Mapping[str, Any]:
+    def constants_of_episode(self) -> Mapping[str, object]:
         """Return the seed of the environment."""
         return {"seed": self._seed}
 
@@ -177,15 +176,16 @@ class AdaptedWorld(Scenario):
         success = self.settings.success
         if not isinstance(success, dict):
             return self._terminated
-        wanted: dict[str, Any] = dict(success)
-        least = wanted.pop("return", -np.inf)
         names = [variable.name for variable in self.state_space.variables]
-        inside = (
-            low <= value <= high
-            for name, (low, high) in wanted.items()
-            for value in self._states[:, names.index(name)]
-        )
-        return bool(success) and self._return >= least and all(inside)
+        for name, ends in success.items():
+            if isinstance(ends, tuple):
+                values = self._states[:, names.index(name)]
+                reached = bool(((ends[0] <= values) & (values <= ends[1])).all())
+            else:
+                reached = self._return >= ends
+            if not reached:
+                return False
+        return bool(success)
 
     @property
     def draws(self) -> bool:
@@ -313,9 +313,7 @@ def _play_randomly(
             return
 
 
-def from_gymnasium(
-    env: gymnasium.Env[Any, Any] | Callable[..., gymnasium.Env[Any, Any]], **keys: Any
-) -> AdaptedWorld:
+def from_gymnasium(env: Environment | Callable[..., Environment], **keys: Any) -> AdaptedWorld:
     """Return an environment of Gymnasium as a scenario.
 
     Parameters
@@ -332,13 +330,14 @@ def from_gymnasium(
 
     Examples
     --------
+    >>> import gymnasium
     >>> from_gymnasium(gymnasium.make("Pendulum-v1"), actions=3).action_set.names
     ('-2', '0', '2')
     """
     return AdaptedWorld(GymnasiumSettings(id="", **keys), _maker(env))
 
 
-def from_pettingzoo(env: Any, **keys: Any) -> AdaptedWorld:
+def from_pettingzoo(env: Environment | Callable[..., Environment], **keys: Any) -> AdaptedWorld:
     """Return an environment of PettingZoo as a scenario.
 
     Parameters
@@ -357,7 +356,7 @@ def from_pettingzoo(env: Any, **keys: Any) -> AdaptedWorld:
     return AdaptedWorld(PettingZooSettings(id="", **keys), _maker(env))
 
 
-def _maker(env: Any) -> Make:
+def _maker(env: object) -> Make:
     def make(settings: AdaptedSettings, render_mode: str | None) -> Simulator:
         if not callable(env):
             return simulator_of(env)

@@ -51,7 +51,7 @@ class PickledCopies(Copies):
 
     def __init__(self, simulator: Simulator) -> None:
         self._layers = list(_layers(simulator))
-        self._kept: dict[int, Any] = {id(layer): layer for layer in self._layers}
+        self._kept: dict[int, object] = {id(layer): layer for layer in self._layers}
         file = BytesIO()
         pickler: Any = pickle.Pickler(file, pickle.HIGHEST_PROTOCOL)
         pickler.persistent_id = self._identity
@@ -59,7 +59,7 @@ class PickledCopies(Copies):
         pickler.dump([vars(layer) for layer in self._layers])
         self._saved = file.getvalue()
 
-    def _identity(self, value: Any) -> int | None:
+    def _identity(self, value: object) -> int | None:
         """Return the identity of what copies have in common, and of the layers themselves."""
         if id(value) not in self._kept:
             if not _is_shared(value):
@@ -70,12 +70,12 @@ class PickledCopies(Copies):
     @contextmanager
     def lane(self) -> Iterator[Simulator]:
         """Return a copy."""
-        made = {id(layer): object.__new__(type(layer)) for layer in self._layers}
+        copies: dict[int, Any] = {id(layer): object.__new__(type(layer)) for layer in self._layers}
         unpickler: Any = pickle.Unpickler(BytesIO(self._saved))
-        unpickler.persistent_load = {**self._kept, **made}.__getitem__
-        for layer, attributes in zip(made.values(), unpickler.load(), strict=True):
+        unpickler.persistent_load = {**self._kept, **copies}.__getitem__
+        for layer, attributes in zip(copies.values(), unpickler.load(), strict=True):
             vars(layer).update(attributes)
-        yield made[id(self._layers[0])]
+        yield copies[id(self._layers[0])]
 
 
 class SavedMujoco(Copies):
@@ -89,10 +89,12 @@ class SavedMujoco(Copies):
 
     def __init__(self, simulator: Simulator) -> None:
         mujoco: Any = import_module("mujoco")
-        env: Any = simulator.env.unwrapped
-        self._simulator, self._env = simulator, env
+        env = simulator.env.unwrapped
+        self._simulator = simulator
+        self._env = env
         self._attributes = [(layer, dict(vars(layer))) for layer in _layers(simulator)]
-        self._copy, self._saved = mujoco.mj_copyData, mujoco.MjData(env.model)
+        self._copy = mujoco.mj_copyData
+        self._saved = mujoco.MjData(env.model)
         self._copy(self._saved, env.model, env.data)
 
     @contextmanager
@@ -126,16 +128,16 @@ def fault_of_copies(simulator: Simulator, actions: Mapping[Player, object]) -> s
     return "" if len(set(played)) == 1 else "a copy does something else than the original"
 
 
-def _layers(simulator: Simulator) -> Iterator[Any]:
+def _layers(simulator: Simulator) -> Iterator[object]:
     """Yield a simulator and all that its environment is wrapped in, from the outside in."""
-    layer: Any = simulator
+    layer: object = simulator
     while layer is not None:
         yield layer
         inside = vars(layer)
         layer = inside.get("env", inside.get("aec_env"))
 
 
-def _is_shared(value: Any) -> bool:
+def _is_shared(value: object) -> bool:
     """Return whether no step changes a part of an environment."""
     fixed = gymnasium.Space, gymnasium.envs.registration.EnvSpec, FunctionType, ModuleType
     return isinstance(value, fixed) or type(value).__module__.partition(".")[0] in SHARED

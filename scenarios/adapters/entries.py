@@ -44,11 +44,11 @@ class Entries:
 
     Examples
     --------
-    >>> entries = Entries("a", Dict({"side": Discrete(2), "height": Box(0.0, 9.0, (1,))}))
+    >>> entries = Entries("a", Dict({"height": Box(0.0, 9.0, (1,)), "side": Discrete(2)}))
     >>> entries.names, entries.bounds[1].tolist()
-    (['side0', 'side1', 'height'], [1.0, 1.0, 9.0])
-    >>> entries.numbers({"height": np.array([4.5]), "side": 1}, 0).tolist()
-    [0.0, 1.0, 4.5]
+    (['height', 'side0', 'side1'], [9.0, 1.0, 1.0])
+    >>> entries.numbers({"side": 1, "height": np.array([4.5])}, 0).tolist()
+    [4.5, 0.0, 1.0]
     """
 
     def __init__(self, player: Player, space: Space) -> None:

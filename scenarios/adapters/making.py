@@ -19,7 +19,7 @@ import gymnasium
 from ...core.plugins import sources
 from ...core.plugins.settings import near
 from .settings import AdaptedSettings, GymnasiumSettings
-from .simulators import GymnasiumSimulator, Simulator, simulator_of
+from .simulators import Environment, GymnasiumSimulator, Simulator, simulator_of
 
 Make = Callable[[AdaptedSettings, str | None], Simulator]
 """Makes a simulator of settings that renders in a mode of its environment, or does not."""
@@ -100,10 +100,10 @@ def _unmade(settings: AdaptedSettings, error: Exception) -> ValueError:
     return ValueError(f"scenario.id = {settings.id!r}: {problem}")
 
 
-def _of_gymnasium(name: str, options: Mapping[str, Any]) -> gymnasium.Env[Any, Any]:
+def _of_gymnasium(name: str, options: Mapping[str, Any]) -> Environment:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r".*the latest versioned environment")
-        env: gymnasium.Env[Any, Any] = gymnasium.make(name, disable_env_checker=True, **options)
+        env = gymnasium.make(name, disable_env_checker=True, **options)
     if env.spec and env.spec.id != name.rpartition(":")[2]:
         raise ValueError(f"say which version, such as {env.spec.id}")
     return env
@@ -117,7 +117,7 @@ def _creator_of_pettingzoo(name: str) -> Callable[..., object]:
     creator = _registered(registered)
     if creator is not None:
         return creator
-    module: Any = import_module(name.replace("/", "."))
+    module = import_module(name.replace("/", "."))
     of_module: Callable[..., object] = getattr(module, "parallel_env", None) or module.env
     return of_module
 

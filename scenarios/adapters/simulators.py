@@ -26,6 +26,8 @@ from pettingzoo.utils.conversions import aec_to_parallel_wrapper
 Player = Hashable
 """Who acts and observes: `ONLY`, or the id of an agent of PettingZoo."""
 Space = gymnasium.Space[Any]
+Environment = Any
+"""Of Gymnasium or PettingZoo, or somebody's that is used alike."""
 Observations = Mapping[Player, object]
 TABLES = ("observations", "rewards", "terminations", "truncations", "infos")
 """What a step of a parallel environment returns, in order, each by player."""
@@ -83,7 +85,7 @@ class Simulator(ABC):
     Its methods raise a `ValueError` of one line where an environment returns what none may return.
     """
 
-    env: Any
+    env: Environment
     """The environment; `reset` and `step` modify it."""
     players: tuple[Player, ...]
     """All who may act in it."""
@@ -108,7 +110,7 @@ class GymnasiumSimulator(Simulator):
         The environment; `reset` and `step` modify it.
     """
 
-    def __init__(self, env: Any) -> None:
+    def __init__(self, env: Environment) -> None:
         self.env = env
         self.players = (ONLY,)
         self.observation_spaces = {ONLY: env.observation_space}
@@ -149,7 +151,7 @@ class ParallelSimulator(Simulator):
         If it does not say who may act; one line.
     """
 
-    def __init__(self, env: Any) -> None:
+    def __init__(self, env: Environment) -> None:
         self.env = env
         self.players = _possible_agents(env)
         self.observation_spaces = {p: env.observation_space(p) for p in self.players}
@@ -246,14 +248,14 @@ class TurnsAtOnce(aec_to_parallel_wrapper[Any, Any, Any]):
     PettingZoo's own conversion takes ids that are text alone.
     """
 
-    def reset(self, seed: int | None = None, options: Any = None) -> Any:
+    def reset(self, seed: int | None = None, options: object = None) -> tuple[object, object]:
         """Start an episode; return observations and infos."""
         env = self.aec_env
         env.reset(seed=seed, options=options)
         self.agents = list(env.agents)
         return {agent: env.observe(agent) for agent in self.agents}, dict(env.infos)
 
-    def step(self, actions: Mapping[Player, object]) -> Any:
+    def step(self, actions: Mapping[Player, object]) -> tuple[object, ...]:
         """Let each agent take its turn; return what all are told after the last."""
         env = self.aec_env
         rewards: dict[Player, float] = {}
@@ -279,7 +281,7 @@ class TurnsAtOnce(aec_to_parallel_wrapper[Any, Any, Any]):
         return bool(self.aec_env.terminations[agent] or self.aec_env.truncations[agent])
 
 
-def simulator_of(env: Any) -> Simulator:
+def simulator_of(env: object) -> Simulator:
     """Return the simulator of an environment of Gymnasium, or of PettingZoo, parallel or not.
 
     Raises
@@ -300,7 +302,7 @@ def simulator_of(env: Any) -> Simulator:
     return GymnasiumSimulator(env)
 
 
-def _possible_agents(env: Any) -> tuple[Player, ...]:
+def _possible_agents(env: object) -> tuple[Player, ...]:
     """Return who may act in an environment."""
     players = tuple(getattr(env, "possible_agents", None) or ())
     if not players:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import zip_longest
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from ...core.interface.plain import as_scenario
 from ...core.interface.scenario import Scenario, Transition
 from ...core.numerics import IntArray
 
-Frame = dict[str, Any]
+Frame = dict[str, object]
 """What one step gave, by dotted name; without the measured times."""
 
 
@@ -83,7 +82,7 @@ def opening(scenario: Scenario, seed: int, episode: int) -> Frame:
     return copied({"states": states, "info": scenario.measure()})
 
 
-def fields(transition: Transition) -> Iterator[tuple[str, Any]]:
+def fields(transition: Transition) -> Iterator[tuple[str, object]]:
     """Yield what a transition holds, by dotted name, not copied."""
     table = {
         "states": transition.states,
@@ -112,7 +111,7 @@ def differences(
                     yield f"{here} {name}{_contrast(one[name], other[name])}"
 
 
-def bits(value: Any) -> tuple[Any, ...]:
+def bits(value: object) -> tuple[object, ...]:
     """Return what equal values share, to the last bit."""
     array = np.asarray(value)
     content = repr(value) if array.dtype == object else array.tobytes()
@@ -124,9 +123,9 @@ def at(step: int) -> str:
     return "at the start" if step == 0 else f"at step {step}"
 
 
-def _contrast(one: Any, other: Any) -> str:
-    one = np.asarray(one)
-    other = np.asarray(other)
+def _contrast(value: object, other_value: object) -> str:
+    one = np.asarray(value)
+    other = np.asarray(other_value)
     if one.shape != other.shape or one.dtype != other.dtype:
         return f" of shapes {one.shape} and {other.shape}, types {one.dtype} and {other.dtype}"
     if not one.ndim:
@@ -148,7 +147,7 @@ def look_ahead(scenario: Scenario) -> None:
     scenario.measure()
 
 
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
     for name, value in table.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{name}.")
@@ -156,7 +155,7 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
             yield prefix + name, value
 
 
-def copied(table: Mapping[str, Any]) -> Frame:
+def copied(table: Mapping[str, object]) -> Frame:
     """Return what is in a table, by dotted name, without the measured times."""
     return {
         name: value.copy() if isinstance(value, np.ndarray) else value

@@ -7,7 +7,6 @@ check. What a scenario need not have, such as measures or tables, is checked whe
 import random
 from collections.abc import Iterator, Mapping
 from itertools import product, zip_longest
-from typing import Any
 
 import numpy as np
 
@@ -71,7 +70,7 @@ def _misformed(scenario: Scenario, frame: Frame, step: int) -> Iterator[str]:
         yield f"terminated and truncated must be bool, {at(step)} they are not"
     bodies = len(scenario.groups)
     twists = frame.get("twists")
-    shape = (bodies, 3) if twists is None else np.shape(twists)
+    shape = (bodies, 3) if twists is None else np.asarray(twists).shape
     if shape[1:] != (3,) or shape[0] < bodies:
         yield f"twists of shape {shape} {at(step)}, must be (bodies >= {bodies}, 3)"
 
@@ -94,16 +93,16 @@ def check_measures(of: Examination) -> Iterator[str]:
             break
 
 
-def _wrong_source(measure: Measure, info: Mapping[str, Any], step: int) -> Iterator[str]:
+def _wrong_source(measure: Measure, info: Mapping[str, object], step: int) -> Iterator[str]:
     """Yield why a measure cannot be taken from what a step tells."""
     source = measure.source
     if source not in info:
         yield f"{measure.name}: info has no {source!r} {at(step)}, has {', '.join(info)}"
-    if np.ndim(info[source]):
+    if np.asarray(info[source]).ndim:
         yield f"{measure.name}: info[{source!r}] must be one number"
 
 
-def _wrong_record(scenario: Scenario, info: Mapping[str, Any], step: int) -> Iterator[str]:
+def _wrong_record(scenario: Scenario, info: Mapping[str, object], step: int) -> Iterator[str]:
     """Yield what is to be recorded and is not told, or told in two ways."""
     measurements = scenario.measure()
     for name in scenario.recorded:
@@ -221,7 +220,7 @@ def check_returned_arrays(of: Examination) -> Iterator[str]:
     """Check that returned arrays stay as they are, and seeds and actions, too."""
     scenario = of.factory()
     seed = np.random.SeedSequence(of.seeds[0])
-    returned: list[tuple[str, Any, Any]] = []
+    returned: list[tuple[str, object, object]] = []
     states = scenario.reset(seed, of.episodes[0])
     if seed.n_children_spawned:
         yield "reset spawns from the seed it is given, so that using it twice gives two worlds"
