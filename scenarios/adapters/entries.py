@@ -19,7 +19,7 @@ MOST_BOUND = 1e6
 """A bound of a space beyond it is none."""
 
 
-class Entries:
+class ObservedEntries:
     """The numbers that a player observes.
 
     Parameters
@@ -44,7 +44,7 @@ class Entries:
 
     Examples
     --------
-    >>> entries = Entries("a", Dict({"height": Box(0.0, 9.0, (1,)), "side": Discrete(2)}))
+    >>> entries = ObservedEntries("a", Dict({"height": Box(0.0, 9.0, (1,)), "side": Discrete(2)}))
     >>> entries.names, entries.bounds[1].tolist()
     (['height', 'side0', 'side1'], [9.0, 1.0, 1.0])
     >>> entries.numbers({"side": 1, "height": np.array([4.5])}, 0).tolist()

@@ -11,9 +11,8 @@ from gymnasium.spaces import Discrete
 
 from ...core.interface.spaces import Variable
 from ...core.numerics import BoolArray, FloatArray, IntArray, wrap
-from .entries import Entries
-from .settings import AdaptedSettings, Direction
-from .settings import Entries as Places
+from .entries import ObservedEntries
+from .settings import AdaptedSettings, Direction, Entries
 from .simulators import Played, Player, Space, at, of_player
 
 Numbers = Callable[[Played], FloatArray]
@@ -67,7 +66,7 @@ class Perception:
         met: Callable[[Numbers], FloatArray],
     ) -> None:
         self._settings = settings
-        self._entries = [Entries(player, space) for player, space in spaces.items()]
+        self._entries = [ObservedEntries(player, space) for player, space in spaces.items()]
         self._players: IntArray = np.array([list(spaces).index(player) for player in bodies])
         self._names = self._common_names()
         # Where each player has them that all have.
@@ -136,7 +135,7 @@ class Perception:
             raise ValueError(f"scenario.angles.{name}: another state variable has this name")
         return places | angles
 
-    def _find(self, key: str, entries: Places | Direction) -> IntArray:
+    def _find(self, key: str, entries: Entries | Direction) -> IntArray:
         """Return where a variable is: ``(1, bodies)``, ``(2, bodies)`` of cosine and sine."""
         if isinstance(entries, Direction):
             ends = self._find(key, entries.cos), self._find(key, entries.sin)
