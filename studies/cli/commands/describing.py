@@ -166,6 +166,7 @@ def _learned_errors(
 
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
+    from ....core.interface.plain import as_scenario
     from ....core.learners import check_prediction
     from ...spec.spec import Spec
 
@@ -185,7 +186,7 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     for condition in Spec.load(Path(source), changes).conditions():
         settings = condition.settings.scenario
         with refused():
-            check_prediction(condition.settings.learner, settings.build())
+            check_prediction(condition.settings.learner, as_scenario(settings.build()))
         if settings not in seen:
             seen.add(settings)
             # Played are the first episode and those in which failures begin.
