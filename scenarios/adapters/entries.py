@@ -7,6 +7,7 @@ keys; those of discrete parts are 1 for the value observed and 0 for the others.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
@@ -133,10 +134,9 @@ def _count(part: Space) -> int:
 
 def _entry(observed: object, key: str, where: str) -> object:
     """Return what a table that is observed has under a key."""
-    try:
-        return observed[key]  # type: ignore[index]
-    except (KeyError, TypeError, IndexError):
-        raise ValueError(f"{where}: there is no {key!r}, which their space has") from None
+    if not isinstance(observed, Mapping) or key not in observed:
+        raise ValueError(f"{where}: there is no {key!r}, which their space has")
+    return observed[key]
 
 
 def _discrete(observed: object, where: str) -> FloatArray:
