@@ -10,8 +10,8 @@ from nested_agents.core.adaptation.self_model import CalibrationSettings
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import (
@@ -37,7 +37,7 @@ def scenario(**table):
 
 def calibrating(world, agents="actuator"):
     settings = BatchTDSettings(
-        calibration=CalibrationSettings(enabled=True), decision=Decision(rule="random")
+        calibration=CalibrationSettings(enabled=True), decision=DecisionSettings(rule="random")
     )
     seen = join_agents(world, agents)
     return seen, Team(settings, seen, build("chain", seen.agents), policy_seed(0))
