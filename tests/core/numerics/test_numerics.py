@@ -118,7 +118,7 @@ def test_the_run_that_compiles_has_the_bits_of_later_ones(
 
 
 def test_a_stamp_is_of_all_that_is_imported() -> None:
-    kernels = ROOT / "nested_agents" / "core" / "rules" / "kernels"
+    kernels = ROOT / "core" / "rules" / "kernels"
     assert stamp(kernels / "dense.py") != stamp(kernels / "contraction.py")
     assert stamp(kernels / "dense.py") == stamp(kernels / "dense.py")
 
