@@ -335,7 +335,8 @@ def random_hierarchy(
     """
     rng = np.random.default_rng(seed)
     ranked = [agents[i] for i in rng.permutation(len(agents))]
-    graph, pairs = independent(agents), list(combinations(ranked, 2))
+    graph = independent(agents)
+    pairs = list(combinations(ranked, 2))
     graph.add_edges_from(compress(pairs, rng.random(len(pairs)) < density))
     return graph
 

@@ -21,9 +21,11 @@ from ..core.numerics import FloatArray, nx
 
 COLUMNS = 6
 """Levels side by side before the picture is folded."""
-WIDTH, HEIGHT = 1.25, 0.3
+WIDTH = 1.25
+HEIGHT = 0.3
 """Size of an agent [in]."""
-ACROSS, DOWN = 1.7, 0.44
+ACROSS = 1.7
+DOWN = 0.44
 """Distance of columns and of rows [in]."""
 ARROW: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 8, "shrinkA": 0, "shrinkB": 0}
 BOX: dict[str, Any] = {"boxstyle": "round,pad=0.05", "edgecolor": "#666666", "linewidth": 0.8}
@@ -63,9 +65,11 @@ def draw(
     if Path(path).suffix not in (".svg", ".png", ".pdf"):
         raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
     places = positions(hierarchy)
-    low, high = places.min(axis=0), places.max(axis=0)
+    low = places.min(axis=0)
+    high = places.max(axis=0)
     width, height = high - low + (WIDTH + 0.6, HEIGHT + 1.1)
-    width, centre = max(width, 4.5, 0.09 * len(title)), (low[0] + high[0]) / 2
+    width = max(width, 4.5, 0.09 * len(title))
+    centre = (low[0] + high[0]) / 2
     figure = Figure(figsize=(width, height))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
@@ -88,7 +92,8 @@ def draw(
     notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
     middle: dict[str, Any] = {"ha": "center", "va": "center"}
     axes.text(centre, top + 0.27, title, fontsize=10, **middle)
-    bottom, noted = top + height - 0.17, "; ".join(notes)
+    bottom = top + height - 0.17
+    noted = "; ".join(notes)
     axes.text(centre, bottom, noted, fontsize=7.5, color="#555555", **middle)
     # Without date and random identifiers, equal hierarchies give equal files.
     metadata = {"Date": None} if Path(path).suffix == ".svg" else None
@@ -110,7 +115,8 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
         return radius * np.stack([np.sin(turns), -np.cos(turns)], axis=1)
     graph = nx.DiGraph(hierarchy.edges)
     graph.add_nodes_from(range(n))
-    places, bands = np.zeros((n, 2)), np.zeros(n, dtype=int)
+    places = np.zeros((n, 2))
+    bands = np.zeros(n, dtype=int)
     for number, level in enumerate(nx.topological_generations(graph)):
         beside = {i: np.mean(places[list(graph.pred[i]), 1]) if number else 0.0 for i in level}
         ranked = sorted(level, key=lambda i: (beside[i], -len(hierarchy.below(i)), i))
@@ -165,7 +171,8 @@ def _agents(
     axes: Axes, hierarchy: Hierarchy, places: FloatArray, fills: list[str], failing: Sequence[int]
 ) -> None:
     for rank, i in enumerate(hierarchy.order, 1):
-        (x, y), name = places[i], hierarchy.agents[i]
+        x, y = places[i]
+        name = hierarchy.agents[i]
         corner = x - WIDTH / 2 + 0.05, y - HEIGHT / 2 + 0.05
         frame = BOX | {"edgecolor": "#B00020", "linestyle": "--"} if i in failing else BOX
         look = {"facecolor": fills[i], "zorder": 3, **frame}

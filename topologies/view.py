@@ -64,7 +64,8 @@ class HierarchyView:
     @property
     def title(self) -> str:
         """What it is, in one line."""
-        n, depth = len(self.hierarchy), self.hierarchy.depth
+        n = len(self.hierarchy)
+        depth = self.hierarchy.depth
         agents = f"{n} agent{'s' if n > 1 else ''}"
         count = readable(sum(self.tries))
         return f"{self.text}: {agents}, depth {depth}, {count} joint actions a step"
@@ -161,7 +162,8 @@ def kinds() -> str:
 def printed(shown: HierarchyView, form: Form) -> str:
     """Return a view for printing."""
     hierarchy = shown.hierarchy
-    names, n = hierarchy.agents, len(hierarchy)
+    names = hierarchy.agents
+    n = len(hierarchy)
     below = [[names[j] for j in hierarchy.below(i)] for i in range(n)]
     if form == "json":
         content = {
@@ -205,7 +207,8 @@ def aligned(rows: Sequence[Sequence[str]], sides: str, heads: int = 0) -> list[s
     ends = [end - 2 for end in accumulate(width + 2 for width in widths)]
     if heads and ends[-1] > most:
         n = max(heads + 1, sum(end <= most for end in ends))
-        first, rest = [r[:n] for r in rows], [[*r[:heads], *r[n:]] for r in rows]
+        first = [r[:n] for r in rows]
+        rest = [[*r[:heads], *r[n:]] for r in rows]
         below = ["", *aligned(rest, sides[:heads] + sides[n:], heads)] * (n < len(widths))
         return [*aligned(first, sides[:n]), *below]
     lines = []

@@ -96,7 +96,8 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
         # A turning rate is measured in units of the nominal body's own turning per wheel speed.
         turning = [max(1.0, float(np.abs(effect[2]).max())) for effect in nominal]
         self._units = [np.array([1.0, 1.0, unit]) for unit in turning]
-        of_effect, of_constant = settings.prior_effect**2, settings.prior_constant**2
+        of_effect = settings.prior_effect**2
+        of_constant = settings.prior_constant**2
         wheels = [effect.shape[1] - 1 for effect in nominal]
         self._priors = [np.diag([of_effect] * w + [of_constant]) for w in wheels]
         self._covariances = [np.stack([prior] * 3) for prior in self._priors]
@@ -140,15 +141,20 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
         """
         if transition.twists is None:
             return
-        speeds, slips = prediction.commands(joint_action), prediction.slips(joint_action)
+        speeds = prediction.commands(joint_action)
+        slips = prediction.slips(joint_action)
         free = transition.twists[-len(slips) :] - slips
         for body, group in enumerate(prediction.groups):
             self.observe(body, speeds[list(group)], free[body])
 
     def observe(self, body: int, speeds: FloatArray, twist: FloatArray) -> None:
         """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
-        settings, regressor, ratio = self._settings, np.append(speeds, 1.0), self._ratios[body]
-        noise, effect, covariance = settings.noise**2, self.effects[body], self._covariances[body]
+        settings = self._settings
+        regressor = np.append(speeds, 1.0)
+        ratio = self._ratios[body]
+        noise = settings.noise**2
+        effect = self.effects[body]
+        covariance = self._covariances[body]
         for row, unit in enumerate(self._units[body]):
             innovation = float(twist[row] - effect[row] @ regressor) / unit
             carried = covariance[row] @ regressor
@@ -174,7 +180,8 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
 
     def continue_from(self, former: SelfModel) -> None:
         """Go on from what another one has learned, if its bodies are built alike; else anew."""
-        mine, theirs = self._nominal, former._nominal
+        mine = self._nominal
+        theirs = former._nominal
         if len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs)):
             self.restore(former.arrays())
 
@@ -251,7 +258,8 @@ class Calibration(Adaptive[EmbodiedPrediction]):
         self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
     ) -> None:
         """Hold the constants against how what bodies push moved by a joint action, if it did."""
-        twists, n_bodies = transition.twists, len(prediction.groups)
+        twists = transition.twists
+        n_bodies = len(prediction.groups)
         if twists is not None and twists[:-n_bodies].any():
             self.observe(twists, prediction.outcomes(joint_action, self.points))
 
@@ -263,8 +271,10 @@ class Calibration(Adaptive[EmbodiedPrediction]):
 
     def observe(self, measured: FloatArray, predicted: FloatArray) -> None:
         """Take in the twists ``(B, 3)`` of all bodies against those ``(2 n, B, 3)`` predicted."""
-        n, settings = len(self.constants), self.settings
-        plus, minus = self._units * predicted[:n], self._units * predicted[n:]
+        n = len(self.constants)
+        settings = self.settings
+        plus = self._units * predicted[:n]
+        minus = self._units * predicted[n:]
         slope = (plus - minus) / (2.0 * np.sqrt(n))
         if not slope.any():
             return

@@ -175,7 +175,9 @@ class MaxPlus:
         self, scopes: Sequence[Scope], n: int, n_actions: int,
         rounds: int = 100, damping: float = 0.5,
     ) -> None:  # fmt: skip
-        self.n, self.n_actions, self.rounds = n, n_actions, rounds
+        self.n = n
+        self.n_actions = n_actions
+        self.rounds = rounds
         # Tables over the same agents are added up: apart, they would receive their own messages.
         apart = list(dict.fromkeys(scopes))
         self._place = [apart.index(scope) for scope in scopes]
@@ -199,21 +201,24 @@ class MaxPlus:
         tables
             One for each scope, in their order; not modified.
         """
-        members, a = self._members, self.n_actions
+        members = self._members
+        a = self.n_actions
         count, k = members.shape
         full = np.zeros((count, *[a] * k))
         for place, table in zip(self._place, tables, strict=True):
             # The same along the axes of agents that are not there.
             full[place] += table[(..., *[None] * (k - table.ndim))]
         to_agents = np.zeros((count, k, a))  # messages of tables
-        best, greatest = np.zeros(self.n, dtype=np.int64), -np.inf
+        best = np.zeros(self.n, dtype=np.int64)
+        greatest = -np.inf
         for _ in range(self.rounds):
             sums = np.zeros((self.n + 1, a))
             np.add.at(sums, members, to_agents)
             joint = np.append(sums[:-1].argmax(axis=1), 0)
             worth = float(full[(np.arange(count), *joint[members].T)].sum())
             if worth > greatest:
-                best, greatest = joint[:-1].copy(), worth
+                best = joint[:-1].copy()
+                greatest = worth
             to_tables = sums[members] - to_agents  # what agents heard of other tables
             to_tables[members == self.n] = 0.0
             new = self._messages(full, to_tables)
@@ -248,7 +253,8 @@ class MaxPlus:
                     index[place] = slice(None)
                     values += full[(table, *index)]
                 if values.max() > values[joint[i]] + 1e-12 * max(1.0, abs(values.max())):
-                    joint[i], gained = int(values.argmax()), True
+                    joint[i] = int(values.argmax())
+                    gained = True
         return joint[:-1]
 
 

@@ -64,7 +64,8 @@ class Kernel:
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
         # Division by zero gives what it gives in NumPy: that compiles sooner than an exception.
-        self.py_func, self._options = function, {"error_model": "numpy"} | options
+        self.py_func = function
+        self._options = {"error_model": "numpy"} | options
         self._ready: Callable[..., Any] | None = None
 
     # What nobody calls is not compiled: a third to a half of a small kernel is its wrappers.
@@ -92,7 +93,8 @@ class Kernel:
             function.__code__, function.__globals__ | kernels, function.__name__,
             function.__defaults__, function.__closure__,
         )  # fmt: skip
-        seen.__module__, seen.__qualname__ = function.__module__, function.__qualname__ + suffix
+        seen.__module__ = function.__module__
+        seen.__qualname__ = function.__qualname__ + suffix
         compiled = numba.njit(**self._options, **options)(seen)
         file = _cache_file(compiled)
         if file is not None:  # interpreted kernels, NUMBA_DISABLE_JIT=1, have none
@@ -201,7 +203,8 @@ def _alone(file: Any) -> Iterator[None]:
 
 def stamp(path: Path) -> str:
     """Return a digest of a file and of all files that it imports, directly or not."""
-    paths, left = {path}, [path]
+    paths = {path}
+    left = [path]
     while left:
         new = _imported(left.pop()) - paths
         paths |= new
