@@ -16,7 +16,8 @@ from ..core.hierarchy.failures import MessageFailure
 from ..core.hierarchy.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, parse
 from .builders import check_legible, names_of
-from .config import ARGUMENTS, read
+from .config import read
+from .strings import ARGUMENTS
 
 Form = Literal["table", "json"]
 

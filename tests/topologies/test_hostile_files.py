@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents.studies.cli.main import main
-from nested_agents.topologies import build
-from nested_agents.topologies.config import parse
+from nested_agents.topologies import build, parse
 from nested_agents.topologies.view import named_by
 
 GRAPHML = '<graphml xmlns="http://graphml.graphdrawing.org/xmlns"><graph edgedefault="directed">'
