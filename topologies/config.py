@@ -13,26 +13,32 @@ subordinate); an agent in no pair stands alone.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import model_validator
 
-from ..core.coordination.graphs import oriented
+from ..core.coordination.graphs import orient
 from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure
 from ..core.hierarchy.hierarchy import Considers, Hierarchy, Told
 from ..core.numerics import nx
 from ..core.plugins import sources
 from ..core.plugins.registry import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, closest, tuples, unwritten
-from .builders import Bodies, Names, check_names, from_networkx, names_of, shown
+from .builders import Bodies, Names, check_names, from_networkx, quote
 from .files import read_file
-from .strings import ARGUMENTS
+from .strings import ARGUMENTS, Keys
 from .user_functions import call_builder
 
 BUILDERS = "nested_agents.topologies.builders"
 BUILT = (
-    "chain", "tree", "star", "teams", "independent", "simultaneous", "coordination-graph",
-)  # fmt: skip
+    "chain",
+    "tree",
+    "star",
+    "teams",
+    "independent",
+    "simultaneous",
+    "coordination-graph",
+)
 """Topologies whose builder is called so."""
 
 
@@ -71,7 +77,7 @@ class TopologySettings(Settings):
             raise ValueError("fill_in = true: needs oriented, in which order agents decide")
         return self
 
-    def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
+    def __repr_args__(self) -> Iterable[tuple[str | None, object]]:
         written = self.model_dump()
         return [(name, value) for name, value in super().__repr_args__() if name in written]
 
@@ -102,7 +108,7 @@ TOPOLOGIES = SettingsRegistry(
 """Topologies by name."""
 
 
-def parse(text: str | Mapping[str, Any]) -> TopologySettings:
+def parse(text: str | Mapping[str, object]) -> TopologySettings:
     """Read a topology from a string, or from a table as it stands in a spec.
 
     Besides ``"kind"`` and ``"kind:argument"``, a file of a graph or of such a table, a
@@ -146,7 +152,7 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
     raise ValueError(f"topology {text!r}: {TOPOLOGIES.moved.get(kind, unknown)}")
 
 
-def _of_table(table: Mapping[str, Any]) -> TopologySettings:
+def _of_table(table: Mapping[str, object]) -> TopologySettings:
     """Return the settings of a table."""
     implied = next((k for key, k in IMPLIED.items() if key in table), None)
     kind = table.get("kind", implied)
@@ -165,7 +171,7 @@ Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
 
 
 def build(
-    settings: TopologySettings | str | Mapping[str, Any],
+    settings: TopologySettings | str | Mapping[str, object],
     agents: Sequence[str],
     bodies: Sequence[Sequence[int]] | None = None,
     interactions: Sequence[tuple[int, int]] | None = None,
@@ -249,11 +255,11 @@ def _directed(graph: nx.Graph, settings: TopologySettings, agents: Names) -> nx.
             )
         return graph
     if graph.is_directed():
-        raise ValueError(f"oriented = {shown(order)}: the edges are directed already, leave it out")
+        raise ValueError(f"oriented = {quote(order)}: the edges are directed already, leave it out")
     names = {"listed": tuple(agents), "reversed": tuple(reversed(agents))}
     listed = names[order] if isinstance(order, str) else order
     check_names(listed, agents, "oriented")
-    return oriented(graph, listed, fill_in=settings.fill_in)
+    return orient(graph, listed, fill_in=settings.fill_in)
 
 
 def read(path: str) -> nx.DiGraph | TopologySettings:
@@ -279,19 +285,19 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
     return settings
 
 
-def _named(agents: Names, bodies: Sequence[Any]) -> Bodies:
+def _named(agents: Names, bodies: Sequence[Sequence[int]]) -> Bodies:
     """Return the names of agents given by index, by body; refuse what is no index."""
     indices = range(len(agents))
     try:
         named = [[agents[indices.index(i)] for i in body] for body in bodies]
     except (TypeError, ValueError):
         allowed = f"agent indices by body, 0 to {len(agents) - 1}"
-        raise ValueError(f"bodies = {shown(bodies)}: must be {allowed}") from None
-    check_names(names_of(named), agents, "bodies")
+        raise ValueError(f"bodies = {quote(bodies)}: must be {allowed}") from None
+    check_names([name for body in named for name in body], agents, "bodies")
     return named
 
 
-def _arguments(kind: str, text: str) -> dict[str, Any]:
+def _arguments(kind: str, text: str) -> Keys:
     """Return the settings that stand in ``"kind:text"``."""
     if kind not in ARGUMENTS:
         raise ValueError(f"takes no argument, received {text!r}")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -27,9 +26,6 @@ HEIGHT = 0.3
 ACROSS = 1.7
 DOWN = 0.44
 """Distance of columns and of rows [in]."""
-ARROW: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 8, "shrinkA": 0, "shrinkB": 0}
-BOX: dict[str, Any] = {"boxstyle": "round,pad=0.05", "edgecolor": "#666666", "linewidth": 0.8}
-"""How arrows and agents look."""
 COLOURS = ("#cfe2f3", "#fde5cd", "#d9ead3", "#ead1dc", "#fff2cc", "#d0e0e3", "#e6d5c3", "#d9d2e9")
 """Fill of the agents by body, again from the start when they run out."""
 
@@ -90,11 +86,11 @@ def draw(
     notes += ["grey arrows: implied by the others"] * bool(implied)
     styles = {_style(hierarchy, edge)[1] for edge in hierarchy.edges} - {""}
     notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
-    middle: dict[str, Any] = {"ha": "center", "va": "center"}
-    axes.text(centre, top + 0.27, title, fontsize=10, **middle)
+    axes.text(centre, top + 0.27, title, fontsize=10, ha="center", va="center")
     bottom = top + height - 0.17
-    noted = "; ".join(notes)
-    axes.text(centre, bottom, noted, fontsize=7.5, color="#555555", **middle)
+    axes.text(
+        centre, bottom, "; ".join(notes), fontsize=7.5, color="#555555", ha="center", va="center"
+    )
     # Without date and random identifiers, equal hierarchies give equal files.
     metadata = {"Date": None} if Path(path).suffix == ".svg" else None
     with matplotlib.rc_context({"svg.hashsalt": "nested-agents", "svg.fonttype": "none"}):
@@ -138,10 +134,20 @@ def _arrows(
     for edge in hierarchy.edges:
         colour, thickness, order = ("#c4c4c4", 0.6, 1) if edge in implied else ("#444444", 1.0, 2)
         start, end, bend = _route(*places[list(edge)])
-        look = {"linewidth": thickness, "color": colour, "zorder": order, **ARROW}
-        look["linestyle"] = _style(hierarchy, edge)[0]
-        bent = f"arc3,rad={bend}"
-        axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), connectionstyle=bent, **look))
+        arrow = FancyArrowPatch(
+            tuple(start),
+            tuple(end),
+            connectionstyle=f"arc3,rad={bend}",
+            arrowstyle="-|>",
+            mutation_scale=8,
+            shrinkA=0,
+            shrinkB=0,
+            linewidth=thickness,
+            linestyle=_style(hierarchy, edge)[0],
+            color=colour,
+            zorder=order,
+        )
+        axes.add_patch(arrow)
 
 
 def _style(hierarchy: Hierarchy, edge: tuple[int, int]) -> tuple[str, str]:
@@ -174,9 +180,18 @@ def _agents(
         x, y = places[i]
         name = hierarchy.agents[i]
         corner = x - WIDTH / 2 + 0.05, y - HEIGHT / 2 + 0.05
-        frame = BOX | {"edgecolor": "#B00020", "linestyle": "--"} if i in failing else BOX
-        look = {"facecolor": fills[i], "zorder": 3, **frame}
-        axes.add_patch(FancyBboxPatch(corner, WIDTH - 0.1, HEIGHT - 0.1, **look))
+        box = FancyBboxPatch(
+            corner,
+            WIDTH - 0.1,
+            HEIGHT - 0.1,
+            boxstyle="round,pad=0.05",
+            facecolor=fills[i],
+            edgecolor="#B00020" if i in failing else "#666666",
+            linestyle="--" if i in failing else "-",
+            linewidth=0.8,
+            zorder=3,
+        )
+        axes.add_patch(box)
         size = min(8.5, 8.5 * 15 / len(name))
         left = x - WIDTH / 2 + 0.07
         axes.text(left, y, str(rank), fontsize=6.5, va="center", color="#777777", zorder=4)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..core.numerics import nx
 from ..core.plugins import sources
-from .builders import check_legible, shown
+from .builders import check_legible, quote
 
 NUMBERED = re.compile(r"n?\d+")
 """Ids that a program gave to nodes, as yEd and Gephi do."""
@@ -80,12 +80,12 @@ def _named_by_labels(graph: nx.Graph) -> nx.Graph:
         return graph
     bare = [node for node in graph if node not in labels]
     if bare:
-        raise ValueError(f"node {shown(bare[0])} has no label, others have one")
+        raise ValueError(f"node {quote(bare[0])} has no label, others have one")
     names = {n: text.strip() if isinstance(text, str) else text for n, text in labels.items()}
     check_legible(names.values())
     for name, times in Counter(names.values()).items():
         if times > 1:
-            raise ValueError(f"label {shown(name)} is that of {times} nodes")
+            raise ValueError(f"label {quote(name)} is that of {times} nodes")
     return nx.relabel_nodes(graph, names)
 
 

@@ -7,7 +7,7 @@ import networkx as nx
 import pytest
 
 from nested_agents.topologies import build, parse
-from nested_agents.topologies.view import named_by
+from nested_agents.topologies.view import names_in
 
 AGENTS = ("a", "b", "c", "d")
 
@@ -90,19 +90,19 @@ def test_it_is_read_as_its_program_wrote_it(name: str, tmp_path: Path) -> None:
         hierarchy = build(parse(text), AGENTS)
         assert hierarchy.agents == AGENTS
         assert hierarchy.edges == ((0, 1), (0, 2))
-    assert named_by(parse(str(path))) == AGENTS
+    assert names_in(parse(str(path))) == AGENTS
 
 
 def test_ids_that_are_names_stay_whatever_the_labels_are(tmp_path: Path) -> None:
     path = tmp_path / "ids.graphml"
     path.write_text(gephi("robot", ("the", "first", "of", "all")), encoding="utf-8")
-    assert named_by(parse(str(path))) == ("robot0", "robot1", "robot2", "robot3")
+    assert names_in(parse(str(path))) == ("robot0", "robot1", "robot2", "robot3")
 
 
 def test_numbers_without_labels_are_names(tmp_path: Path) -> None:
     path = tmp_path / "bare.graphml"
     nx.write_graphml(nx.DiGraph([("n0", "n1")]), path)
-    assert named_by(parse(str(path))) == ("n0", "n1")
+    assert names_in(parse(str(path))) == ("n0", "n1")
 
 
 def test_an_undirected_node_link_graph_needs_an_orientation(tmp_path: Path) -> None:
