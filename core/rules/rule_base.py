@@ -24,7 +24,7 @@ from pydantic import Field
 
 from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
-from ..numerics import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray, interpreted
 from ..plugins.settings import Positive, Settings
 from .kernels.compact_states import active_compact, each_compact, total_compact
 from .kernels.dense import Tried, enumerate_dense, enumerate_looked_up, values_dense
@@ -125,7 +125,7 @@ class RuleBase:
             raise ValueError(f"rule base: {self.n_rules} rules, allowed {MOST_RULES} at most")
         self.layout = layout(self.partitions, self.terms, n_own)
         # Not worth compiling it for.
-        lay = getattr(unpack, "py_func", unpack)(self.layout)
+        lay = interpreted(unpack)(self.layout)
         self.n_parts = int(lay.row_sizes @ lay.part_sizes)
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"

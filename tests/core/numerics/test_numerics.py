@@ -47,7 +47,8 @@ def package(tmp_path: Path) -> Path:
 def called(package: Path) -> tuple[int, int, bool]:
     """Return what a kernel says in a new process, its cache hits, and whether it was compiled."""
     code = (
-        "from package.caller import caller\nprint(caller(3), sum(caller.stats.cache_hits.values()))"
+        "from package.caller import caller\n"
+        "print(caller(3), sum(caller.compiled.stats.cache_hits.values()))"
     )
     command = [sys.executable, "-c", code]
     before = {path: path.stat().st_mtime_ns for path in package.rglob("*.nb?")}
