@@ -80,6 +80,11 @@ class Kernel:
         """What numba makes of the function for other kernels to call, by far the less code."""
         return self._compile(INNER, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes this for in kernels that name it as an attribute of its module."""
+        return self.compiled._numba_type_
+
     def _compile(self, suffix: str, **options: bool) -> Any:
         import numba
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from acting import fuzzy
+from acting import fuzzy, look
 
 from nested_agents.core.adaptation.learned_predictor import LearnedPredictor
 from nested_agents.core.adaptation.predictors import (
@@ -30,7 +30,7 @@ from nested_agents.topologies.config import build
 LEARNED = LearnedPredictorSettings(ridge=1e-6)
 
 
-class Rails:
+class Rails(Scenario):
     """Sledges on rails: each is driven by its own speed, and drags every other by a tenth.
 
     Their places wrap at 10 m. `predict` is missing: nothing but the learned predictor knows.
@@ -291,7 +291,7 @@ def test_what_it_cannot_regress_is_refused() -> None:
 def test_rewards_are_not_predicted() -> None:
     team = team_of(Rails(), decision={"rule": "reward"})
     with pytest.raises(ValueError, match=r"decision.rule = 'reward': no rewards"):
-        team.check(team.predict(Rails(), Rails().reset(0)))
+        team.check(look(Rails(), Rails().reset(0)))
 
 
 def test_states_by_group_are_those_of_all() -> None:
