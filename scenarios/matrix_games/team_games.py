@@ -23,7 +23,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ...core.coordination.graphs import Elimination, Shape, shaped
+from ...core.coordination.graphs import Elimination, Shape, build_shape
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
@@ -188,7 +188,8 @@ class TeamGame(Scenario):
             seen = tuple(Variable(f"distance{j + 1}", "1", 0.0, 1.0) for j in range(n))
         number = (choice("number", self.agents),) if settings.numbered else ()
         self.state_space = StateSpace(settings.game, (*seen, *number))
-        edges = shaped(settings.shape, n) if settings.game == "polymatrix" else nx.complete_graph(n)
+        is_sparse = settings.game == "polymatrix"
+        edges = build_shape(settings.shape, n) if is_sparse else nx.complete_graph(n)
         self._edges: list[tuple[int, int]] = sorted(tuple(sorted(edge)) for edge in edges.edges)
         self.interactions = self._edges
         self._numbers = np.arange(float(n))[:, None][:, : len(number)]

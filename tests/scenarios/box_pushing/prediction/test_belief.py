@@ -6,7 +6,7 @@ from acting import fuzzy, look
 from pydantic import ValidationError
 
 from benchmarks.scripted.controller import ScriptedController
-from nested_agents.core.adaptation.self_model import CalibrationSettings
+from nested_agents.core.adaptation.calibration import CalibrationSettings
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
