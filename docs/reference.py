@@ -73,7 +73,7 @@ MODULES = {
         "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
         "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.world",
         "box_pushing.pictures.rendering",
-        "box_pushing.pushing_points", "kinematic_chain.config",
+        "box_pushing.driving", "kinematic_chain.config",
         "kinematic_chain.scenario", "kinematic_chain.variables", "matrix_games.scenario",
         "matrix_games.team_games", "line_up", "faults.settings", "faults.wrappers",
         "state_variables", "checking.checker",

@@ -102,3 +102,4 @@ def test_the_wheel_holds_the_four_packages(packages: dict[str, Path], checkout: 
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"nested_agents"}
     assert [name for name in names if "/published/" in name] == []
     assert "nested_agents/studies/claims/quick/shapes.toml" in names
+    assert "nested_agents/examples/worlds/pushing_points.py" in names
