@@ -35,6 +35,7 @@ from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
 import nested_agents as na
+from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.spaces import choice
 from nested_agents.core.numerics import FloatArray, IntArray, wrap
 from nested_agents.core.plugins.settings import Positive
@@ -168,7 +169,7 @@ MOST_VALUES = 10**6
 """The most action values of an agent, of a team that learns of joint choices."""
 
 
-class PushingPoints:
+class PushingPoints(na.Scenario, Prediction):
     """A box, a goal, and robots as agents that choose where to push.
 
     Its episodes can be recorded and drawn. It is its own prediction.
