@@ -12,9 +12,10 @@ from gymnasium.envs.mujoco.swimmer_v5 import SwimmerEnv
 
 SEGMENT = '<geom fromto="{begin} 0 0 {end} 0 0" size="0.1" type="capsule"/>'
 HINGE = (
-    '<body name="segment{number}" pos="{at} 0 0">' + SEGMENT.format(begin=0, end=-1)
+    '<body name="segment{number}" pos="{at} 0 0">'
+    + SEGMENT.format(begin=0, end=-1)
     + '<joint axis="0 0 1" limited="true" name="joint{joint}" range="-100 100" type="hinge"/>'
-)  # fmt: skip
+)
 SWIMMER = """
 <mujoco model="swimmer">
   <compiler angle="degree" inertiafromgeom="true"/>

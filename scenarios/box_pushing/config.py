@@ -7,7 +7,7 @@ for the physics holds, but it was hardly intended.
 
 from collections.abc import Iterator, Mapping
 from math import pi
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -26,8 +26,12 @@ from .world.settings import (
     label,
 )
 
-LARGEST_BOX, LARGEST_RADIUS, LARGEST_REACH = 20.0, 1.0, 5.0
-"""Beyond these a size was hardly intended [m]."""
+LARGEST_BOX = 20.0
+"""Beyond this a size of a box was hardly intended [m]."""
+LARGEST_RADIUS = 1.0
+"""The same of the radius of a robot [m]."""
+LARGEST_REACH = 5.0
+"""The same of the reach of infrared sensors [m]."""
 HEAVIEST = 50.0
 """The same of masses [kg]."""
 FASTEST = 10.0
@@ -116,18 +120,21 @@ class BoxPushingSettings(BoxTaskSettings):
             raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
         return self
 
-    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
+    def scenario_defaults(self, preset: str) -> Mapping[str, object]:
         """Return what learns best here: with one or two robots, every wheel by weights of its own.
 
         Two robots stand on different sides of the box and need different functions; larger teams
         learn sooner if all left wheels share theirs, and all right wheels.
         """
-        return {"learner": {"weights": "own"}} if preset == "default" and self.robots <= 2 else {}
+        if preset == "default" and self.robots <= 2:
+            return {"learner": {"weights": "own"}}
+        return {}
 
 
-def _warnings(settings: Any) -> Iterator[str]:
-    """Yield a line for every size of `BoxTaskSettings` that is probably given in another unit."""
-    box, robot = settings.box, settings.robot
+def _warnings(settings: BoxTaskSettings) -> Iterator[str]:
+    """Yield a line for every size that is probably given in another unit."""
+    box = settings.box
+    robot = settings.robot
     if not isinstance(box, str):
         width = max(max(axis) - min(axis) for axis in zip(*box.vertices, strict=True))
         yield from _length("box.vertices", width, LARGEST_BOX)
@@ -150,7 +157,8 @@ def _warnings(settings: Any) -> Iterator[str]:
 
 def _length(key: str, value: float, most: float) -> Iterator[str]:
     if value > most:
-        unit, factor = ("mm", 1e-3) if value * 1e-2 > most / 10.0 else ("cm", 1e-2)
+        is_far_off = value * 1e-2 > most / 10.0
+        unit, factor = ("mm", 1e-3) if is_far_off else ("cm", 1e-2)
         yield _suggest_unit(key, value, "m", unit, factor)
 
 

@@ -144,7 +144,8 @@ def moved(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:
     turn = twists[:, 2] * seconds
     middle = poses[:, 2] + turn / 2
     chord = seconds * np.sinc(turn / (2 * pi))
-    cosine, sine = np.cos(middle), np.sin(middle)
+    cosine = np.cos(middle)
+    sine = np.sin(middle)
     x = poses[:, 0] + chord * (cosine * twists[:, 0] - sine * twists[:, 1])
     y = poses[:, 1] + chord * (sine * twists[:, 0] + cosine * twists[:, 1])
     return np.stack([x, y, poses[:, 2] + turn], axis=1)

@@ -19,7 +19,7 @@ holds, see `FailureSettings.held`. A world without failures never comes here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Generic, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.random import Generator
@@ -149,7 +149,10 @@ def befalling(
     return models
 
 
-class Failures:
+FailureT = TypeVar("FailureT", bound=FailureSettings)
+
+
+class Failures(Generic[FailureT]):
     """The failures that a spec schedules, and the actuators under them.
 
     Parameters
@@ -184,7 +187,7 @@ class Failures:
 
     def __init__(
         self,
-        settings: Sequence[FailureSettings],
+        settings: Sequence[FailureT],
         agents: Sequence[str],
         limits: FloatArray,
         key: str = "scenario.failures",
@@ -228,17 +231,19 @@ class Failures:
         speeds = np.tile(commands, (periods, 1))
         remembered = np.vstack([self._commands, speeds])
         for i in self._active:
-            mask, failure = self._masks[i], self._settings[i]
+            mask = self._masks[i]
+            failure = self._settings[i]
             if isinstance(failure, Delayed):
                 first = self._memory - failure.periods
                 speeds[:, mask] = remembered[first : first + periods, mask]
             else:
-                limits, stream = self._limits[mask], self._streams[i]
+                limits = self._limits[mask]
+                stream = self._streams[i]
                 speeds[:, mask] = failure.held(speeds[:, mask], limits, stream)
         self._commands = remembered[len(remembered) - self._memory :]
         return speeds
 
-    def active(self) -> Iterator[tuple[Any, BoolArray]]:
+    def active(self) -> Iterator[tuple[FailureT, BoolArray]]:
         """Yield the failures that are on, each with the mask ``(n,)`` of what it has befallen."""
         for i in self._active:
             yield self._settings[i], self._masks[i]

@@ -198,7 +198,8 @@ class _Faulty:
                     f"mechanism that does, or say what else actions command"
                 )
         # Actions by prefix: those of Gymnasium have none, those of PettingZoo the agent's name.
-        spaces, rests = {"": env.action_space}, {"": rest}
+        spaces = {"": env.action_space}
+        rests = {"": rest}
         if hasattr(env, "possible_agents"):
             spaces = {agent: env.action_space(agent) for agent in env.possible_agents}
             rests = rest or {}
@@ -211,8 +212,11 @@ class _Faulty:
         self.actuators = tuple(names)
         limits = np.concatenate([scale.limits for scale, _ in self._parts.values()])
         self._failures = Failures(faults, self.actuators, limits, "faults")
-        self._commands, self._mechanism, self._seed = commands, mechanism, seed
-        self._inform, self._hooked = inform, False
+        self._commands = commands
+        self._mechanism = mechanism
+        self._seed = seed
+        self._inform = inform
+        self._hooked = False
         self.carried: Any = None
         self._begin(0, 0)
 
@@ -223,12 +227,15 @@ class _Faulty:
         """
         left = dict(options or {})
         if seed is not None:
-            self._world, self._episode = seed, -1
+            self._world = seed
+            self._episode = -1
         self._begin(self._world, int(left.pop("fault_episode", self._episode + 1)))
         return self.env.reset(seed=seed, options=left or None)
 
     def _begin(self, world: int, episode: int) -> None:
-        self._world, self._episode, self._step = world, episode, 0
+        self._world = world
+        self._episode = episode
+        self._step = 0
         root = np.random.SeedSequence([self._seed, world, episode])
         self._failures.begin(root, episode)
         self._rng = np.random.default_rng(root)
@@ -347,7 +354,8 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
         self.carried = self._carry(actions)
         *given, infos = self.env.step(self.carried)
         if self._inform:
-            now, infos = self._now(), dict(infos)
+            now = self._now()
+            infos = dict(infos)
             for agent, info in infos.items():
                 own = {name: kind for name, kind in now.items() if name.rpartition(".")[0] == agent}
                 infos[agent] = {**info, "faults": own, "carried": self.carried.get(agent)}

@@ -1,7 +1,7 @@
 """The settings of the kinematic chain, as they stand in the ``[scenario]`` table of a spec."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Union
 
 from pydantic import Field
 
@@ -90,7 +90,7 @@ class KinematicChainSettings(ScenarioSettings):
     most_decisions: Annotated[int, Field(ge=1, le=1_000_000)] = 150
     """Decisions after which an episode is broken off."""
 
-    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
+    def scenario_defaults(self, preset: str) -> Mapping[str, object]:
         """Return what learns best here: little regularisation, and little foresight.
 
         The ridge weighs against the squared errors of all joints that share weights, so that it

@@ -29,11 +29,18 @@ import numpy as np
 from ...core.interface.spaces import Variable
 from ...core.numerics import FloatArray, njit
 from ...core.plugins.registry import Registry
-from ..state_variables import find_variable, fixed, sensed, space_of, state_variable
+from ..state_variables import (
+    Situations,
+    find_variable,
+    fixed,
+    sensed,
+    space_of,
+    state_variable,
+)
 
 
 @dataclass(frozen=True)
-class ChainView:
+class ChainView(Situations):
     """Situations to be described, ``m`` at once."""
 
     places: FloatArray
@@ -49,7 +56,7 @@ class ChainView:
 
     @property
     def n_situations(self) -> int:
-        """How many situations there are."""
+        """How many postures there are."""
         return len(self.places)
 
     @property

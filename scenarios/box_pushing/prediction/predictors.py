@@ -122,6 +122,7 @@ class ExactPrediction(BoxPrediction):
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
         speeds = self.commands(joint_action)
         future = self.future.onward(speeds)
-        box, robots = future.state.poses[0], future.state.poses[1:]
+        box = future.state.poses[0]
+        robots = future.state.poses[1:]
         reached = replace(self.situation, robots=robots, box=box, speeds=speeds)
         return ExactPrediction(reached, self.model, self.premises, future)

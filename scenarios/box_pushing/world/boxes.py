@@ -40,8 +40,10 @@ MAX_VERTICES = 8
 """Of a convex piece; b2_maxPolygonVertices."""
 MOST_VERTICES = 1000
 """Of an outline and its holes; a drawing with more is to be simplified."""
-LEAST_EDGE, LARGEST = 1e-6, 100.0
-"""Shortest edge, and greatest distance of a vertex from another one [m]."""
+LEAST_EDGE = 1e-6
+"""Shortest edge [m]."""
+LARGEST = 100.0
+"""Greatest distance of a vertex from another one [m]."""
 STRAIGHT = 1e-9
 """Sine of the angle between edges that counts as straight on."""
 
@@ -65,7 +67,8 @@ def moments(edges: FloatArray) -> Moments:
     Sums over the signed triangles between the origin and each edge; exact but for `radial`, which
     is a 64-point Gauss-Legendre quadrature along each edge.
     """
-    a, b = edges[:, :2], edges[:, 2:]
+    a = edges[:, :2]
+    b = edges[:, 2:]
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     area = cross.sum() / 2
     ends = a + b
@@ -127,7 +130,8 @@ def _check_ring(box: str, vertices: Vertices) -> None:
     edges = np.roll(ring, -1, axis=0) - ring
     short = np.flatnonzero(np.hypot(edges[:, 0], edges[:, 1]) < LEAST_EDGE)
     if len(short):
-        first, second = short[0] + 1, (short[0] + 1) % len(ring) + 1
+        first = short[0] + 1
+        second = (short[0] + 1) % len(ring) + 1
         raise ValueError(
             f"{box}: vertices {first} and {second} are at the same place {vertices[short[0]]}, "
             "allowed: each once, the first not again at the end"
@@ -146,7 +150,8 @@ def _merged(first: FloatArray, second: FloatArray) -> FloatArray | None:
 
 def _turns(ring: FloatArray) -> FloatArray:
     """Return the sine of the turn at every vertex of a ring ``(n, 2)``."""
-    into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    into = ring - np.roll(ring, 1, axis=0)
+    out = np.roll(ring, -1, axis=0) - ring
     cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
     return cross / (np.linalg.norm(into, axis=1) * np.linalg.norm(out, axis=1))
 
@@ -268,7 +273,8 @@ class BoxSpec:
     def moments(self) -> Moments:
         """Moments of the area."""
         if self.polygon is None:
-            area, quarter = pi * self.radius**2, pi * self.radius**4 / 4
+            area = pi * self.radius**2
+            quarter = pi * self.radius**4 / 4
             return Moments(area, np.zeros(2), quarter * np.eye(2), area * self.radius * 2 / 3)
         return moments(self.outline.edges)
 
@@ -325,9 +331,12 @@ class BoxSpec:
             tuple((along * x, factor * y) for x, y in ring) for ring in (self.vertices, *self.holes)
         ]
         return replace(
-            self, vertices=outline, holes=tuple(holes), radius=along * self.radius,
+            self,
+            vertices=outline,
+            holes=tuple(holes),
+            radius=along * self.radius,
             mass=factor * self.mass,
-        )  # fmt: skip
+        )
 
 
 def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
@@ -349,7 +358,8 @@ def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
     >>> round(box.area, 12), box.mass
     (0.16, 0.8)
     """
-    described, factor = _described(box), growth(box, robots)
+    described = _described(box)
+    factor = growth(box, robots)
     return described if factor == 1.0 else described.scaled(factor)
 
 
@@ -381,7 +391,8 @@ def _described(box: str | BoxSettings) -> BoxSpec:
 
 
 def _rectangle(name: str, depth: float, width: float) -> BoxSpec:
-    x, y = depth / 2, width / 2
+    x = depth / 2
+    y = width / 2
     return BoxSpec(name, ((-x, -y), (x, -y), (x, y), (-x, y)))
 
 

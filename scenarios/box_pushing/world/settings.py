@@ -232,7 +232,8 @@ class Task(NamedTuple):
 
     def reached(self, distance: FloatArray, orientation: FloatArray) -> BoolArray:
         """Return whether the goal is reached ``(m,)``; parameters as of `reward`."""
-        near, most = distance <= self.tolerance, self.orientation_tolerance
+        near = distance <= self.tolerance
+        most = self.orientation_tolerance
         return near if most is None else near & (np.abs(orientation) <= most)
 
 
@@ -272,8 +273,12 @@ def reward(
     """
     settings = task.reward
     at = np.s_[:, None] if settings.of == "team" else np.s_[:, :, None]
-    contact, readings = contact[at], readings[at]  # of robots (m, parties, members)
-    distance, approach, orientation = distance[:, None], approach[:, None], orientation[:, None]
+    # Of robots: (m, parties, members).
+    contact = contact[at]
+    readings = readings[at]
+    distance = distance[:, None]
+    approach = approach[:, None]
+    orientation = orientation[:, None]
     r1 = settings.c1 * np.exp(-settings.r1 * distance)
     r2_r3 = (settings.c2 * np.exp(-settings.r2 * readings)).sum(axis=2)
     r4 = settings.c4 * np.abs(orientation)
