@@ -100,8 +100,8 @@ class LineUp(Scenario):
         self._commands = self._commanded(joint_action)
         self._places, self._speeds = advance(self._places, self._speeds, self._commands)
         arrived = bool((np.abs(self._places) < TOLERANCE).all())
-        paid = float(reward(self._places))
-        return Transition(self._states(), paid, arrived, False, self.measure())
+        received = float(reward(self._places))
+        return Transition(self._states(), received, arrived, False, self.measure())
 
     def predict(self) -> LineUpPrediction:
         """Predict from the present state."""

@@ -25,7 +25,7 @@ StateFunction = Callable[[Any, int], FloatArray]
 
 @dataclass(frozen=True)
 class Situations(ABC):
-    """Situations to be described, ``m`` at once: what the view of a scenario inherits."""
+    """Situations to be describe, ``m`` at once: what the view of a scenario inherits."""
 
     @property
     @abstractmethod
@@ -91,20 +91,20 @@ def space_of(name: str, own: Variable, things: Sequence[StateVariable]) -> State
     return StateSpace(name, variables, 1, common)
 
 
-def fixed(array: FloatArray) -> FloatArray:
+def freeze(array: FloatArray) -> FloatArray:
     """Make an array read-only, and return it."""
     array.flags.writeable = False
     return array
 
 
-def guarded(view: SituationsT) -> SituationsT:
+def guard(view: SituationsT) -> SituationsT:
     """Return a view of the same situations whose arrays cannot be written to."""
     held = {field.name: vars(view)[field.name] for field in fields(view)}
-    arrays = {k: fixed(v.view()) for k, v in held.items() if isinstance(v, np.ndarray)}
+    arrays = {k: freeze(v.view()) for k, v in held.items() if isinstance(v, np.ndarray)}
     return replace(view, **arrays)
 
 
-def sensed(
+def sense(
     parts: Sequence[StateVariable],
     view: Situations,
     bodies: Sequence[int],
@@ -120,7 +120,7 @@ def sensed(
     shape = (len(bodies), view.n_situations, len(parts))
     values = np.empty(shape) if done is None else done
     wanted = [(c, thing) for c, thing in enumerate(parts) if once or not thing.trusted]
-    safe = view if all(thing.trusted for _, thing in wanted) else guarded(view)
+    safe = view if all(thing.trusted for _, thing in wanted) else guard(view)
     for column, thing in wanted:
         for k, body in enumerate(bodies):
             known = once and k > 0 and thing.common
@@ -155,11 +155,11 @@ def state_variable(
     'closest'
     """
 
-    def described(function: StateFunction) -> StateVariable:
+    def describe(function: StateFunction) -> StateVariable:
         variable = Variable(function.__name__, unit, low, high, periodic, centres, labels, mirrored)
         return StateVariable(variable, function, common)
 
-    return described
+    return describe
 
 
 def find_variable(registry: Registry, name: str) -> StateVariable:
@@ -179,7 +179,7 @@ def find_variable(registry: Registry, name: str) -> StateVariable:
     return replace(thing, trusted=name in registry.built_in)
 
 
-def referred(registry: Registry) -> BeforeValidator:
+def names_of(registry: Registry) -> BeforeValidator:
     """Return what replaces state variables of a registry by their names, in a list of both."""
 
     def named(given: object) -> object:

@@ -302,7 +302,7 @@ class PushingPoints(na.Scenario, Prediction):
 
     def constants_of_episode(self) -> dict[str, Any]:
         """Return those of `BoxPushing`; a frame is an option."""
-        return {**self.world.constants_of_episode(), **self.settings.drawn}
+        return {**self.world.constants_of_episode(), **self.settings.drawing}
 
     def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
         """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from ...core.plugins.settings import Positive, ScenarioSettings, team_size
-from ..state_variables import referred
+from ..state_variables import names_of
 from .prediction.settings import BeliefSettings
 from .states.relational import STATE_VARIABLES
 from .world.settings import (
@@ -86,7 +86,7 @@ class BoxTaskSettings(ScenarioSettings):
         return self.action_repeat * CONTROL_PERIOD
 
     @property
-    def drawn(self) -> dict[str, float | str]:
+    def drawing(self) -> dict[str, float | str]:
         """What a recording must tell beside motions, so that it can be drawn."""
         named = {"robot": self.robot, "box": self.box, "infrared": self.infrared}
         return {"dt": self.period} | {name: label(thing) for name, thing in named.items()}
@@ -99,7 +99,7 @@ class BoxPushingSettings(BoxTaskSettings):
     factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
     state_space: Annotated[
         Literal["paper", "relational", "pose", "crowd", "wide"] | tuple[str, ...],
-        referred(STATE_VARIABLES),
+        names_of(STATE_VARIABLES),
     ] = "relational"
     """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
     name, one's own included."""

@@ -105,7 +105,7 @@ class Drivers:
             now = after[row, option]
             twists = twists[row, option]
             for _ in range(2):
-                poses = moved(poses, twists, self.seconds / 2)
+                poses = move(poses, twists, self.seconds / 2)
                 apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
                 cost = cost + 10.0 * np.maximum(span - apart, 0.0).sum(axis=1)
                 path = paths(
@@ -139,7 +139,7 @@ def _robot_actions(robot: RobotSettings, n_actions: int) -> IntArray:
     return np.array([[row[groups.index(side)] for side in sides] for row in rows])
 
 
-def moved(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:
+def move(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:
     """Return poses ``(m, 3)`` after moving with constant body twists ``(m, 3)``."""
     turn = twists[:, 2] * seconds
     middle = poses[:, 2] + turn / 2

@@ -157,8 +157,10 @@ class BoxPushing(Scenario, Embodiment):
         self._model = push_model(settings.predictor, robots, self.box, settings.belief)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = WheelFailures(settings.failures, self.agents, self._limits)
-        paid = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
-        self._task = Task(paid, self._unit * settings.tolerance, settings.orientation_tolerance)
+        reward_settings = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
+        self._task = Task(
+            reward_settings, self._unit * settings.tolerance, settings.orientation_tolerance
+        )
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._premises = Premises(
             self._belief,
@@ -236,7 +238,7 @@ class BoxPushing(Scenario, Embodiment):
         contact = self.world.contact[None]
         strongest = readings.max(axis=1)[None]
         gained = reward(self._task, distance, way, turn, contact, strongest)[0]
-        paid = gained[self._body] if self.settings.reward.of == "robot" else float(gained[0])
+        received = gained[self._body] if self.settings.reward.of == "robot" else float(gained[0])
         sensed = perf_counter()
         if terminated:
             # Does the box come to rest within the tolerance when all wheels stop?
@@ -247,7 +249,7 @@ class BoxPushing(Scenario, Embodiment):
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
         farthest = self._unit * self.settings.termination_radius
         truncated = not terminated and away > farthest
-        return Transition(states, paid, terminated, truncated, measured, twists)
+        return Transition(states, received, terminated, truncated, measured, twists)
 
     def embodiment(self) -> Embodiment:
         """Return itself: its robots are open to self-models."""
@@ -285,7 +287,7 @@ class BoxPushing(Scenario, Embodiment):
 
     def constants_of_episode(self) -> dict[str, object]:
         """Return the goal pose of the episode, and what is drawn."""
-        return {"goal_pose": self._goal, **self.settings.drawn}
+        return {"goal_pose": self._goal, **self.settings.drawing}
 
     def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
         """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""
@@ -366,4 +368,4 @@ class BoxPushing(Scenario, Embodiment):
             self.box.friction_radius,
         )
         own = self._space.own(poses[self._body], self._speeds, self._goal)
-        return np.hstack([own, self._space.sensed(view, range(len(poses)))[self._body, 0]])
+        return np.hstack([own, self._space.sense(view, range(len(poses)))[self._body, 0]])

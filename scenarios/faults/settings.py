@@ -2,13 +2,13 @@
 
 The kinds of failure, `KINDS`, know nothing of what fails. A scenario says under which key its
 actuators are named, ``wheels`` or ``joints``, in a model that inherits `FailureSettings`, and
-`befalling` joins it with the kinds that can befall them::
+`build_kinds` joins it with the kinds that can befall them::
 
     class WheelFailure(FailureSettings):
         part = "wheels"
         wheels: Names
 
-    Failure = Annotated[Union[*befalling(WheelFailure, **KINDS).values()], DISCRIMINATOR]
+    Failure = Annotated[Union[*build_kinds(WheelFailure, **KINDS).values()], DISCRIMINATOR]
 
 A failure lies between the command that an actuator gets and the speed that its servo holds, see
 `FailureSettings.held`; the agents see the commands, and the failure only in how their bodies move.
@@ -116,7 +116,7 @@ DISCRIMINATOR = Field(discriminator="kind")
 """Of a field that holds failures of any of several kinds."""
 
 
-def befalling(
+def build_kinds(
     naming: type[FailureSettings], **kinds: type[FailureSettings]
 ) -> dict[str, type[Any]]:
     """Return the settings of failures that befall what `naming` names, by their ``kind``.
@@ -128,7 +128,7 @@ def befalling(
     >>> class CartFailure(FailureSettings):
     ...     part = "carts"
     ...     carts: tuple[str, ...]
-    >>> befalling(CartFailure, loose=Free)["loose"](carts=("left",))
+    >>> build_kinds(CartFailure, loose=Free)["loose"](carts=("left",))
     Loose(episode=0, step=0, end_episode=None, end_step=0, carts=('left',), kind='loose')
     >>> CartFailure.Loose.__doc__
     'The cart has no drive and gives way.'

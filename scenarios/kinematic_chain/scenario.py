@@ -127,9 +127,9 @@ class KinematicChain(Scenario, Embodiment):
         truncated = not terminated and self._step >= self.settings.most_decisions
         twists = np.zeros((len(angles), 3))
         twists[:, 2] = (self._angles - angles) / PERIOD
-        paid = float(self._reward(away, before - away)[0])
+        received = float(self._reward(away, before - away)[0])
         measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
-        return Transition(states, paid, terminated, truncated, measured, twists)
+        return Transition(states, received, terminated, truncated, measured, twists)
 
     def embodiment(self) -> Embodiment:
         """Return itself: its joints are open to self-models."""
@@ -259,7 +259,7 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         self.turns = np.ascontiguousarray((after - angles).T)
         self._fractions = self.speeds / arm.settings.top_speed
 
-    def seen(self, joint_actions: IntArray) -> ChainView:
+    def view_after(self, joint_actions: IntArray) -> ChainView:
         """Return the situations after joint actions ``(m, n)``."""
         angles = self.angles + self.turns[self._joints, joint_actions]
         places = postures_of(angles, self.arm.length)
@@ -268,21 +268,21 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        return self.arm._states.of_joints(self.seen(joint_actions), agent, 1)[0]
+        return self.arm._states.of_joints(self.view_after(joint_actions), agent, 1)[0]
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the speeds ``(n, m, 1)`` and the other variables ``(n, m, d - 1)`` of all."""
-        states = self.arm._states.of_joints(self.seen(joint_actions), 0, len(self.angles))
+        states = self.arm._states.of_joints(self.view_after(joint_actions), 0, len(self.angles))
         return states[:, :, :1], states[self._joints, :, 1:]
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
-        view = self.seen(joint_actions)
+        view = self.view_after(joint_actions)
         return self.arm._reward(view.distance, view.approach)
 
     def after(self, joint_action: IntArray) -> ChainPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in one decision."""
-        reached = self.seen(joint_action[None])
+        reached = self.view_after(joint_action[None])
         speeds = self.commands(joint_action)
         before = float(reached.distance[0])
         return ChainPrediction(self.arm, self.effects, reached.angles[0], speeds, before)

@@ -32,8 +32,8 @@ from ...core.plugins.registry import Registry
 from ..state_variables import (
     Situations,
     find_variable,
-    fixed,
-    sensed,
+    freeze,
+    sense,
     space_of,
     state_variable,
 )
@@ -67,7 +67,7 @@ class ChainView(Situations):
     @cached_property
     def distance(self) -> FloatArray:
         """Distance ``(m,)`` of the tip from the goal [m]."""
-        return fixed(np.hypot(*(self.goal - self.tip).T))
+        return freeze(np.hypot(*(self.goal - self.tip).T))
 
     @property
     def approach(self) -> FloatArray:
@@ -226,5 +226,5 @@ class ChainStates:
         states: FloatArray = columns(
             view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
         )
-        sensed(self._things, view, range(first, first + count), states[:, :, 1:])
+        sense(self._things, view, range(first, first + count), states[:, :, 1:])
         return states

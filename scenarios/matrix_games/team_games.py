@@ -68,15 +68,15 @@ class Game(ABC):
 
     Parameters
     ----------
-    seen
+    states
         What the agents see ``(n, d)``.
     """
 
     best = 1.0
     """The greatest payoff."""
 
-    def __init__(self, seen: FloatArray) -> None:
-        self.seen = seen
+    def __init__(self, states: FloatArray) -> None:
+        self.states = states
 
     @abstractmethod
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
@@ -136,8 +136,8 @@ class Landmarks(Game):
 
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
         """Return the share of landmarks that are taken, less the cost of the mean distance."""
-        n = len(self.seen)
-        far = self.seen[np.arange(n), joint_actions].mean(axis=1)
+        n = len(self.states)
+        far = self.states[np.arange(n), joint_actions].mean(axis=1)
         return distinct(joint_actions) / n - self._cost * far
 
     def is_optimal(self, joint_action: IntArray) -> bool:
@@ -146,9 +146,9 @@ class Landmarks(Game):
 
     def advance(self, rng: np.random.Generator) -> None:
         """Draw other places, and find the assignment of least distance."""
-        agents, landmarks = rng.random((2, len(self.seen), 2))
-        self.seen = np.linalg.norm(agents[:, None] - landmarks, axis=2)
-        assigned = optimize.linear_sum_assignment(self.seen)[1]
+        agents, landmarks = rng.random((2, len(self.states), 2))
+        self.states = np.linalg.norm(agents[:, None] - landmarks, axis=2)
+        assigned = optimize.linear_sum_assignment(self.states)[1]
         self.best = float(self.payoffs(assigned[None])[0])
 
 
@@ -231,4 +231,4 @@ class TeamGame(Scenario):
         return Transition(self._states(), payoff, False, False, info)
 
     def _states(self) -> FloatArray:
-        return np.hstack([self.game.seen, self._numbers])
+        return np.hstack([self.game.states, self._numbers])

@@ -110,9 +110,11 @@ class BoxPrediction(EmbodiedPrediction, Tables):
         now = self.situation
         twists = self.wheel_commands.twists
         robots, box, gaps = push(now.robots, now.box, twists, choices, seconds, self.model)
-        return self._seen(robots, box, gaps, seconds)
+        return self._view_of(robots, box, gaps, seconds)
 
-    def _seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
+    def _view_of(
+        self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float
+    ) -> View:
         """Return a view of situations that the present one leads to in `seconds`."""
         now = self.situation
         premises = self.premises

@@ -116,7 +116,7 @@ class ExactPrediction(BoxPrediction):
         commands = self.wheel_commands.speeds[np.arange(rows.shape[1]), rows]
         played = [self.future.after(each.ravel(), periods) for each in commands]
         poses, gaps = (np.array(part)[which] for part in zip(*played, strict=True))
-        return self._seen(poses[:, 1:], poses[:, 0], gaps, seconds)
+        return self._view_of(poses[:, 1:], poses[:, 0], gaps, seconds)
 
     def after(self, joint_action: IntArray) -> ExactPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""

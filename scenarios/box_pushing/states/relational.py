@@ -28,7 +28,7 @@ import numpy as np
 
 from ....core.numerics import FloatArray, njit, wrap
 from ....core.plugins.registry import Registry
-from ...state_variables import Situations, StateFunction, StateVariable, fixed, state_variable
+from ...state_variables import Situations, StateFunction, StateVariable, freeze, state_variable
 from ..world.geometry import Outline, surface
 
 CLOSE = 0.02
@@ -74,7 +74,7 @@ class View(Situations):
     @cached_property
     def distance(self) -> FloatArray:
         """Distance ``(m,)`` of the box from the goal [m]."""
-        return fixed(np.hypot(*(self.goal[:2] - self.box[:, :2]).T))
+        return freeze(np.hypot(*(self.goal[:2] - self.box[:, :2]).T))
 
     @cached_property
     def before(self) -> float:
@@ -132,12 +132,12 @@ class View(Situations):
         drift = np.arctan2(across, np.abs(along) + STILL * self.periods)
         reach = 2.0 * self.friction_radius**2 / np.maximum(self.distance, ARRIVED)
         turn = np.arctan2(lever, np.maximum(depth, reach))
-        return fixed(inward + KEPT * drift + turn)
+        return freeze(inward + KEPT * drift + turn)
 
     @cached_property
     def turn(self) -> FloatArray:
         """Turn ``(m,)`` of the box from the goal pose [rad]."""
-        return fixed(wrap(self.box[:, 2] - self.goal[2]))
+        return freeze(wrap(self.box[:, 2] - self.goal[2]))
 
     def azimuth(self, robot: int) -> FloatArray:
         """Direction ``(m,)`` from a robot to the box [rad]."""
@@ -156,7 +156,7 @@ class View(Situations):
 
 def _direction(ways: FloatArray) -> FloatArray:
     """Return the directions ``(m,)`` of ways ``(m, 2)`` [rad], read-only."""
-    return fixed(np.arctan2(ways[:, 1], ways[:, 0]))
+    return freeze(np.arctan2(ways[:, 1], ways[:, 0]))
 
 
 @njit(cache=True)

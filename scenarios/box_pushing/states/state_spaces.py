@@ -18,7 +18,7 @@ import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics import FloatArray, wrap
-from ...state_variables import StateVariable, find_variable, sensed, space_of
+from ...state_variables import StateVariable, find_variable, sense, space_of
 from .relational import STATE_VARIABLES, View
 from .relational_lanes import Columns
 
@@ -38,14 +38,14 @@ class BoxStateSpace:
     columns: Columns | None = None
     """Computes the built-in ones fast for many situations; none: the functions do."""
 
-    def sensed(self, view: View, robots: Sequence[int]) -> FloatArray:
+    def sense(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, by the functions alone."""
-        return sensed(self.functions, view, robots)
+        return sense(self.functions, view, robots)
 
     def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
         compiled = None if self.columns is None else self.columns.of(view, robots)
-        return sensed(self.functions, view, robots, compiled)
+        return sense(self.functions, view, robots, compiled)
 
 
 def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
@@ -75,7 +75,7 @@ def _angle(name: str, centres: tuple[float, ...] = ()) -> Variable:
 _shared = partial(StateVariable, common=True, trusted=True)
 
 
-def listed(name: str, *shared: str) -> BoxStateSpace:
+def build_space(name: str, *shared: str) -> BoxStateSpace:
     """Return a state space of variables by name, behind the speed of the own wheel.
 
     Raises
@@ -127,14 +127,16 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
         functions=_PAPER,
     ),
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
-    "relational": listed("relational", *_PUSHING),
-    "pose": listed("pose", *_PUSHING, "bend", "box_turn"),
+    "relational": build_space("relational", *_PUSHING),
+    "pose": build_space("pose", *_PUSHING, "bend", "box_turn"),
     # The same for boxes that are wide for a robot, and for any number of robots.
-    "crowd": listed(
+    "crowd": build_space(
         "crowd", *_BESIDE_OTHERS, "contact_push_bearing", "contact_cross_track_error", *_ON_THE_WAY
     ),
     # For boxes so wide that they hardly turn on the way: where the box goes, not how it is pushed.
-    "wide": listed("wide", *_BESIDE_OTHERS, "path_bearing", "path_cross_track_error", *_ON_THE_WAY),
+    "wide": build_space(
+        "wide", *_BESIDE_OTHERS, "path_bearing", "path_cross_track_error", *_ON_THE_WAY
+    ),
 }
 """State spaces by the name that specs use."""
 
@@ -154,7 +156,9 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
     >>> state_space_for("paper", 0.26).space.variables[3].centres
     (-0.26, -0.13, 0.0, 0.13, 0.26)
     """
-    space = STATE_SPACES[chosen] if isinstance(chosen, str) else listed("+".join(chosen), *chosen)
+    space = (
+        STATE_SPACES[chosen] if isinstance(chosen, str) else build_space("+".join(chosen), *chosen)
+    )
     factor = max_speed / _MAX_SPEED
     if factor == 1.0:
         return space

@@ -87,7 +87,7 @@ def polygon_edges(polygon: Polygon) -> FloatArray:
     return np.vstack([ring_edges(np.asarray(ring.coords)[:-1]) for ring in rings])
 
 
-def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Polygon:
+def centre(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Polygon:
     """Return a checked polygon, counter-clockwise, with its centre of mass at the origin.
 
     A clockwise outline is turned around with a warning.
@@ -138,7 +138,7 @@ def _check_ring(box: str, vertices: Vertices) -> None:
         )
 
 
-def _merged(first: FloatArray, second: FloatArray) -> FloatArray | None:
+def _merge(first: FloatArray, second: FloatArray) -> FloatArray | None:
     """Return the union of two convex rings that share an edge, or None unless it is convex."""
     union = shapely.union(Polygon(first), Polygon(second))
     if not isinstance(union, Polygon) or union.interiors:
@@ -177,7 +177,7 @@ def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
         if not beside.has_edge(i, j):  # one of them has been merged since
             continue
         shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
-        union = _merged(pieces[i], pieces[j]) if len(shared) >= 2 else None
+        union = _merge(pieces[i], pieces[j]) if len(shared) >= 2 else None
         if union is None:
             continue
         pieces[i] = union
@@ -247,7 +247,7 @@ class BoxSpec:
     @cached_property
     def polygon(self) -> Polygon | None:
         """The centred polygon; None for a disc."""
-        return centred(self.name, self.vertices, self.holes) if self.vertices else None
+        return centre(self.name, self.vertices, self.holes) if self.vertices else None
 
     @cached_property
     def rings(self) -> list[FloatArray]:
@@ -358,7 +358,7 @@ def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
     >>> round(box.area, 12), box.mass
     (0.16, 0.8)
     """
-    described = _described(box)
+    described = _spec_of(box)
     factor = growth(box, robots)
     return described if factor == 1.0 else described.scaled(factor)
 
@@ -376,10 +376,10 @@ def growth(box: str | BoxSettings, robots: int) -> float:
     >>> growth("square", 2), growth("square", 8)
     (1.0, 4.0)
     """
-    return max(robots / ROBOTS_PER_BOX, 1.0) if _described(box).grows else 1.0
+    return max(robots / ROBOTS_PER_BOX, 1.0) if _spec_of(box).grows else 1.0
 
 
-def _described(box: str | BoxSettings) -> BoxSpec:
+def _spec_of(box: str | BoxSettings) -> BoxSpec:
     """Return a box as it stands in the table or the spec."""
     if isinstance(box, str) and box.startswith("{"):
         box = BoxSettings.model_validate_json(box)

@@ -22,7 +22,7 @@ from pydantic import Field, model_validator
 from ....core.hierarchy.failures import Names
 from ....core.numerics import BoolArray, FloatArray
 from ....core.plugins.settings import NonNegative, Positive, Settings, unwritten
-from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
+from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
 
 GRAVITY = 9.81
 """Standard acceleration of free fall [m/s2], rounded."""
@@ -81,7 +81,7 @@ class WheelFailure(FailureSettings):
 if TYPE_CHECKING:
     Failure = WheelFailure
 else:
-    Failure = Annotated[Union[*befalling(WheelFailure, **KINDS).values()], DISCRIMINATOR]
+    Failure = Annotated[Union[*build_kinds(WheelFailure, **KINDS).values()], DISCRIMINATOR]
 """Any failure's settings, distinguished by `kind`."""
 
 

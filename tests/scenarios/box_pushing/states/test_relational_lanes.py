@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES, View
 from nested_agents.scenarios.box_pushing.states.relational_lanes import COMPILED, angle_of
-from nested_agents.scenarios.box_pushing.states.state_spaces import listed
+from nested_agents.scenarios.box_pushing.states.state_spaces import build_space
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.state_variables import find_variable
 
@@ -29,8 +29,8 @@ def test_compiled_blocks_are_those_of_the_definition(
         rng.normal(size=(100, robots)), rng.normal(size=3), rng.normal(size=3),
         3.0, BOXES[box].outline, BOXES[box].friction_radius,
     )  # fmt: skip
-    space, wanted = listed("some", *names), list(range(robots))[::-1]
-    expected = np.array([space.sensed(seen, [r])[0] for r in wanted])
+    space, wanted = build_space("some", *names), list(range(robots))[::-1]
+    expected = np.array([space.sense(seen, [r])[0] for r in wanted])
     np.testing.assert_allclose(space.shared_of(seen, wanted), expected, rtol=0, atol=1e-12)
 
 
