@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.learners.td import QLearning
 from nested_agents.core.plugins.sources import Sources
@@ -115,9 +116,9 @@ def test_presets_learn_it_by_q_learning(
     spec = Spec.of({"scenario": {**SCENARIO, "observed": observed}}, sources)
     (condition,) = spec.conditions()
     _, _, team = arrange(condition.settings, 0)
-    assert isinstance(team.learner, QLearning)
+    assert isinstance(fuzzy(team).learner, QLearning)
     assert len(team.hierarchy.edges) == edges
-    assert team.learner.theta.shape == (2, rules)
+    assert fuzzy(team).learner.theta.shape == (2, rules)
 
 
 def test_what_is_learned_on_a_square_is_evaluated_on_other_boxes(sources: Sources) -> None:
