@@ -72,7 +72,7 @@ class Embodiment(ABC):
     """Per body the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
     constants: tuple[str, ...] = ()
     """Names of the positive constants of its predictor that can be calibrated."""
-    levers: FloatArray
+    levers: FloatArray = np.zeros(0)
     """``(K + M,)`` the speed per turning rate of what is moved and of the bodies [m], if there are
     constants."""
 

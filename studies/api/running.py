@@ -29,7 +29,7 @@ import numpy as np
 from ...core.interface.measures import Measure
 from ...core.numerics import FloatArray, IntArray, optimize, pd
 from ...core.plugins.sources import is_reference
-from ..catalogue.study import load_study, measured
+from ..catalogue.study import load_study, measure_by_name
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
@@ -97,7 +97,7 @@ def run_study(
             store.forget_failed()
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
-        run_one = measured if is_reference(spec.study) else load_study(spec.study).measure
+        run_one = measure_by_name if is_reference(spec.study) else load_study(spec.study).measure
         for note in (*store.notes, *spec.warnings()):
             observer.note(note)
         if left:
@@ -127,7 +127,7 @@ def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
     """
     measures = check(spec, may_fail=may_fail)
     with spec.sources.active():
-        getattr(load_study(spec.study), "check", lambda spec: None)(spec)
+        load_study(spec.study).check(spec)
     return measures
 
 

@@ -16,6 +16,7 @@ from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.plain import as_explorer, as_learner
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
 from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
 from nested_agents.core.hierarchy.failures import AbsentAgents, LostMessages
@@ -24,7 +25,6 @@ from nested_agents.core.interface.experience import Experience
 from nested_agents.core.interface.scenario import carried_rows
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings
-from nested_agents.core.learners.learner import Decision
 from tests.scenarios.test_examples import Tank
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
@@ -512,7 +512,7 @@ class StateActionValues:
 def test_a_learner_that_asks_is_given_what_was_done_where() -> None:
     """So that SARSA is a learner of a hierarchy like any other."""
     scenario = Tank(Tank.Settings(pumps=1))
-    decision = Decision().model_copy(update={"evaluator": StateActionValues.Settings()})
+    decision = DecisionSettings().model_copy(update={"evaluator": StateActionValues.Settings()})
     settings = SarsaSettings(decision=decision, discount=0.8)
     hierarchy = Hierarchy(scenario.agents, [])
     team = Team(settings, scenario, hierarchy, np.random.SeedSequence(0))

@@ -1,5 +1,7 @@
 """Pushing points, an example: where they are, how robots push from there and learn it."""
 
+import doctest
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -48,6 +50,11 @@ def test_points_are_as_far_from_the_box_as_is_said_and_face_it(pushing_points, b
         assert gap == pytest.approx(GAP, abs=1e-3)  # arcs have corners
         assert np.cos(direction) * nx + np.sin(direction) * ny == pytest.approx(-1.0)
     assert len({(round(x, 6), round(y, 6)) for x, y, _ in points}) == 8
+
+
+def test_its_examples_hold(sources: Sources) -> None:
+    module = sys.modules[sources.load("pushing_points.py:PushingPoints").__module__]
+    assert doctest.testmod(module) == (0, 4)
 
 
 def test_the_name_of_earlier_versions_tells_where_it_is() -> None:

@@ -11,9 +11,9 @@ from acting import fuzzy
 from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.interface.measures import measures_of
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -86,7 +86,7 @@ def test_a_team_finds_out_that_a_wheel_has_seized() -> None:
     scenario = BoxPushing(BoxPushingSettings(robot="four-wheel", robots=1, failures=[failure]))
     hierarchy = build(parse("chain"), scenario.agents)
     settings = BatchTDSettings(
-        self_model=SelfModelSettings(enabled=True), decision=Decision(rule="random")
+        self_model=SelfModelSettings(enabled=True), decision=DecisionSettings(rule="random")
     )
     team = Team(settings, scenario, hierarchy, policy_seed(0))
     for _ in control_loop(scenario, team, episodes=2, steps=40, seed=0):
