@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
 from ...core.interface.recording import EpisodeRecorder
@@ -134,7 +134,7 @@ class Environment(ABC):
     def _teams(self) -> dict[str, Sequence[int]]:
         """Return the wheels that each agent drives, by its name."""
 
-    def begin(self, seed: int | None, options: Mapping[str, int] | None) -> FloatArray:
+    def begin(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start the next episode; a seed starts the stream of worlds and their count afresh.
 
         The option ``episode`` sets the number of the episode, by which failures are scheduled, and
@@ -219,7 +219,7 @@ class WheelsEnv(Environment, ParallelEnv):
         return self.players[agent].action_space
 
     def reset(
-        self, seed: int | None = None, options: Mapping[str, int] | None = None
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Observations, Infos]:
         """Start an episode, see `Environment.begin`; return observations and infos by agent."""
         return self._observe(self.begin(seed, options), self.scenario.measure())
@@ -310,14 +310,14 @@ class BoxPushingEnv(Environment, gymnasium.Env):
         return {"single": range(len(self.scenario.agents))}
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, int] | None = None
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, object]]:
         """Start an episode, see `Environment.begin`; return observation and info."""
         super().reset(seed=seed)
         states = self.begin(seed, options)
         return self._player.observe(states), self.info(self.scenario.measure())
 
-    def step(self, action: IntArray) -> tuple[FloatArray, float, bool, bool, dict[str, object]]:
+    def step(self, action: ArrayLike) -> tuple[FloatArray, float, bool, bool, dict[str, object]]:
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
         transition, truncated = self.advance(np.asarray(action, dtype=np.int64))
         observation = self._player.observe(transition.states)
