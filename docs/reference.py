@@ -53,16 +53,16 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "hierarchy.hierarchy", "hierarchy.turns", "hierarchy.failures", "interface.spaces", "interface.prediction", "interface.scenario",
-        "interface.measures", "interface.experience", "interface.plain", "agents.team",
-        "adaptation.predictors", "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
+        "interface.spaces", "interface.scenario", "interface.prediction", "interface.measures",
+        "interface.experience", "interface.agents", "interface.plain", "hierarchy.hierarchy",
+        "hierarchy.turns", "hierarchy.failures", "agents.team", "agents.fuzzy", "agents.peer",
+        "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
         "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
         "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",
         "evaluators.best_response", "evaluators.coordination", "coordination.graphs",
-        "adaptation.self_model",
-        "agents.cost", "plugins.registry", "plugins.settings", "numerics.arrays",
-        "numerics.random", "numerics.compiler", "numerics.libraries",
-        "networks.settings", "agents.fuzzy", "agents.peer", "interface.agents",
+        "adaptation.predictors", "adaptation.self_model", "adaptation.foresight",
+        "networks.settings", "agents.cost", "plugins.registry", "plugins.settings",
+        "numerics.arrays", "numerics.random", "numerics.compiler", "numerics.libraries",
     )),
     "topologies": ("Who is above whom.", ("builders", "config", "drawing", )),
     "scenarios": ("Where agents act.", (
