@@ -97,13 +97,14 @@ def open_to_write(path: Path) -> Iterator[sqlite3.Connection]:
     SpecError
         If it cannot be used, or the disk is full.
     """
-    with _one_line(path), closing(_connect(path)) as connection:
-        _begin_journal(connection)
-        if not has_log(connection):
-            connection.execute(f"PRAGMA busy_timeout = {PATIENCE}")
-        connection.execute("PRAGMA synchronous = FULL")
-        connection.execute("PRAGMA foreign_keys = ON")
-        yield connection
+    with _one_line(path):
+        _begin_journal(path)
+        with closing(_connect(path)) as connection:
+            if not has_log(connection):
+                connection.execute(f"PRAGMA busy_timeout = {PATIENCE}")
+            connection.execute("PRAGMA synchronous = FULL")
+            connection.execute("PRAGMA foreign_keys = ON")
+            yield connection
 
 
 def has_log(connection: sqlite3.Connection) -> bool:
@@ -112,27 +113,27 @@ def has_log(connection: sqlite3.Connection) -> bool:
     return bool(mode == "wal")
 
 
-def _begin_journal(connection: sqlite3.Connection) -> None:
+def _begin_journal(path: Path) -> None:
     """Give a database a write-ahead log; or a rollback journal, where that cannot be.
 
     A journal that is there stays: trying anew would take ten seconds each time.
     """
     try:
-        (pages,) = connection.execute("PRAGMA page_count").fetchone()
-        if pages and not has_log(connection):
-            return
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("BEGIN IMMEDIATE")
-        connection.execute("ROLLBACK")
+        with closing(_connect(path)) as connection:
+            (pages,) = connection.execute("PRAGMA page_count").fetchone()
+            if pages and not has_log(connection):
+                return
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("BEGIN IMMEDIATE")
+            connection.execute("ROLLBACK")
     except sqlite3.OperationalError as error:
         if error.sqlite_errorcode not in NO_SHARED_MEMORY:
             raise
-        # Who is alone needs no shared memory, also to end the log. The lock of the directory keeps
+        # Who is alone needs no shared memory to end the log. The lock of the directory keeps
         # others from writing.
-        connection.execute("PRAGMA locking_mode = EXCLUSIVE")
-        connection.execute("PRAGMA journal_mode = DELETE")
-        connection.execute("PRAGMA locking_mode = NORMAL")
-        connection.execute("SELECT 1 FROM sqlite_master").fetchone()  # lets the lock go
+        with closing(_connect(path)) as connection:
+            connection.execute("PRAGMA locking_mode = EXCLUSIVE")
+            connection.execute("PRAGMA journal_mode = DELETE")
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import re
 import shutil
 import sqlite3
 from dataclasses import replace
+from pathlib import Path
 
 import made_up
 import pytest
@@ -417,3 +418,20 @@ def test_a_study_of_a_newer_version_is_refused_and_left_as_it_is(study, capsys):
         assert "holds results of version 99" in capsys.readouterr().err
     assert (study / DATABASE).read_bytes() == before
     assert not list(study.glob("*.damaged-*"))
+
+
+def test_a_study_of_version_0_3_0_is_read_as_before(tmp_path, capsys):
+    dump = Path(__file__).with_name("version_0_3_0.sql").read_text(encoding="utf-8")
+    with sqlite3.connect(tmp_path / DATABASE) as db:
+        db.executescript(dump)
+    db.close()
+    with Store.open(tmp_path) as store:
+        store.verify()
+        assert store.counts() == {"done": 4, "failed": 0}
+        assert len(list(store.episodes()[1])) == 4 * 3
+    assert main(["results", str(tmp_path), "--format", "csv"]) == 0
+    first = capsys.readouterr().out.splitlines()[1]
+    assert first == (
+        "default,default,0,training,0,6,0,0.9644814481842697,0.8611634842064431,"
+        "-0.009279672728450386"
+    )
