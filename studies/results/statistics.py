@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.numerics import IntArray, special, stats
+from ...core.numerics import special, stats
 
 Array = NDArray[np.float64]
 
