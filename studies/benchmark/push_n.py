@@ -24,7 +24,7 @@ from pydantic import ConfigDict, Field, model_validator
 from ...core.agents.loop import world_seed
 from ...core.plugins.settings import Settings, tuples
 from ...scenarios.box_pushing.config import BoxPushingSettings
-from ..api.study import run
+from ..api.running import run
 from ..claims.claims import PUBLISHED
 from ..errors import SpecError
 from ..results import published

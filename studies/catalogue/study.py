@@ -61,6 +61,18 @@ def load_study(name: str) -> Study:
     return cast(Study, study)
 
 
+def notes_of(analysis: Any) -> tuple[str, ...]:
+    """Return what an analysis says in words, line by line; one of your own may say nothing."""
+    return tuple(getattr(analysis, "notes", ()))
+
+
+def check_needs(spec: Spec) -> None:
+    """Raise `SpecError` if a spec has not what its study needs, by the study's own ``check``."""
+    check = getattr(load_study(spec.study), "check", None)
+    if check is not None:
+        check(spec)
+
+
 def measure(trial: Trial) -> TrialResult:
     """Run a trial that is measured by its episodes alone."""
     from ..trials.session import run_trial  # who only reads results needs nothing that learns

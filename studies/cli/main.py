@@ -10,17 +10,20 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from importlib import import_module
-from typing import Any
+from io import TextIOWrapper
+from pkgutil import resolve_name
 
 import click
 
-from ..errors import SpecError
+from ..errors import SpecError, printable
 from .options import complete
 
 PROGRAM = "nested-agents"
 IN_ASCII = "nested-agents-ascii"
 """Name of the error handler of the streams: a terminal that lacks dashes shows ``-`` for them."""
+
+REFUSING = ("strict", "surrogateescape")
+"""The error handlers that Python's streams have by locale and that raise for such characters."""
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("running", "Train two e-Pucks to push a box: table, figures and replay."),
@@ -30,7 +33,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "table": ("reading", "Print the results of a study: conditions against estimates."),
     "compare": ("reading", "Compare conditions of one study or several, seed by seed."),
     "results": ("reading", "Print what every episode of a study measured."),
-    "watch": ("watch", "Watch a study while it runs: trials, curves, failures."),
     "status": ("reading", "Tell how far a study is, what failed, and how long is left."),
     "retry": ("running", "Run the failed trials of a study again."),
     "export": ("reading", "Write what a study holds as files for other programs."),
@@ -39,7 +41,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "presets": ("describing", "List the named starting points of a spec, or print one."),
     "keys": ("describing", "List the keys of a spec: type, default, what is allowed, meaning."),
     "topology": ("describing", "List the topologies, or show one of them."),
-    "check": ("describing", "Check that scenarios keep their promises."),
+    "check": ("checking", "Check that scenarios keep their promises."),
     "cost": ("describing", "Print what hierarchies cost, by formula and measured."),
     "benchmark": ("committed", "Enter a learner in the benchmark push-n, and compare entries."),
     "claims": ("committed", "Print the claims of the paper and the verdict on each."),
@@ -56,8 +58,9 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        module = import_module(f".commands.{COMMANDS[cmd_name][0]}", __package__)
-        command: click.Command = getattr(module, cmd_name)
+        module, _ = COMMANDS[cmd_name]
+        command = resolve_name(f"{__package__}.commands.{module}:{cmd_name}")
+        assert isinstance(command, click.Command)
         return command
 
     def resolve_command(
@@ -93,13 +96,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     for stream in (sys.stdout, sys.stderr):
-        if getattr(stream, "errors", None) == "strict":
-            stream.reconfigure(errors=IN_ASCII)  # type: ignore[union-attr]
+        if isinstance(stream, TextIOWrapper) and stream.errors in REFUSING:
+            stream.reconfigure(errors=IN_ASCII)
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
 
 
-def _in_ascii(error: Any) -> tuple[str, int]:
+def _in_ascii(error: UnicodeError) -> tuple[str, int]:
     """Return what stands for the characters that a terminal lacks, and where they end."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
     lacking = error.object[error.start : error.end]
     return "".join("-" if c in "–−" else "?" for c in lacking), error.end
 
@@ -126,9 +131,9 @@ def run_to_status(program: str, run: Callable[[], int]) -> int:
         from ...core.plugins.sources import place
 
         if where := place(error):  # in code of a file of the user, or raised by it
-            print(f"{program}: interrupted{where}", file=sys.stderr)
+            print(printable(f"{program}: interrupted{where}"), file=sys.stderr)
         return 130
-    print(f"{program}: error: {' '.join(message.split())}", file=sys.stderr)
+    print(printable(f"{program}: error: {' '.join(message.split())}"), file=sys.stderr)
     return 2
 
 

@@ -22,7 +22,6 @@ from nested_agents.studies.cli.commands import (  # noqa: F401
     committed,
     reading,
     running,
-    watch,
 )
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import text  # noqa: F401

@@ -2,19 +2,28 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Literal, TypedDict, Unpack, get_args
 
 import click
 
 from ....core.plugins.settings import closest
-from ...api.study import run as run_study
-from ...claims.claims import PAPERS, PUBLISHED, QUICK, SPECS, judge, print_claims, studies_of
+from ...api.running import run as run_study
+from ...claims.claims import (
+    PAPERS,
+    PUBLISHED,
+    QUICK,
+    SPECS,
+    Format,
+    judge,
+    print_claims,
+    studies_of,
+)
 from ...errors import SpecError
 from ...presentation.progress import Terminal, say
 from ...results import published
 from ...store import durable
 from .. import options
-from ..display import print_table, print_wrapped
+from ..display import Form, in_form, print_data, print_table, print_text, print_wrapped
 
 
 @click.command()
@@ -33,7 +42,7 @@ from ..display import print_table, print_wrapped
 )
 @options.jobs
 @options.formats("table", "json", "markdown")
-def claims(out: Path | None, quick: bool, of: str, jobs: int | None, form: Any) -> int:
+def claims(out: Path | None, quick: bool, of: str, jobs: int | None, form: Format) -> int:
     """Print one table: each claim of a paper, its measure, the result, the verdict.
 
     Without --out the table is made from the results that are committed in the repository.
@@ -77,9 +86,19 @@ def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, publ
 
 
 entries = click.argument("entries", type=options.PATH, metavar="ENTRY.json...", nargs=-1)
-sizes = click.Choice(["2", "4", "8", "16", "32", "64"])
-given = click.Choice(["nothing", "predictor", "predictor and reward"])
-measures = click.Choice(["success", "decisions"])
+
+SIZES = ("2", "4", "8", "16", "32", "64")
+"""Numbers of robots that an entry may have teams of."""
+Given = Literal["nothing", "predictor", "predictor and reward"]
+"""What a learner is given of the world."""
+
+
+class EntryOptions(TypedDict):
+    """What an entry says of itself."""
+
+    name: str
+    about: str
+    given: Given
 
 
 @click.group(no_args_is_help=False)
@@ -90,14 +109,30 @@ def benchmark() -> None:
 @benchmark.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.out("Where to keep the study.", required=True)
-@click.option("--robots", type=sizes, multiple=True, default=["2", "4", "8"], help="How many.")
+@click.option(
+    "--robots",
+    type=click.Choice(SIZES),
+    multiple=True,
+    default=SIZES[:3],
+    help="How many.",
+)
 @click.option("--seeds", type=click.IntRange(5), default=5, metavar="N", help="From seed 0 on.")
 @click.option("--name", metavar="TEXT", required=True, help="What tables call the entry.")
 @click.option("--about", metavar="TEXT", required=True, help="How it learns, in a line.")
-@click.option("--given", type=given, default="predictor", help="What it is given of the world.")
+@click.option(
+    "--given",
+    type=click.Choice(get_args(Given)),
+    default="predictor",
+    help="What it is given of the world.",
+)
 @options.jobs
 def run(
-    spec: Path, out: Path, robots: tuple[str, ...], seeds: int, jobs: int | None, **entry: Any
+    spec: Path,
+    out: Path,
+    robots: tuple[str, ...],
+    seeds: int,
+    jobs: int | None,
+    **entry: Unpack[EntryOptions],
 ) -> int:
     """Train and evaluate a spec by the rules.
 
@@ -109,7 +144,7 @@ def run(
     teams = run_spec(spec, out, list(dict.fromkeys(map(int, robots))), seeds, jobs)
     text = Entry(teams=teams, **entry).model_dump_json(indent=1)
     durable.write(out / "entry.json", f"{text}\n".encode())
-    print(out / "entry.json")
+    print_text(out / "entry.json")
     return 0
 
 
@@ -121,30 +156,35 @@ def check(entries: tuple[Path, ...], schema: bool) -> int:
     from ...benchmark.push_n import Entry, load_entry
 
     if schema:
-        print(json.dumps(Entry.model_json_schema(), indent=1))
+        print_text(json.dumps(Entry.model_json_schema(), indent=1))
     for path in entries:
         entry = load_entry(path)
         teams = ", ".join(f"{t.robots} robots x {len(t.success)} seeds" for t in entry.teams)
-        print(f"passed  {path}: {entry.name}, {teams}")
+        print_text(f"passed  {path}: {entry.name}, {teams}")
     return 0
 
 
 @benchmark.command()
 @entries
-@click.option("--measure", type=measures, default="success", help="In evaluation, or of training.")
+@click.option(
+    "--measure",
+    type=click.Choice(["success", "decisions"]),
+    default="success",
+    help="In evaluation, or of training.",
+)
 @options.form
-def table(entries: tuple[Path, ...], measure: str, form: str) -> int:
+def table(entries: tuple[Path, ...], measure: str, form: Form) -> int:
     """Print entries by number of robots: the committed ones, then others."""
     from ...benchmark.push_n import committed_entries, load_entry, table_of
     from ...presentation.tables import tabulate
 
-    shown = [*committed_entries(), *map(load_entry, entries)]
-    printed = tabulate(table_of(shown, measure))
+    compared = [*committed_entries(), *map(load_entry, entries)]
+    estimates = tabulate(table_of(compared, measure))
     if form != "table":
-        print(getattr(printed, form), end="")
+        print_data(in_form(estimates, form))
         return 0
-    print_table(printed)
-    print()
-    for entry in shown:
+    print_table(estimates)
+    print_text("")
+    for entry in compared:
         print_wrapped(f"{entry.name}: {entry.about}; is given {entry.given}")
     return 0
