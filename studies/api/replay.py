@@ -6,9 +6,8 @@ import base64
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ...core.interface.scenario import can_draw
 from ...core.plugins.settings import closest
 from ..errors import SpecError
 from ..store.store import Store
@@ -57,8 +56,8 @@ def draw_episode(
             episode = "last"  # of one episode
         if episode not in recorded:
             raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
-        scenario: Any = trial.world()
-        if not can_draw(scenario):
+        scenario = trial.world()
+        if not scenario.draws:
             raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
         if path is None:
             drawing = directory / "replay" / f"{trial.identity[:8]}-{episode}.gif"

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from ...core.interface.scenario import Measure
+from ...core.interface.measures import Measure
 from ...core.plugins.sources import is_reference
 from ..catalogue.study import check_needs, load_study, measured
 from ..presentation.progress import Terminal, count

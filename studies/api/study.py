@@ -23,7 +23,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.interface.scenario import SUCCESS, Actors, Scenario
+from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
 from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources
@@ -43,6 +43,9 @@ from .replay import Replay, draw_episode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from ...core.agents.team import Team
+    from ...core.interface.scenario import Scenario
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -251,9 +254,7 @@ class StudyResults:
         """
         return draw_episode(self.directory, condition, seed, episode, path)
 
-    def team(
-        self, condition: str | None = None, seed: int | None = None
-    ) -> tuple[Scenario, Actors]:
+    def team(self, condition: str | None = None, seed: int | None = None) -> tuple[Scenario, Team]:
         """Return the world of a trial, and the team that was trained in it, ready to act.
 
         Parameters

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core.interface.scenario import roles_of
 from ...core.numerics import pd
 from ..errors import SpecError, show
 from ..presentation.progress import Terminal, count
@@ -247,7 +246,7 @@ def _space(spec: Spec) -> dict[str, Sequence[object]]:
     with spec.sources.active():
         scenario = spec.conditions()[0].settings.scenario.build()
     usual = dict(USUAL)
-    if len({*roles_of(scenario)}) == len(scenario.agents):
+    if len({*scenario.roles}) == len(scenario.agents):
         del usual["learner.weights"]  # nobody shares a role
     possible = dict[str, Sequence[object]]()
     for key, values in usual.items():

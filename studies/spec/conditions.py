@@ -20,7 +20,7 @@ from pydantic import AfterValidator, Field, ValidationError
 
 from ...core.agents.joint import Granularity, join_agents
 from ...core.hierarchy.hierarchy import Hierarchy
-from ...core.interface.scenario import Scenario, groups_of
+from ...core.interface.scenario import Scenario
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.registry import Plugged
@@ -116,7 +116,7 @@ class ConditionSettings(Settings):
         except ValueError as error:
             raise ValueError(f"scenario: has {len(scenario.agents)} agents: {error}") from None
         own: Sequence[tuple[int, int]] | None = getattr(scenario, "interactions", None)
-        return scenario, build(self.topology, scenario.agents, groups_of(scenario), own)
+        return scenario, build(self.topology, scenario.agents, scenario.groups, own)
 
     def acts_as(self, other: ConditionSettings) -> bool:
         """Return whether topology and learner are those of `other`."""

@@ -93,7 +93,6 @@ def _learned_errors(
     source: str, changes: tuple[str, ...], steps: int
 ) -> Iterator[tuple[str, DataFrame]]:
     """Yield the errors of learned predictors by variable, see `errors_of`, each once."""
-    from ....core.agents.team import of_fuzzy_agents
     from ...explain.team import errors_of
     from ...spec.spec import Spec
     from ...trials.session import Session
@@ -107,7 +106,7 @@ def _learned_errors(
         checked.add((trial.settings.scenario, predictor))
         session = Session(replace(trial, episodes=LESSONS, steps=steps, curriculum=()))
         session.train(LESSONS)
-        errors = errors_of(of_fuzzy_agents(session.team), session.scenario, trial.seed)
+        errors = errors_of(session.team, session.scenario, trial.seed)
         if errors is not None:
             yield trial.condition, errors
 

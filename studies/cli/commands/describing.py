@@ -280,7 +280,7 @@ def _of_spec(path: str) -> list[view.HierarchyView] | None:
         return None  # whoever reads it as a topology says why
     if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
         return None
-    from ....core.interface.scenario import groups_of
+
     from ....topologies.view import HierarchyView
     from ...spec.spec import Spec
 
@@ -304,6 +304,6 @@ def _of_spec(path: str) -> list[view.HierarchyView] | None:
                 )
                 if content not in distinct:
                     distinct[content] = HierarchyView(
-                        label, hierarchy, groups_of(scenario), n_actions, failures
+                        label, hierarchy, scenario.groups, n_actions, failures
                     )
     return list(distinct.values())
