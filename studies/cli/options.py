@@ -116,7 +116,7 @@ _accept_code = flag(
 )
 
 
-class Running(TypedDict):
+class RunOptions(TypedDict):
     """The options of who runs trials, as `nested_agents.studies.api.running.run` takes them."""
 
     jobs: int | None
@@ -126,7 +126,7 @@ class Running(TypedDict):
 
 
 def running(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options of who runs trials, see `Running`."""
+    """Add the options of who runs trials, see `RunOptions`."""
     return jobs(_backend(_address(_accept_code(command))))
 
 

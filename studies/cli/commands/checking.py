@@ -27,7 +27,7 @@ LESSONS = 8
 """Episodes from which a predictor has learned when its errors are shown."""
 
 
-class Case(NamedTuple):
+class ScenarioCase(NamedTuple):
     """A scenario that is checked."""
 
     label: str
@@ -122,7 +122,7 @@ def _learned_predictor(trial: Trial) -> LearnedPredictorSettings | None:
     return learner.predictor if isinstance(learner.predictor, LearnedPredictorSettings) else None
 
 
-def _case_of_file(source: str) -> Case:
+def _case_of_file(source: str) -> ScenarioCase:
     """Return what is to be checked of a function or class in a Python file."""
     from ....scenarios import SCENARIOS
 
@@ -137,10 +137,10 @@ def _case_of_file(source: str) -> Case:
     except (Exception, SystemExit) as error:
         message = f"raised {type(error).__name__}: {' '.join(str(error).split())}"
         raise SpecError(f"{source}, called as a scenario is, {message}") from None
-    return Case(source.rpartition(":")[2], build, [0, 1])
+    return ScenarioCase(source.rpartition(":")[2], build, [0, 1])
 
 
-def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
+def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCase]:
     """Yield what is to be checked of a spec, each scenario once."""
     from ....core.learners import check_prediction
     from ...spec.spec import Spec
@@ -152,4 +152,4 @@ def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
             check_prediction(condition.settings.learner, settings.build())
         if settings not in checked:
             checked.add(settings)
-            yield Case(condition.label, settings.build, sorted({0, *settings.onsets}))
+            yield ScenarioCase(condition.label, settings.build, sorted({0, *settings.onsets}))

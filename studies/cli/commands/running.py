@@ -72,7 +72,7 @@ def run(
     trust: bool,
     figures: tuple[str, ...],
     changes: tuple[str, ...],
-    **running: Unpack[options.Running],
+    **running: Unpack[options.RunOptions],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
 
@@ -109,7 +109,7 @@ class Budget(TypedDict):
     draw: int
 
 
-class TuneOptions(Budget, options.Running):
+class TuneOptions(Budget, options.RunOptions):
     """All options of ``tune`` but where to and what to change."""
 
 
@@ -174,7 +174,7 @@ def plan(spec: Path, changes: tuple[str, ...], **supposed: Unpack[Supposed]) -> 
 @options.directory
 @options.running
 @options.trust
-def retry(directory: Path, trust: bool, **running: Unpack[options.Running]) -> int:
+def retry(directory: Path, trust: bool, **running: Unpack[options.RunOptions]) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
     DIR is where the study is kept.

@@ -75,7 +75,7 @@ def test_what_was_interrupted_goes_on_and_runs_nothing_twice(tuned, tmp_path, mo
 
 def test_the_same_draw_gives_the_same_configurations() -> None:
     spec = na.Spec.of({key: value for key, value in SPEC.items() if key != "tune"})
-    first, again, other = (tuning._sampled(spec, 5, draw) for draw in (0, 0, 1))
+    first, again, other = (tuning._sample(spec, 5, draw) for draw in (0, 0, 1))
     assert list(first) == ["given", "c01", "c02", "c03", "c04"]
     assert first == again != other
     keys = set(first["c01"])
