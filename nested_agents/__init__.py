@@ -15,8 +15,15 @@ Two e-Pucks, their four wheels in a chain, learning by the default settings:
 [0, 1, 2]
 """
 
-from importlib import import_module
+from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
+
+if Path(__file__).with_name("core").is_file():
+    raise ImportError(
+        "nested_agents/core is a plain file where a checkout has a symbolic link, as in zip "
+        "downloads and on Windows: clone with git -c core.symlinks=true, or install the package"
+    )
 
 __version__: str
 
@@ -95,7 +102,7 @@ def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, attribute = _PLACES[name]
-    return getattr(import_module(f".{module}", __name__), attribute)
+    return resolve_name(f"{__name__}.{module}:{attribute}")
 
 
 def __dir__() -> list[str]:

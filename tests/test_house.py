@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -349,3 +350,15 @@ def test_dev_refuses_an_unknown_command() -> None:
     run = subprocess.run([ROOT / "dev", "tset"], capture_output=True, text=True, check=False)
     assert run.returncode == 2
     assert run.stderr.splitlines()[-1] == "dev: unknown command 'tset'"
+
+
+def test_a_checkout_without_links_says_what_to_do(tmp_path: Path) -> None:
+    """Zip downloads and Windows leave a file in place of a link, which holds where it led."""
+    package = tmp_path / "nested_agents"
+    package.mkdir()
+    shutil.copy(ROOT / "nested_agents" / "__init__.py", package)
+    (package / "core").write_text("../core")
+    line = [sys.executable, "-c", "import nested_agents"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("ImportError: nested_agents/core is a plain ")

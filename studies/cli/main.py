@@ -7,6 +7,7 @@ click command of that name in a module of `commands`.
 
 import codecs
 import os
+import resource
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -24,6 +25,9 @@ IN_ASCII = "nested-agents-ascii"
 
 REFUSING = ("strict", "surrogateescape")
 """The error handlers that Python's streams have by locale and that raise for such characters."""
+
+LEAST_ADDRESSES = 10**9
+"""Of the process [bytes]: with less, libraries of linear algebra crash or wait for ever."""
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("running", "Train two e-Pucks to push a box: table, figures and replay."),
@@ -66,6 +70,7 @@ class _Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str, click.Command, list[str]]:
+        _check_address_space()
         command = self.get_command(ctx, args[0])
         if command is None:
             from ...core.plugins.settings import closest  # pydantic takes its time
@@ -101,6 +106,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
 
 
+def _check_address_space() -> None:
+    """Refuse to begin what a limit of the shell would not let end."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY and limit < LEAST_ADDRESSES:
+        least = LEAST_ADDRESSES // 1024
+        raise SpecError(f"ulimit -v {limit // 1024}: must be at least {least}, or unlimited")
+
+
 def _in_ascii(error: UnicodeError) -> tuple[str, int]:
     """Return what stands for the characters that a terminal lacks, and where they end."""
     if not isinstance(error, UnicodeEncodeError):
@@ -124,6 +137,8 @@ def run_to_status(program: str, run: Callable[[], int]) -> int:
         # The reader went away, as `head` does; Python would complain again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+    except MemoryError as error:
+        message = f"not enough memory: {error}".rstrip(": ")
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         message = f"{where}{error.strerror or error}"

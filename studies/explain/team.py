@@ -28,6 +28,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import track
 
 from ...core.adaptation.learned_predictor import LearnedPredictor
@@ -43,7 +44,7 @@ from ...core.numerics import FloatArray, IntArray
 from ...core.rules.kernels.fuzzy import Partition
 from ...core.rules.rule_base import RuleBase
 from ...scenarios.checking.predictions import apart
-from ..errors import WIDTH, SpecError, refused
+from ..errors import WIDTH, SpecError, printable, refused
 from ..store.database import STAGE, columns
 from ..store.durable import TEAM
 from ..store.store import Store
@@ -314,7 +315,7 @@ def _train(store: Store, session: Session, bodies: BodyEffects) -> None:
     model = session.team.only(FuzzyAgents).foresight.self_model
     episodes = track(
         range(trial.episodes),
-        f"training {trial.condition}, seed {trial.seed} again",
+        escape(printable(f"training {trial.condition}, seed {trial.seed} again")),
         console=Console(stderr=True),
         transient=True,
         disable=not sys.stderr.isatty(),

@@ -56,7 +56,7 @@ Json = dict[str, Any]
 """An object of JSON."""
 
 
-class Player(Protocol):
+class EpisodePlayer(Protocol):
     """A module that plays recordings on a canvas."""
 
     SCRIPT: Path
@@ -177,12 +177,12 @@ def _gif(store: Store, trial: Trial) -> str:
         return base64.b64encode(path.read_bytes()).decode("ascii")
 
 
-def _scene_of(recording: Recording) -> tuple[Player | None, Json]:
+def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
     """Return who plays a recording, and in which scene; none if nobody can."""
     models = [SCENARIOS.model(name) for name in SCENARIOS.built_in]
     names = [model.player for model in models if issubclass(model, ScenarioSettings)]
     for name in dict.fromkeys(filter(None, names)):
-        player: Player = resolve_name(name)
+        player: EpisodePlayer = resolve_name(name)
         with suppress(ValueError):
             return player, player.scene_of(recording)
     return None, {}
