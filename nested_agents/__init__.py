@@ -19,15 +19,13 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
-if Path(__file__).with_name("core").is_file():
-    raise ImportError(
-        "nested_agents/core is a plain file where a checkout has a symbolic link, as in zip "
-        "downloads and on Windows: clone with git -c core.symlinks=true, or install the package"
-    )
-
 __version__: str
 
+if not Path(__file__).with_name("core").exists():  # a checkout: the four folders stand beside
+    __path__.append(str(Path(__file__).parents[1]))
+
 _PLACES = {
+    "Agents": ("core.interface.agents", "Agents"),
     "ActionSet": ("core.interface.spaces", "ActionSet"),
     "Analysis": ("studies.results.analysis", "Analysis"),
     "BatchTDSettings": ("core.learners.batch", "BatchTDSettings"),
@@ -41,12 +39,14 @@ _PLACES = {
     "EvaluatorSettings": ("core.evaluators", "EvaluatorSettings"),
     "ExplorationSettings": ("core.decision.exploration", "ExplorationSettings"),
     "FrozenSettings": ("core.learners.td", "FrozenSettings"),
+    "FuzzyAgents": ("core.agents.fuzzy", "FuzzyAgents"),
     "Hierarchy": ("core.hierarchy.hierarchy", "Hierarchy"),
     "KinematicChain": ("scenarios.kinematic_chain.scenario", "KinematicChain"),
     "KinematicChainSettings": ("scenarios.kinematic_chain.config", "KinematicChainSettings"),
     "LearnerSettings": ("core.learners", "LearnerSettings"),
     "LineUpSettings": ("scenarios.line_up", "LineUpSettings"),
     "Measure": ("core.interface.measures", "Measure"),
+    "Observation": ("core.interface.experience", "Observation"),
     "Partition": ("core.rules.kernels.fuzzy", "Partition"),
     "RuleBase": ("core.rules.rule_base", "RuleBase"),
     "SUCCESS": ("core.interface.measures", "SUCCESS"),

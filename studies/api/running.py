@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ...core.interface.measures import Measure
 from ...core.plugins.sources import is_reference
-from ..catalogue.study import check_needs, load_study, measured
+from ..catalogue.study import load_study, measure_by_name
 from ..presentation.progress import Terminal, count
 from ..spec.spec import Spec
 from ..store.store import Store
@@ -77,7 +77,7 @@ def run_study(
             store.forget_failed()
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
-        run_one = measured if is_reference(spec.study) else load_study(spec.study).measure
+        run_one = measure_by_name if is_reference(spec.study) else load_study(spec.study).measure
         for note in (*store.notes, *spec.warnings()):
             observer.note(note)
         if left:
@@ -107,7 +107,7 @@ def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
     """
     measures = check(spec, may_fail=may_fail)
     with spec.sources.active():
-        check_needs(spec)
+        load_study(spec.study).check(spec)
     return measures
 
 

@@ -27,7 +27,7 @@ from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
 from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources
-from ..catalogue.study import analysed, drawn, load_study, notes_of
+from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import published
@@ -158,7 +158,7 @@ class StudyResults:
     def analysis(self) -> Any:
         """What the study makes of its results, see `nested_agents.studies.catalogue.study`."""
         with self._sources.active():
-            return analysed(self.outline.study, self.results)
+            return analyse_as(self.outline.study, self.results)
 
     def compare(
         self,
@@ -212,7 +212,7 @@ class StudyResults:
     def figures(self) -> dict[str, Figure]:
         """The figures of the study by name."""
         with self._sources.active():
-            return drawn(load_study(self.outline.study), self.analysis)
+            return draw_figures(load_study(self.outline.study), self.analysis)
 
     def figure(self, name: str | None = None) -> Figure:
         """Return a figure of the study as matplotlib has it; the first unless named.

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from ....core.adaptation.predictors import LearnedPredictorSettings
-    from ....core.interface.scenario import Scenario
     from ....core.plugins.settings import ScenarioSettings
     from ...trials.trial import Trial
 
@@ -32,7 +31,7 @@ class ScenarioCase(NamedTuple):
 
     label: str
     """What it is called."""
-    build: Callable[[], Scenario]
+    build: Callable[[], object]
     """Makes it anew."""
     episodes: list[int]
     """Numbers of the episodes that are played: the first, and those in which failures begin."""
@@ -79,6 +78,8 @@ def check(source: str, steps: int, changes: tuple[str, ...]) -> int:
             frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
             _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
     if is_spec and not faults:
+        faults += _report_order(source, changes, steps)
+    if is_spec and not faults:
         for label, errors in _learned_errors(source, changes, steps):
             print_wrapped(f"{label}: what {LESSONS} episodes teach to predict", "learned  ", 8)
             _print_frame(errors.to_string(float_format=SHORT))
@@ -87,6 +88,23 @@ def check(source: str, steps: int, changes: tuple[str, ...]) -> int:
 
 def _print_frame(text: str) -> None:
     print_text("", text, "")
+
+
+def _report_order(source: str, changes: tuple[str, ...], steps: int) -> bool:
+    """Say that trials depend on what ran before them; return whether they do."""
+    from ...spec.spec import Spec
+    from ...trials.order import fault_of_order, has_programs
+    from ...trials.trial import trials_of
+
+    trials = trials_of(Spec.load(Path(source), changes))
+    if not has_programs(trials[0]):
+        return False
+    fault = fault_of_order(trials, steps)
+    if fault:
+        print_text(f"FAULT   order of trials: {fault}")
+    else:
+        print_wrapped("order of trials: the same rows in two orders", "passed  ", 8)
+    return bool(fault)
 
 
 def _learned_errors(
@@ -124,14 +142,8 @@ def _learned_predictor(trial: Trial) -> LearnedPredictorSettings | None:
 
 def _case_of_file(source: str) -> ScenarioCase:
     """Return what is to be checked of a function or class in a Python file."""
-    from ....scenarios import SCENARIOS
-
     with refused():
-        SCENARIOS.find(source)
-
-    def build() -> Scenario:
-        return SCENARIOS.parsed(source).build()
-
+        build = _factory_of(source)
     try:
         build()
     except (Exception, SystemExit) as error:
@@ -140,8 +152,24 @@ def _case_of_file(source: str) -> ScenarioCase:
     return ScenarioCase(source.rpartition(":")[2], build, [0, 1])
 
 
+def _factory_of(source: str) -> Callable[[], object]:
+    """Return what makes a scenario of one's own, by its own settings as they are by default."""
+    from ....core.plugins.sources import active
+    from ....scenarios import SCENARIOS
+
+    thing: Callable[[], object] = active().load(source)
+    if not hasattr(thing, "Settings"):
+        return thing
+    try:
+        build: Callable[[], object] = SCENARIOS.parsed(source).build
+    except ValueError as error:
+        raise ValueError(f"{source}: its Settings have no defaults for all keys, {error}") from None
+    return build
+
+
 def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCase]:
     """Yield what is to be checked of a spec, each scenario once."""
+    from ....core.interface.plain import as_scenario
     from ....core.learners import check_prediction
     from ...spec.spec import Spec
 
@@ -149,7 +177,7 @@ def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCa
     for condition in Spec.load(Path(source), changes).conditions():
         settings = condition.settings.scenario
         with refused():
-            check_prediction(condition.settings.learner, settings.build())
+            check_prediction(condition.settings.learner, as_scenario(settings.build()))
         if settings not in checked:
             checked.add(settings)
             yield ScenarioCase(condition.label, settings.build, sorted({0, *settings.onsets}))

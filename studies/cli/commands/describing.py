@@ -185,9 +185,9 @@ def topology() -> None:
 @topology.command("list")
 def list_all() -> int:
     """List the topologies, built-in and installed."""
-    from ....topologies.view import kinds
+    from ....topologies.view import list_kinds
 
-    print_text(kinds())
+    print_text(list_kinds())
     return 0
 
 
@@ -232,7 +232,7 @@ def show(topology: str, form: view.Form, plot: Path | None, **team: Unpack[TeamO
     SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json,
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
-    from ....topologies.view import printed, view
+    from ....topologies.view import format_view, view
 
     with refused():
         views = _of_spec(topology)
@@ -246,7 +246,7 @@ def show(topology: str, form: view.Form, plot: Path | None, **team: Unpack[TeamO
                 _draw(hierarchy, plot.with_name(f"{plot.stem}{several}{plot.suffix}"))
             if number > 1:
                 print_text("")
-            print_text(printed(hierarchy, form))
+            print_text(format_view(hierarchy, form))
     return 0
 
 

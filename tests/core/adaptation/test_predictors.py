@@ -4,8 +4,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.adaptation.predictors import Mirror
+from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
@@ -61,19 +63,17 @@ def test_left_and_right_wheels_learn_the_same_function_in_the_mirror() -> None:
     agents = scenario.agents
     chain = Hierarchy(agents, list(pairwise(agents)))
     team = Team(settings, scenario, chain, np.random.SeedSequence(0))
-    scenario.reset(0)
-    team.begin_episode()
-    for _ in range(12):
-        team.learn(scenario.step(team.act(team.predict(scenario))))
-    team.end_episode()
-    assert team.learner.theta.shape[0] == 2
+    list(control_loop(scenario, team, episodes=1, steps=12, seed=0))
+    assert fuzzy(team).learner.theta.shape[0] == 2
     rng = np.random.default_rng(0)
     variables = scenario.state_space.variables
     states = rng.uniform(
         [v.low for v in variables], [v.high for v in variables], (50, len(variables))
     )
-    rules, theta = team.evaluator.problem.rules, team.learner.theta
-    left, right = rules.values(theta[0], states), rules.values(theta[1], team.mirror.signs * states)
+    rules = fuzzy(team).evaluator.problem.rules
+    theta = fuzzy(team).learner.theta
+    left = rules.values(theta[0], states)
+    right = rules.values(theta[1], fuzzy(team).mirror.signs * states)
     assert np.abs(left).max() > 0
     np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-12)
 

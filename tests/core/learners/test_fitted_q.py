@@ -2,15 +2,17 @@
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.experience import Experience, Observation
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import REWARD_SCALE
 from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
 from nested_agents.studies.spec.spec import Spec
@@ -31,7 +33,7 @@ def feed(
     learner.begin_episode()
     for t, (left, joint_action) in enumerate(zip(lefts, acts, strict=True)):
         last = end and t == len(acts) - 1
-        learner.observe(left, float(paid[t]), last, left=left, joint_action=joint_action)
+        learner.observe_decision(left, joint_action, left, float(paid[t]), last)
     learner.end_episode()
 
 
@@ -120,10 +122,13 @@ def told_in(team: Team, decisions: int = 20) -> tuple[np.ndarray, np.ndarray]:
     told, did = [], []
     team.begin_world(0, 0)
     team.begin_episode()
+    previous = None
     for _ in range(decisions):
-        team.predict(None, np.zeros((3, 1)))
-        did.append(team.act(None))
-        told.append(team._left[:, 1:].copy())
+        seen = Observation(np.zeros((3, 1)), fuzzy(team).scenario, previous)
+        decision = team.act(seen)
+        previous = decision.joint_action
+        did.append(previous)
+        told.append(decision.inputs[0].left[:, 1:].copy())
     return np.array(told), np.array(did)
 
 
@@ -150,7 +155,7 @@ def test_an_agent_sees_what_its_ancestors_decided_in_the_order_of_decision() -> 
 @pytest.mark.parametrize("unseen", ["maintain", "last"])
 def test_a_lost_message_is_read_as_the_decision_says(unseen: str) -> None:
     lost = LostMessages(agents="agent1")
-    decision = Decision(unseen=unseen)
+    decision = DecisionSettings(unseen=unseen)
     told, did = told_in(team(chain(told="parents"), lost, decision=decision))
     before = np.append(0, did[:-1, 0])  # at first it is taken to have maintained
     np.testing.assert_array_equal(told[:, 1, 0], before if unseen == "last" else 0 * before)
@@ -166,12 +171,12 @@ def test_who_is_told_learns_a_best_reply_and_who_is_not_does_not() -> None:
         for episode in range(10):
             states = game.reset(episode)
             both.begin_episode()
-            for _ in range(20):
-                both.predict(game, states)
-                both.act(None)
-                both.learn(game.step(both._last))
-            both.end_episode()
-        plays = [both.act(None, explore=False) for _ in range(20)]
+            seen = Observation(states, game)
+            for play in range(20):
+                decision = both.act(seen)
+                transition = game.step(decision.joint_action)
+                both.learn(Experience(seen, decision, transition, play == 19))
+        plays = [both.act(seen, explore=False).joint_action for _ in range(20)]
         reached.append(np.mean([a != b for a, b in plays]))
     assert reached[0] == 1.0
     assert reached[1] < 1.0
@@ -180,10 +185,13 @@ def test_who_is_told_learns_a_best_reply_and_who_is_not_does_not() -> None:
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"decision": Decision(value_of="team")}, "learner.decision.value_of = 'team': fitted-q"),
-        ({"decision": Decision(evaluator="exact")}, "learner.decision.evaluator = 'exact'"),
-        ({"decision": Decision(rule="reward")}, "allowed: rule = value or random"),
-        ({"decision": Decision(unseen="plan")}, "unseen = maintain or last"),
+        (
+            {"decision": DecisionSettings(value_of="team")},
+            "learner.decision.value_of = 'team': fitted-q",
+        ),
+        ({"decision": DecisionSettings(evaluator="exact")}, "learner.decision.evaluator = 'exact'"),
+        ({"decision": DecisionSettings(rule="reward")}, "allowed: rule = value or random"),
+        ({"decision": DecisionSettings(unseen="plan")}, "unseen = maintain or last"),
         ({"self_model": {"enabled": True}}, "learner.self_model"),
     ],
 )
@@ -207,11 +215,11 @@ def test_neighbours_are_refused_as_they_tell_nothing() -> None:
 def test_a_team_goes_on_with_all_it_has_learned_unless_others_tell_it_something() -> None:
     former, later = team(chain()), team(chain())
     told_in(former)
-    former.learner.theta[:] = 1.0
-    later.continue_from(former, np.arange(3))
-    assert (later.learner.theta == 1.0).all()
+    fuzzy(former).learner.theta[:] = 1.0
+    later.continue_from(former)
+    assert (fuzzy(later).learner.theta == 1.0).all()
     with pytest.raises(ValueError, match="told by 1 fewer others than when it learned"):
-        team(chain(told="parents")).continue_from(former, np.arange(3))
+        team(chain(told="parents")).continue_from(former)
 
 
 def test_a_topology_that_says_whom_agents_consider_is_remarked_on() -> None:

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.interface.measures import measures_of
-from nested_agents.core.interface.scenario import can_draw
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -29,7 +29,7 @@ def test_teams_of_one_to_four_robots_act_and_learn(robots: int, space: str) -> N
     for record in control_loop(scenario, team, episodes=1, steps=4, seed=0):
         assert record.states.shape == (2 * robots, scenario.state_space.n_variables)
         assert np.isfinite(record.transition.states).all()
-    assert np.any(team.learner.theta != 0)
+    assert np.any(fuzzy(team).learner.theta != 0)
 
 
 def test_equal_seeds_give_equal_episodes() -> None:
@@ -86,12 +86,15 @@ def test_a_team_finds_out_that_a_wheel_has_seized() -> None:
     scenario = BoxPushing(BoxPushingSettings(robot="four-wheel", robots=1, failures=[failure]))
     hierarchy = build(parse("chain"), scenario.agents)
     settings = BatchTDSettings(
-        self_model=SelfModelSettings(enabled=True), decision=Decision(rule="random")
+        self_model=SelfModelSettings(enabled=True), decision=DecisionSettings(rule="random")
     )
     team = Team(settings, scenario, hierarchy, policy_seed(0))
     for _ in control_loop(scenario, team, episodes=2, steps=40, seed=0):
         pass
-    found, nominal = team.self_model.effects[0][0, :4], scenario.nominal_effects[0][0, :4]
+    found, nominal = (
+        fuzzy(team).foresight.self_model.effects[0][0, :4],
+        scenario.nominal_effects[0][0, :4],
+    )
     assert abs(found[0]) < 0.3 * nominal[0]
     assert (found[1:] > 0.5 * nominal[1:]).all()
 
@@ -124,7 +127,7 @@ def test_the_role_of_an_agent_is_its_wheel() -> None:
 
 def test_it_can_be_recorded_drawn_and_predicted_exactly(tmp_path: Path) -> None:
     scenario = BoxPushing(BoxPushingSettings(action_repeat=4, belief={"load": 2.0}))
-    assert can_draw(scenario)
+    assert scenario.draws
     exact = scenario.with_exact_prediction().settings
     assert (exact.predictor, exact.prediction_horizon, exact.action_repeat) == ("exact", 4, 4)
     assert BoxPushingSettings.model_validate(exact.model_dump()) == exact
