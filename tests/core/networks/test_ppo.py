@@ -2,17 +2,19 @@
 
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from acting import fuzzy
+from acting import look
 
+from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.turns import slots_of
+from nested_agents.core.interface.experience import Experience
 from nested_agents.core.interface.scenario import Transition
+from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
-from nested_agents.core.networks.peer import Passing, Seen
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
@@ -34,37 +36,81 @@ def spec_of(topology: Any = "chain", **learner: Any) -> Spec:
     )  # fmt: skip
 
 
-def peer_of(scenario: Any, hierarchy: Hierarchy | None, seed: int = 0, **table: Any) -> Any:
+class Players:
+    """Agents who see nothing of a world in which nothing happens."""
+
+    state_space = StateSpace("one", (Variable("x", "1", 0, 1),))
+
+    def __init__(self, agents: str, n_actions: int, roles: str = "") -> None:
+        self.agents = tuple(agents)
+        self.roles = tuple(roles or agents)
+        zeros = (0.0,) * n_actions
+        self.action_set = ActionSet(tuple("uvwxyz"[:n_actions]), zeros, zeros, 0)
+
+    def reset(self, seed: Any, episode: int = 0) -> Any:
+        return np.zeros((len(self.agents), 1))
+
+    def step(self, joint: Any) -> Transition:
+        return Transition(np.zeros((len(self.agents), 1)), 0.0, False, False, {})
+
+
+def team_of(
+    scenario: Any, hierarchy: Hierarchy | None = None, failures: Any = (), **table: Any
+) -> tuple[Team, Any]:
+    """A team, and the agents that it is made of."""
     settings = LEARNERS.model("hierarchy-ppo").model_validate({**SHORT, **table})
-    return settings.build(scenario, np.random.SeedSequence(seed), hierarchy)
+    hierarchy = hierarchy or Hierarchy(scenario.agents, [])
+    team = Team(settings, scenario, hierarchy, np.random.SeedSequence(0), failures)
+    return team, team.parts[0]
 
 
-def sequence(scenario: Any, peer: Any, steps: int) -> None:
+def sequence(scenario: Any, team: Team, steps: int) -> None:
+    """Act and learn for some steps of an episode, which goes on."""
     states = scenario.reset(1)
     for _ in range(steps):
-        transition = scenario.step(peer.act(Seen(states, scenario)))
-        peer.learn(transition)
+        seen = look(scenario, states)
+        decision = team.act(seen)
+        transition = scenario.step(decision.joint_action)
+        team.learn(Experience(seen, decision, transition, last=False))
         states = transition.states
 
 
+def told_of(team: Team, joint: Any) -> Any:
+    """What all agents are told ``(n, width)`` who are made to decide a joint action."""
+    agents: Any = team.parts[0]
+    inputs = agents.perceive(look(agents.scenario), explore=False)
+    inputs.noise[np.arange(len(joint)), joint] = 1e9
+    assert team._walk(look(agents.scenario), (inputs,)).tolist() == list(joint)
+    return inputs.seen[:, : agents.width]
+
+
 def test_turns_and_messages_by_hand() -> None:
-    tree = Passing(Hierarchy("abcd", TREE), n_actions=3, rows=np.array([0, 0, 1, 0]))
-    assert [t.weights for t in tree.turns] == [0, 0, 1, 0]
-    assert [t.told.tolist() for t in tree.turns] == [[1, 2, 3], [3], [], []]
-    assert tree.width == 6  # of a and b; nobody is told by c or d
-    told, joint = np.zeros((4, 6)), np.array([2, 0, 1, 1])
-    for turn in tree.turns:
-        tree.tell(turn, joint, told)
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    hierarchy = Hierarchy("abcd", TREE)
+    slots = slots_of(hierarchy, [0] * 4, [True])
+    assert [slot.agents.tolist() for slot in slots] == [[0], [1, 2], [3]]
+    told = [list(zip(slot.senders, slot.receivers, strict=True)) for slot in slots]
+    assert told == [[], [(0, 1), (0, 2)], [(0, 3), (1, 3)]]
+    team, agents = team_of(Players("abcd", 3, "xxyx"), hierarchy, weights="role")
+    turns = [agents._policies_of(slot.agents) for slot in slots]
+    own = [[(policy, places.tolist()) for policy, places in turn] for turn in turns]
+    assert own == [[(0, [0])], [(0, [0]), (1, [1])], [(0, [0])]]
+    assert agents.width == 6  # of a and b; nobody is told by c or d
     by_a, by_b = [0, 0, 1], [1, 0, 0]
-    assert told.tolist() == [[0] * 6, by_a + [0] * 3, by_a + [0] * 3, by_a + by_b]
+    told = told_of(team, [2, 0, 1, 1]).tolist()
+    assert told == [[0] * 6, by_a + [0] * 3, by_a + [0] * 3, by_a + by_b]
 
 
 def test_parents_alone_are_heard() -> None:
-    rows = np.zeros(3, dtype=int)
-    chain = Passing(Hierarchy("abc", pairwise("abc"), told="parents"), 2, rows)
-    assert [turn.told.tolist() for turn in chain.turns] == [[1], [2], []]
-    silent = Passing(Hierarchy("abc", pairwise("abc"), told="none"), 2, rows)
-    assert ([turn.agents for turn in silent.turns], silent.width) == ([slice(0, 3)], 0)
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    chain = Hierarchy("abc", pairwise("abc"), told="parents")
+    slots = slots_of(chain, [0] * 3, [True])
+    assert [slot.receivers.tolist() for slot in slots] == [[], [1], [2]]
+    assert [slot.senders.tolist() for slot in slots] == [[], [0], [1]]
+    silent = Hierarchy("abc", pairwise("abc"), told="none")
+    (slot,) = slots_of(silent, [0] * 3, [True])
+    assert (slot.agents.tolist(), slot.receivers.tolist()) == ([0, 1, 2], [])
+    assert team_of(Players("abc", 2), silent)[1].width == 0
 
 
 @pytest.mark.parametrize("weights", ["all", "role", "own"])
@@ -74,13 +120,13 @@ def test_the_masked_pass_has_the_probabilities_of_acting(weights: str, critic: s
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     scenario = LineUpSettings(carts=CARTS).build()
     hierarchy = Hierarchy(scenario.agents, pairwise(scenario.agents))
-    peer = peer_of(scenario, hierarchy, weights=weights, critic=critic)
-    assert len(peer.parts) == {"all": 1, "role": 1, "own": CARTS}[weights]
-    sequence(scenario, peer, 24)  # updated after 16, and 8 steps are in the buffers
-    for part in peer.parts.values():
+    team, agents = team_of(scenario, hierarchy, weights=weights, critic=critic)
+    assert len(agents.policies) == {"all": 1, "role": 1, "own": CARTS}[weights]
+    sequence(scenario, team, 24)  # updated after 16, and 8 steps are in the buffers
+    for part in agents.policies.values():
         buffer, n = part.model.rollout_buffer, len(part.agents)
         assert buffer.pos == 8
-        told = buffer.observations[:8, :, : peer.passing.width]
+        told = buffer.observations[:8, :, : agents.width]
         for row, agent in enumerate(part.agents):
             assert (told[:, row].sum(axis=1) == len(hierarchy.above(agent))).all()
         # The first of the eight was decided before the update.
@@ -97,38 +143,48 @@ def test_permuting_agents_permutes_results() -> None:
     n, n_actions, names = CARTS, len(first.action_set), first.agents
     order = [2, 0, 3, 1]  # who stands at each place in the second
     edges = [(names[0], names[1]), (names[1], names[2]), (names[2], names[3])]
-    second: Any = SimpleNamespace(
-        agents=tuple(names[i] for i in order), action_set=first.action_set,
-        state_space=first.state_space,
-    )  # fmt: skip
-    one = peer_of(first, Hierarchy(first.agents, edges), critic="own")
-    other = peer_of(second, Hierarchy(second.agents, edges), critic="own")
+    second: Any = LineUpSettings(carts=CARTS).build()
+    second.agents = tuple(names[i] for i in order)
+    _, one = team_of(first, Hierarchy(first.agents, edges), critic="own")
+    team, other = team_of(second, Hierarchy(second.agents, edges), critic="own")
     heard = [[0, 1, 2], [i for i in order if i != 3]]
     told = [n_actions * heard[0].index(i) + a for i in heard[1] for a in range(n_actions)]
     n_states = one.inputs.n_own - n
     columns = [*told, *(len(told) + k for k in range(n_states))]
     columns += [len(told) + n_states + i for i in order]
-    theirs = dict(one.parts["all"].model.policy.state_dict())
+    theirs = dict(one.policies["all"].model.policy.state_dict())
     first_layer = "mlp_extractor.policy_net.0.weight"
     theirs[first_layer] = theirs[first_layer][:, columns]
-    other.parts["all"].model.policy.load_state_dict(theirs)
+    other.policies["all"].model.policy.load_state_dict(theirs)
     states = first.reset(4)
     noise = np.random.default_rng(0).gumbel(size=(n, n_actions))
-    _, logits, joint = one.decide(states, noise)
-    _, permuted, acted = other.decide(states[order], noise[order])
+    logits, joint = decided(one, Hierarchy(first.agents, edges), states, noise)
+    permuted, acted = decided(other, team.hierarchy, states[order], noise[order])
     assert permuted == pytest.approx(logits[order], abs=1e-6)
     assert (acted == joint[order]).all()
+
+
+def decided(agents: Any, hierarchy: Hierarchy, states: Any, noise: Any) -> tuple[Any, Any]:
+    """The logits of agents in states, and what they decide by noise."""
+    team = Team(agents.settings, agents.scenario, hierarchy, np.random.SeedSequence(0))
+    team.parts = (agents,)
+    seen = look(agents.scenario, states)
+    inputs = agents.perceive(seen, explore=False)
+    inputs.noise[:] = noise
+    joint = team._walk(seen, (inputs,))
+    return inputs.logits, joint
 
 
 def test_a_joint_step_has_one_reward_for_all() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     scenario = LineUpSettings(carts=CARTS).build()
     for value_of, spread in (("team", 0.0), ("own", 1.0)):
-        peer = peer_of(scenario, None, value_of=value_of)
-        peer.act(Seen(scenario.reset(1), scenario))
+        team, agents = team_of(scenario, value_of=value_of)
+        seen = look(scenario, scenario.reset(1))
         own = np.arange(CARTS, dtype=float)
-        peer.learn(Transition(scenario.reset(1), own, False, False, {}))
-        rewards = peer.parts["all"].model.rollout_buffer.rewards[0]
+        transition = Transition(scenario.reset(1), own, False, False, {})
+        team.learn(Experience(seen, team.act(seen), transition, last=False))
+        rewards = agents.policies["all"].model.rollout_buffer.rewards[0]
         assert (np.ptp(rewards) > 0) == (spread > 0)
 
 
@@ -149,24 +205,18 @@ def test_policies_of_probabilities_are_evaluated_by_sampled_actions_too() -> Non
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     session = Session(trials_of(spec_of())[0])
     session.train(1)
-    state = fuzzy(session.team).rng.bit_generator.state
+    state = session.team.parts[0].rng.bit_generator.state
     session.run_other_evaluations()
-    assert fuzzy(session.team).rng.bit_generator.state == state
+    assert session.team.parts[0].rng.bit_generator.state == state
     phases = [row.phase for row in session.result().rows]
     assert phases == ["training", "evaluation:sampled actions", "evaluation:sampled actions"]
 
 
-@pytest.mark.parametrize(
-    ("topology", "problem"),
-    [
-        ("simultaneous", "neighbours decide at the same time and tell each other nothing"),
-        ({"kind": "chain", "failures": [{"kind": "lost", "agents": "*"}]}, "topology.failures: "),
-    ],
-)
-def test_what_cannot_be_passed_down_is_refused(topology: Any, problem: str) -> None:
+def test_what_cannot_be_passed_down_is_refused() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    problem = "neighbours decide at the same time and tell each other nothing"
     with pytest.raises(SpecError, match=problem) as raised:
-        check(spec_of(topology))
+        check(spec_of("simultaneous"))
     assert "\n" not in str(raised.value)
 
 
@@ -192,6 +242,9 @@ class Mine(na.Peer):
     def __init__(self, settings, scenario, seed, hierarchy=None):
         super().__init__(seed)
         self.hierarchy = hierarchy
+
+    def act(self, seen, *, explore=True):
+        return [0] * len(seen.present)
 """
 SPEC = """
 scenario.kind = "line-up"
@@ -208,8 +261,9 @@ def test_a_learner_of_ones_own_is_given_the_hierarchy_if_it_asks(
     (tmp_path / "spec.toml").write_text(SPEC, encoding="utf-8")
     spec = Spec.load(tmp_path / "spec.toml")
     with spec.sources.active():
-        team: Any = arrange(spec.conditions()[0].settings, 0).team
-    assert (team.hierarchy.told if uses else team.hierarchy) == ("parents" if uses else None)
+        agents: Any = arrange(spec.conditions()[0].settings, 0).team.parts[0]
+    peer = agents.peer
+    assert (peer.hierarchy.told if uses else peer.hierarchy) == ("parents" if uses else None)
     assert [line[:18] for line in spec.warnings()] == ([] if uses else ["topology: left out"])
 
 
