@@ -16,6 +16,7 @@ import numpy as np
 from gymnasium.spaces import Discrete, MultiDiscrete
 from scipy.special import logsumexp
 
+from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn
 from ..interface.agents import Agents, Counts, Memory, Placement
 from ..interface.experience import Experience, Observation
@@ -23,7 +24,7 @@ from ..interface.scenario import Scenario
 from ..numerics import AnyArray, FloatArray, IntArray, set_words, words_of
 from .inputs import Inputs
 from .settings import MultiAgentPPOSettings, PPOSettings
-from .training import ActorCritic, InputNames, under
+from .training import ActorCritic, InputNames, bytes_of, under
 
 
 @dataclass
@@ -78,7 +79,7 @@ class HierarchyPPO(Agents[PolicyInputs]):
                 "each other nothing, use a topology without them"
             )
         n, n_actions = self.shape
-        heard = sorted({sender for i in range(n) for sender in hierarchy.above(i)})
+        heard = self.senders(hierarchy)
         self.width = len(heard) * n_actions
         self._told_names = [
             f"{scenario.agents[sender]} did {action}"
@@ -98,10 +99,21 @@ class HierarchyPPO(Agents[PolicyInputs]):
         self._by_policy: dict[bytes, list[tuple[int, IntArray]]] = {}
         self._counts = Counts()
 
+    @staticmethod
+    def senders(hierarchy: Hierarchy) -> list[int]:
+        """Return whose actions somebody may be told, in agent order: for them there are inputs."""
+        above = (hierarchy.above(agent) for agent in range(len(hierarchy)))
+        return sorted({sender for senders in above for sender in senders})
+
     @property
     def counts(self) -> Counts:
         """What they have evaluated so far: each its own actions."""
         return self._counts
+
+    @property
+    def weight_bytes(self) -> int:
+        """How much memory the weights of policies and critics take."""
+        return sum(bytes_of(policy.model.policy) for policy in self.policies.values())
 
     def policy_of(self, agents: IntArray) -> ActorCritic:
         """Return the policy and critic of agents that share weights."""
@@ -229,12 +241,40 @@ class HierarchyPPO(Agents[PolicyInputs]):
         ValueError
             If it is that of other agents.
         """
+        saved = {name: under(f"{name}.", memory) for name in self.policies}
+        missing = [name for name, own in saved.items() if not own]
+        if missing:
+            raise ValueError(f"team: no weights of {missing[0]!r} have been saved")
+        if sum(len(own) for own in saved.values()) < len(memory) - 1:
+            raise ValueError(f"team: more has been saved than of {', '.join(saved)}")
         for name, policy in self.policies.items():
-            own = under(f"{name}.", memory)
-            if not own:
-                raise ValueError(f"team: no weights of {name!r} have been saved")
-            policy.restore(own)
+            policy.restore(saved[name])
         set_words(self.rng, memory["generator"])
+
+
+class UnreliablyToldPPO(HierarchyPPO):
+    """The same where messages fail, so that an agent may be told by any that decided before.
+
+    Agents decide one after the other. Weights and random numbers begin as if no message failed;
+    what others tell than those of the hierarchy weighs nothing at first.
+    """
+
+    at_once = False
+
+    def __init__(self, settings: MultiAgentPPOSettings, placement: Placement) -> None:
+        super().__init__(settings, placement)
+        self.continue_from(HierarchyPPO(settings, placement))
+
+    @staticmethod
+    def senders(hierarchy: Hierarchy) -> list[int]:
+        """Return all who decide before another."""
+        return sorted(hierarchy.order[:-1])
+
+
+def hierarchy_ppo(settings: MultiAgentPPOSettings, placement: Placement) -> HierarchyPPO:
+    """Return agents in a hierarchy, whose messages may fail."""
+    kind = UnreliablyToldPPO if placement.messages_fail else HierarchyPPO
+    return kind(settings, placement)
 
 
 class CentralPPO(HierarchyPPO):
@@ -261,6 +301,7 @@ class CentralPPO(HierarchyPPO):
         """Return the actions ``(n,)`` of all."""
         logits = self._actors[0](inputs.seen).reshape(self.shape)
         inputs.logits[:] = logits
+        self._counts.joint_actions += logits.size
         return (logits + inputs.noise).argmax(axis=1)
 
     def check_world(self, scenario: Scenario) -> None:

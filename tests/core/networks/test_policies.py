@@ -9,6 +9,7 @@ import pytest
 from acting import look
 
 from nested_agents.core.agents.team import Team
+from nested_agents.core.hierarchy.failures import Messages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.hierarchy.turns import slots_of
 from nested_agents.core.interface.experience import Experience
@@ -20,6 +21,7 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session, arrange, check, run_trial
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.topologies.config import parse
 
 SHORT = {"kind": "hierarchy-ppo", "rollout": 16, "batch_size": 8, "epochs": 2}
 CARTS = 4
@@ -80,7 +82,7 @@ def told_of(team: Team, joint: Any) -> Any:
     agents: Any = team.parts[0]
     inputs = agents.perceive(look(agents.scenario), explore=False)
     inputs.noise[np.arange(len(joint)), joint] = 1e9
-    assert team._walk(look(agents.scenario), (inputs,)).tolist() == list(joint)
+    team.messages.advance(team._walk(look(agents.scenario), (inputs,)))
     return inputs.seen[:, : agents.width]
 
 
@@ -186,6 +188,123 @@ def test_a_joint_step_has_one_reward_for_all() -> None:
         team.learn(Experience(seen, team.act(seen), transition, last=False))
         rewards = agents.policies["all"].model.rollout_buffer.rewards[0]
         assert (np.ptp(rewards) > 0) == (spread > 0)
+
+
+TWO = [("a", "b"), ("a", "c")]
+FAILURES: dict[str, dict[str, Any]] = {
+    "lost": {"kind": "lost", "agents": "a"},
+    "lost at times": {"kind": "lost", "agents": "*", "probability": 0.5},
+    "delayed": {"kind": "delayed", "agents": "*", "decisions": 2},
+    "noisy": {"kind": "noisy", "agents": "*", "probability": 0.7},
+    "absent": {"kind": "absent", "agents": "b"},
+    "reparented": {"kind": "reparented", "agents": "c", "superior": "b"},
+    "later": {"kind": "lost", "agents": "a", "step": 3, "end_episode": 0, "end_step": 5},
+}
+
+
+def failures_of(*tables: dict[str, Any]) -> Any:
+    return parse({"kind": "chain", "failures": list(tables)}).failures
+
+
+@pytest.mark.parametrize("edges", [TREE[:2], list(pairwise("abc"))], ids=["star", "chain"])
+@pytest.mark.parametrize("failure", FAILURES)
+def test_what_is_told_is_what_arrives(failure: str, edges: Any) -> None:
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    n_actions = 3
+    hierarchy = Hierarchy("abc", edges)
+    failures = failures_of(FAILURES[failure])
+    team, agents = team_of(Players("abc", n_actions), hierarchy, failures)
+    messages = Messages(hierarchy, failures, n_actions)
+    for begun in (team.begin_world, messages.begin):
+        begun(7, 0)
+    rng = np.random.default_rng(0)
+    for _ in range(8):
+        joint = rng.integers(n_actions, size=3)
+        joint[messages.absent(np.arange(3))] = 0
+        arriving = np.zeros((3, 2, n_actions))
+        for agent in hierarchy.order:
+            senders, actions = messages.heard(agent, joint)
+            arriving[agent, senders, actions] = 1.0
+        messages.advance(joint)
+        assert agents.width == 2 * n_actions, "of a and b, who decide before another"
+        assert (told_of(team, joint) == arriving.reshape(3, -1)).all()
+
+
+def echoing(agents: Any, untold: int) -> None:
+    """Set weights by hand: agents do the action after that of the last who tells them.
+
+    Of nobody told, they do `untold`.
+    """
+    from nested_agents.core.networks.training import set_weights, weights_of
+
+    n_actions = agents.shape[1]
+    weights = weights_of(agents.policies["all"].model.policy)
+    weights = {name: np.zeros_like(array) for name, array in weights.items()}
+    into, out = weights["mlp_extractor.policy_net.0.weight"], weights["action_net.weight"]
+    weights["action_net.bias"][untold] = 0.5
+    for unit in range(agents.width):
+        sender, action = divmod(unit, n_actions)
+        into[unit, unit] = 5.0
+        out[(action + 1) % n_actions, unit] = 10.0**sender
+    set_weights(agents.policies["all"].model.policy, weights)
+
+
+@pytest.mark.parametrize(
+    ("failure", "joint"),
+    [
+        (None, [2, 3, 3]),
+        ({"kind": "lost", "agents": "a"}, [2, 2, 2]),
+        ({"kind": "lost", "agents": "b"}, [2, 3, 3]),
+        ({"kind": "delayed", "agents": "a"}, [2, 2, 2]),
+        ({"kind": "absent", "agents": "a"}, [0, 2, 2]),
+        ({"kind": "reparented", "agents": "c", "superior": "b"}, [2, 3, 0]),
+    ],
+)
+def test_agents_act_by_what_arrives(failure: Any, joint: list[int]) -> None:
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    failures = failures_of(failure) if failure else ()
+    world = Players("abc", 4)
+    team, agents = team_of(world, Hierarchy("abc", TWO), failures, hidden=(12,))
+    echoing(agents, untold=2)
+    assert team.act(look(world), explore=False).joint_action.tolist() == joint
+    if failure and failure["kind"] == "delayed":
+        assert team.act(look(world), explore=False).joint_action.tolist() == [2, 3, 3]
+
+
+def test_agents_whose_messages_may_fail_begin_as_others_do() -> None:
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    scenario = LineUpSettings(carts=CARTS).build()
+    star = Hierarchy(scenario.agents, [("cart1", f"cart{k}") for k in (2, 3, 4)])
+    seen = look(scenario, scenario.reset(3))
+    logits = []
+    words = []
+    for failures in ((), failures_of({"kind": "lost", "agents": "cart1", "episode": 99})):
+        team, agents = team_of(scenario, star, failures)
+        decision = team.act(seen)
+        logits.append(decision.inputs[0].logits)
+        words.append(agents.rng.bit_generator.state)
+    assert logits[0] == pytest.approx(logits[1], abs=1e-6)
+    assert words[0] == words[1]
+
+
+def test_what_arrives_is_learned_from() -> None:
+    """Agents are paid for doing as the one does whom they are told of, in place of the first."""
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    failures = failures_of({"kind": "reparented", "agents": "c", "superior": "b"})
+    world = Players("abc", 2)
+    table = {"rollout": 32, "learning_rate": 0.003, "entropy": 0.05}
+    team, agents = team_of(world, Hierarchy("abc", TWO), failures, **table)
+    for _ in range(1000):
+        team.begin_episode()
+        seen = look(world)
+        decision = team.act(seen)
+        reward = float(decision.joint_action[1] == decision.joint_action[2])
+        transition = Transition(np.zeros((3, 1)), reward, True, False, {})
+        team.learn(Experience(seen, decision, transition, last=True))
+    for action in (0, 1):
+        inputs = agents.perceive(look(world), explore=False)
+        inputs.noise[1, action] = 1e9
+        assert team._walk(look(world), (inputs,))[2] == action
 
 
 def test_without_edges_it_is_mappo_and_by_own_critics_ippo() -> None:
