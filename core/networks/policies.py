@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from gymnasium.spaces import Discrete, MultiDiscrete
@@ -206,7 +205,7 @@ class HierarchyPPO(Agents[PolicyInputs]):
         )
         return f"a team trained with {there} cannot act with {here}"
 
-    def continue_from(self, former: Self) -> None:
+    def continue_from(self, former: HierarchyPPO) -> None:
         """Begin with the weights that agents of the same settings have learned elsewhere.
 
         What an input weighs goes with its name, see `ActorCritic.continue_from`.
