@@ -16,11 +16,16 @@ Two e-Pucks, their four wheels in a chain, learning by the default settings:
 """
 
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 __version__: str
 
+if not Path(__file__).with_name("core").exists():  # a checkout: the four folders stand beside
+    __path__.append(str(Path(__file__).parents[1]))
+
 _PLACES = {
+    "Agents": ("core.interface.agents", "Agents"),
     "ActionSet": ("core.interface.spaces", "ActionSet"),
     "Analysis": ("studies.results.analysis", "Analysis"),
     "BatchTDSettings": ("core.learners.batch", "BatchTDSettings"),
@@ -34,12 +39,14 @@ _PLACES = {
     "EvaluatorSettings": ("core.evaluators", "EvaluatorSettings"),
     "ExplorationSettings": ("core.decision.exploration", "ExplorationSettings"),
     "FrozenSettings": ("core.learners.td", "FrozenSettings"),
+    "FuzzyAgents": ("core.agents.fuzzy", "FuzzyAgents"),
     "Hierarchy": ("core.hierarchy.hierarchy", "Hierarchy"),
     "KinematicChain": ("scenarios.kinematic_chain.scenario", "KinematicChain"),
     "KinematicChainSettings": ("scenarios.kinematic_chain.config", "KinematicChainSettings"),
     "LearnerSettings": ("core.learners", "LearnerSettings"),
     "LineUpSettings": ("scenarios.line_up", "LineUpSettings"),
     "Measure": ("core.interface.measures", "Measure"),
+    "Observation": ("core.interface.experience", "Observation"),
     "Partition": ("core.rules.kernels.fuzzy", "Partition"),
     "RuleBase": ("core.rules.rule_base", "RuleBase"),
     "SUCCESS": ("core.interface.measures", "SUCCESS"),

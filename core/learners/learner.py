@@ -5,12 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pkgutil import resolve_name
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
+import numpy as np
 from pydantic import Field
 
+from ..adaptation.calibration import CalibrationSettings
 from ..adaptation.predictors import GivenPredictor, Predictor
-from ..adaptation.self_model import CalibrationSettings, SelfModelSettings
+from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import (
     EXPLORATIONS,
     BurstExploration,
@@ -18,7 +20,9 @@ from ..decision.exploration import (
     no_way_on,
 )
 from ..decision.settings import DecisionSettings
+from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import Agents, Placement
+from ..interface.scenario import Scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
@@ -109,6 +113,15 @@ class Learner(ABC):
         raise ValueError(no_way_on("learner.kind", self))
 
 
+class MembersOf(NamedTuple):
+    """Agents of a team that are of one kind."""
+
+    members: IntArray
+    """``(k,)`` who they are, in agent order."""
+    settings: TeamSettings
+    """How they decide and learn."""
+
+
 class TeamSettings(PartSettings):
     """What stands in the ``[learner]`` table of a spec: how those who act learn.
 
@@ -134,6 +147,16 @@ class TeamSettings(PartSettings):
         """
         agents: Agents[Any] = resolve_name(self.kind_of_agents)(self, placement)
         return agents
+
+    def members(self, scenario: Scenario, hierarchy: Hierarchy) -> list[MembersOf]:
+        """Return the agents of every kind: by default all are of one.
+
+        Raises
+        ------
+        ValueError
+            If nobody decides for an agent; one line.
+        """
+        return [MembersOf(np.arange(len(hierarchy)), self)]
 
     @property
     def needs_prediction(self) -> bool:

@@ -33,7 +33,7 @@ from ...core.plugins.settings import Settings, closest, tuples
 from ...core.plugins.sources import Sources, is_reference, named
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
-from ...topologies.builders import listed
+from ...topologies.builders import join_names
 from ..errors import SpecError, refused
 from .conditions import Condition, Curriculum, Length, Name, Override, below, expand, grid, section
 from .presets import PRESETS
@@ -344,7 +344,7 @@ class Spec(Settings):
         tuned = self.learner.keys() - LearnerSettings.model_fields.keys() - {"kind"}
         if tuned and controls:
             keys = ", ".join(f"learner.{key}" for key in sorted(tuned))
-            labels = listed((condition.label for condition in controls), 3)
+            labels = join_names((condition.label for condition in controls), 3)
             lines.append(f"{keys}: left out for {labels}, which learn nothing")
         for condition in self.conditions():
             lines += condition.settings.warnings()

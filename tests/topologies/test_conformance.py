@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from acting import fuzzy
+from acting import fuzzy, joint_of
 from pydantic import TypeAdapter
 
 from nested_agents.core.agents.joint import join_agents
@@ -176,7 +176,7 @@ def test_agents_that_are_not_seen_maintain() -> None:
     )
     scenario.reset(0)
     prediction = scenario.predict()
-    joint = team.act(prediction)
+    joint = joint_of(team, scenario, imagined=prediction)
     first, second, third, fourth = prediction.asked  # type: ignore[attr-defined]
     assert (first[:, 2:] == maintain).all()
     assert len(np.unique(first[:, :2], axis=0)) == 16  # all actions of itself and the one below
