@@ -58,14 +58,15 @@ class DeepQ(Agents[ValueInputs]):
 
     def __init__(self, settings: DQNSettings, placement: Placement) -> None:
         scenario = placement.scenario
-        if len(scenario.agents) > 1:
+        if len(placement.members) > 1:
             raise ValueError(
-                f"learner.kind = 'dqn': acts for one agent, there are {len(scenario.agents)}; "
+                f"learner.kind = 'dqn': acts for one agent, there are {len(placement.members)}; "
                 "use agents = 'team'"
             )
         self.rng = np.random.Generator(np.random.PCG64(placement.seed))
         self._settings = settings
         self._scenario = scenario
+        self._members = placement.members
         self._inputs = Inputs(scenario)
         self._n_actions = len(scenario.action_set)
         model = DQN(
@@ -118,9 +119,11 @@ class DeepQ(Agents[ValueInputs]):
         """Keep the step; update the network and its target when they are due."""
         transition = experience.transition
         entered = self._inputs.joint(transition.states)[None].astype(np.float32)
-        reward = self._rewards.scaled(np.array([np.mean(transition.reward)]))
+        own = np.asarray(transition.reward)
+        own = own[self._members] if own.ndim else own
+        reward = self._rewards.scaled(np.array([np.mean(own)]))
         done = np.array([float(transition.terminated)])
-        action = experience.decision.joint_action[None]
+        action = experience.decision.joint_action[self._members][None]
         self._model.replay_buffer.add(inputs.seen, entered, action, reward, done, [{}])
         self._decisions += 1
         s = self._settings

@@ -22,6 +22,13 @@ KINDS: dict[str, dict[str, Any]] = {
     "own weights": {"kind": "hierarchy-ppo", "weights": "own", **PPO},
     "dqn": {"kind": "dqn", "begin": 10, "target_interval": 20, "memory": 50},
 }
+MIXED = [
+    {"agents": "cart1", "learner": KINDS["dqn"]},
+    {"agents": ["cart2", "cart3"], "learner": KINDS["ppo"]},
+    {"agents": ["cart4", "cart5"], "learner": KINDS["hierarchy-ppo"]},
+    {"agents": "cart6", "learner": KINDS["mappo"]},
+    {"agents": "*", "learner": {"kind": "fitted-q"}},
+]
 
 
 def spec_of(name: str, **changes: Any) -> Spec:
@@ -66,6 +73,32 @@ def test_a_restored_team_goes_on_to_the_same_bits(name: str, failing: bool) -> N
         one.run_other_evaluations()
     evaluated = [row for row in session.result().rows if row.phase != "training"]
     assert list(restored.result().rows) == evaluated
+
+
+def test_networks_are_parts_of_a_team() -> None:
+    """Each learns of its own, is told of all others, goes on to the same bits when restored."""
+    world = {"kind": "line-up", "carts": 8}
+    learner = {"kind": "mixed", "parts": MIXED}
+    (trial,) = trials_of(spec_of("ppo", scenario=world, learner=learner))
+    session = Session(trial)
+    for episode in range(3):
+        restored = Session.restored(trial, session.team.arrays())
+        session.train(1, episode)
+        restored.train(1, episode)
+        assert same(session, restored)
+    states = session.scenario.reset(0)
+    seen = look(session.scenario, states)
+    decision = session.team.act(seen)
+    ppo: Any = session.team.parts[1]
+    assert (decision.inputs[1].logits.any(axis=1) == [False, True, True, *[False] * 5]).all()
+    assert ppo.policies["all"].model.rollout_buffer.actions.shape[1:] == (1, 2)
+    policies: Any = session.team.parts[2]
+    expected = np.zeros((2, 7, 4))
+    for place, agent in enumerate((3, 4)):
+        expected[place, range(agent), decision.joint_action[:agent]] = 1.0
+    told = decision.inputs[2].seen[[3, 4], : policies.width]
+    assert (told == expected.reshape(2, -1)).all()
+    assert session.team.parts[3].width == 0, "mappo is told nothing"
 
 
 @pytest.mark.parametrize("name", KINDS)
