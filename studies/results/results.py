@@ -427,8 +427,9 @@ def together(
     }
     frames: dict[str, list[pd.DataFrame]] = {"episodes": [], "trials": []}
     for part, new in zip(parts, labels, strict=True):
+        of_part = {"episodes": part.episodes, "trials": part.trials}
         for name, kept in frames.items():
-            frame = getattr(part, name)
+            frame = of_part[name]
             label = frame["condition"].map(new)
             swept = {k: label.map(lambda c, k=k: columns[c][k]) for k in (*keys, DIRECTORY)}
             kept.append(frame.assign(condition=label, **swept))

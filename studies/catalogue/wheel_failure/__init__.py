@@ -64,7 +64,7 @@ def measure(trial: Trial) -> TrialResult:
     kept = _keeping_weights(session)
     session.train(trial.episodes - onset, onset)
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
-    begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
+    begun = sorted(set(trial.settings.scenario.onsets) - {onset})
     later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
     return session.finish({"onset": float(onset), **later})
 
