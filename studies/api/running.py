@@ -14,8 +14,8 @@ from ..catalogue.study import load_study, measure_by_name
 from ..presentation.progress import Terminal, count
 from ..spec.spec import Spec
 from ..store.store import Store
+from ..trials.arrangement import check_conditions
 from ..trials.keeping import open_to_run, pending
-from ..trials.session import check
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer, run_trials
 from ..workers.workers import start_workers
@@ -105,7 +105,7 @@ def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
         If a condition cannot be built, or the study has not what it needs; before anything is run
         or written.
     """
-    measures = check(spec, may_fail=may_fail)
+    measures = check_conditions(spec, may_fail=may_fail)
     with spec.sources.active():
         load_study(spec.study).check(spec)
     return measures
