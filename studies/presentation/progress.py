@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import printable
 from ..spec.outline import StudyOutline
 from ..workers.runner import Observer, Outcome
 
@@ -52,7 +53,7 @@ PLAIN_SECONDS = 10.0
 
 def say(line: str) -> None:
     """Print a line on standard error."""
-    print(line, file=sys.stderr, flush=True)
+    print(printable(line), file=sys.stderr, flush=True)
 
 
 class Terminal(Observer):
@@ -114,7 +115,7 @@ def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:
         for outcome in outcomes:
             progress.advance(task)
             if outcome.error is not None:
-                progress.console.print(_failure(outcome), markup=False, highlight=False)
+                progress.console.print(printable(_failure(outcome)), markup=False, highlight=False)
 
 
 def _follow_lines(outcomes: Iterable[Outcome], total: int, done: int) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.studies.api.alternatives import USUAL
+from nested_agents.studies.api.tuning import USUAL
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
