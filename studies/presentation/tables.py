@@ -342,7 +342,8 @@ def _blocks(titles: Sequence[str], rows: Sequence[Row], width: int) -> list[dict
     if label + sum(1 + wide for wide in whole) <= width:
         return [dict(enumerate(whole))]
     broken = [max(map(len, [*title.split(), *of_cells])) for title, of_cells in pairs]
-    n, label = len(broken), min(label, LABEL)
+    n = len(broken)
+    label = min(label, LABEL)
     for many in range(n, 0, -1):
         blocks = [{i: broken[i] for i in range(k, min(k + many, n))} for k in range(0, n, many)]
         if all(label + sum(1 + wide for wide in block.values()) <= width for block in blocks):

@@ -119,11 +119,13 @@ def contrasts(
         setting: [(name, measure, values[c], values[members[0][1]]) for name, c in members[1:]]
         for setting, members in groups
     }
-    compared, made = differences(pairs, of_rates=shown_as.is_rate), []
+    compared = differences(pairs, of_rates=shown_as.is_rate)
+    made = []
     for setting, members in groups:
         less = {d.condition: {"difference": d.estimate} for d in compared[setting]}
         means = {name: values[c].to_numpy() for name, c in members}
-        lines, trained = [], {}
+        lines = []
+        trained = {}
         for name, c in members:
             if phase and shown_as.is_rate:
                 estimate = rate(results.values(c, shown_as.name, phase))
@@ -239,7 +241,8 @@ def probability_of_improvement(tasks: Tasks) -> Array:
     half = len(tasks) // 2
     each = []
     for own, base in zip(tasks[:half], tasks[half:], strict=True):
-        n, m = own.shape[-1], base.shape[-1]
+        n = own.shape[-1]
+        m = base.shape[-1]
         ranks = stats.rankdata(np.concatenate([own, base], axis=-1), axis=-1)[..., :n]
         each.append((ranks.sum(axis=-1) - n * (n + 1) / 2.0) / (n * m))  # Mann and Whitney's U
     return np.mean(each, axis=0)

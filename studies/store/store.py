@@ -214,7 +214,8 @@ class Store:
             "ORDER BY position, seed"
         )
         columns = [column[0] for column in cursor.description]
-        identity, error = columns.index("identity"), columns.index("error")
+        identity = columns.index("identity")
+        error = columns.index("error")
         rows = []
         for row in cursor:
             last = (row[error] or "").rstrip().rpartition("\n")[2] or None

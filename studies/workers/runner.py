@@ -82,7 +82,9 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
     A scenario that calls ``sys.exit``, or raises KeyboardInterrupt, has failed like any other: a
     worker ignores Ctrl-C, so that neither can come from anybody else.
     """
-    begin, error, result = time.perf_counter(), None, None
+    begin = time.perf_counter()
+    error = None
+    result = None
     try:
         with trial.sources.active():
             result = run_trial(trial)
@@ -283,7 +285,8 @@ class Workers(ABC):
         started
             Called with the identity of each trial when it is handed to a worker.
         """
-        waiting, left = iter(trials), len(trials)
+        waiting = iter(trials)
+        left = len(trials)
         running: dict[Any, Trial] = {}
         finished: SimpleQueue[Any] = SimpleQueue()
         try:
