@@ -429,16 +429,15 @@ def together(
         for name, part, new in zip(names, parts, labels, strict=True)
         for condition, row in part.columns.items()
     }
-    frames: dict[str, list[pd.DataFrame]] = {"episodes": [], "trials": []}
-    for part, new in zip(parts, labels, strict=True):
-        for name, kept in frames.items():
-            frame = getattr(part, name)
-            label = frame["condition"].map(new)
-            swept = {k: label.map(lambda c, k=k: columns[c][k]) for k in (*keys, DIRECTORY)}
-            kept.append(frame.assign(condition=label, **swept))
+
+    def rename(frame: pd.DataFrame, new: Mapping[str, str]) -> pd.DataFrame:
+        label = frame["condition"].map(new)
+        swept = {k: label.map(lambda c, k=k: columns[c][k]) for k in (*keys, DIRECTORY)}
+        return frame.assign(condition=label, **swept)
+
+    episodes = [rename(part.episodes, new) for part, new in zip(parts, labels, strict=True)]
+    trials = [rename(part.trials, new) for part, new in zip(parts, labels, strict=True)]
     phases = dict.fromkeys(phase for part in parts for phase in part.phases)
     usage = (name for part in parts for name in part.usage)
     measures = joined_measures(part.measures for part in parts)
-    episodes = frames["episodes"]
-    trials = frames["trials"]
     return assemble(episodes, trials, phases, columns, measures, usage), labels
