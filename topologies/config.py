@@ -28,8 +28,9 @@ from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure
 from ..core.hierarchy.hierarchy import Considers, Hierarchy, Told
 from ..core.numerics import nx
 from ..core.plugins import registry, sources
+from ..core.plugins.problems import closest
 from ..core.plugins.registry import Plugged, SettingsRegistry
-from ..core.plugins.settings import Settings, SettingsError, closest, tuples, unwritten
+from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
 from .builders import (
     Bodies,
     Names,
@@ -211,10 +212,12 @@ def build(
     if not isinstance(settings, TopologySettings):
         settings = parse(settings)
     title = settings.title
+    named: Bodies = [(a,) for a in agents]
     try:
         if not agents:
             raise ValueError("no agents")
-        named = [(a,) for a in agents] if bodies is None else _named(agents, bodies)
+        if bodies is not None:
+            named = _named(agents, bodies)
         if interactions is not None and getattr(settings, "shape", "") == "scenario":
             pairs = tuple((agents[a], agents[b]) for a, b in interactions)
             settings = settings.model_copy(update={"edges": pairs})
@@ -230,7 +233,9 @@ def build(
         problem = str(error)
         for start in ("hierarchy: ", f"{title}: ", f"topology {title!r}: "):
             problem = problem.removeprefix(start)
-        raise ValueError(f"topology {title!r}: {problem}") from None
+        is_of_user = settings.kind not in TOPOLOGIES.built_in
+        given = f" (given {len(agents)} agents of {len(named)} bodies)" if is_of_user else ""
+        raise ValueError(f"topology {title!r}: {problem}{given}") from None
 
 
 def from_file(agents: Names, bodies: Bodies = (), *, path: str) -> nx.DiGraph:
@@ -433,8 +438,7 @@ def _called(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies)
         lines = [f.lineno for f in frames if f.filename == frames[0].filename]
         where = f" in line {lines[-1]}" if lines else ""
         raise ValueError(
-            f"{name} raised {type(error).__name__}{where}, given {len(agents)} agents of "
-            f"{len(bodies)} bodies: {sources.message(error)}"
+            f"{name} raised {type(error).__name__}{where}: {sources.message(error)}"
         ) from None
     if edges is None:
         raise ValueError(

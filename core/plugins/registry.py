@@ -15,7 +15,7 @@ fields are its annotated keyword-only parameters, documented as its docstring do
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from inspect import getdoc, isfunction, signature
 from pathlib import Path
@@ -26,7 +26,9 @@ from pydantic import Field, create_model
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
-from .settings import Settings, closest, tuples
+from .models import Choice
+from .problems import closest
+from .settings import Settings, tuples
 
 MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
 """A parameter in a docstring: its name, and what is said of it, indented."""
@@ -299,7 +301,7 @@ def _dumped(value: Settings, info: Any) -> Any:
     return value.model_dump(mode=info.mode, exclude_none=info.exclude_none)
 
 
-class Plugged:
+class Plugged(Choice):
     """Marks a field that holds the settings of any thing of a registry.
 
     A table is validated by the model that its ``kind`` names; a text is what `shorthand` makes of
@@ -316,7 +318,16 @@ class Plugged:
     def __init__(
         self, registry: SettingsRegistry, shorthand: Callable[[str], Settings] | None = None
     ) -> None:
-        self.registry, self.shorthand = registry, shorthand
+        self.registry = registry
+        self.shorthand = shorthand
+
+    def model(self, kind: str) -> type[Settings]:
+        """Return the settings model of a kind, see `SettingsRegistry.model`."""
+        return self.registry.model(kind)
+
+    def kinds(self) -> Iterable[str]:
+        """Return the kinds that are built in."""
+        return self.registry.built_in
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
         """Return how pydantic validates and writes the field."""

@@ -259,21 +259,29 @@ def is_file(text: object) -> bool:
     return isinstance(text, str) and text.endswith(GRAPHS)
 
 
-def named(value: Any) -> set[str]:
-    """Return the names of all files that settings mention, at any depth.
+def mentions(value: object, key: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the files that settings mention, at any depth, each with the dotted key that does.
 
     Examples
     --------
-    >>> sorted(named({"kind": "arm.py:Arm", "graphs": ["teams.json"]}))
-    ['arm.py', 'teams.json']
+    >>> list(mentions({"kind": "arm.py:Arm", "graphs": ["teams.json"]}))
+    [('arm.py', 'kind'), ('teams.json', 'graphs')]
     """
     if isinstance(value, Mapping):
-        return set().union(*map(named, value.values()))
-    if isinstance(value, list | tuple):
-        return set().union(*map(named, value))
-    if is_reference(value):
-        return {split(value)[0]}
-    return {value} if is_file(value) else set()
+        for name, inner in value.items():
+            yield from mentions(inner, f"{key}.{name}".lstrip("."))
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from mentions(inner, key)
+    elif isinstance(value, str) and is_reference(value):
+        yield split(value)[0], key
+    elif isinstance(value, str) and is_file(value):
+        yield value, key
+
+
+def files_in(value: object) -> set[str]:
+    """Return the names of all files that settings mention, at any depth."""
+    return {name for name, _ in mentions(value)}
 
 
 def split(reference: str) -> tuple[str, str]:

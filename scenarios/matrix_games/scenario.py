@@ -39,7 +39,8 @@ from ...core.agents.team import Team
 from ...core.interface.scenario import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
 from ...core.numerics import FloatArray, IntArray
-from ...core.plugins.settings import ScenarioSettings, closest
+from ...core.plugins.problems import closest
+from ...core.plugins.settings import ScenarioSettings
 
 OF_OPTIMA = (
     Measure(SUCCESS.name, SUCCESS.title, source="optimal", better="higher", is_rate=True),

@@ -22,8 +22,9 @@ import numpy as np
 
 from ...core.interface.scenario import roles_of
 from ...core.numerics import pd
+from ...core.plugins.problems import show
 from ...core.plugins.sources import Sources
-from ..errors import SpecError, show
+from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..results.results import DONE, Results, read
 from ..spec.spec import Spec, plain

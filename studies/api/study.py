@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...core.interface.scenario import SUCCESS, Actors, Scenario, can_draw
 from ...core.numerics import pd
-from ...core.plugins.settings import closest
+from ...core.plugins.problems import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study
 from ..errors import SpecError

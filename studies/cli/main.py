@@ -65,7 +65,7 @@ class _Commands(click.Group):
     ) -> tuple[str, click.Command, list[str]]:
         command = self.get_command(ctx, args[0])
         if command is None:
-            from ...core.plugins.settings import closest  # pydantic takes its time
+            from ...core.plugins.problems import closest  # pydantic takes its time
 
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
         parts = command.commands if isinstance(command, click.Group) else {}

@@ -23,7 +23,7 @@ from rich.table import Table
 
 from ...core.interface.scenario import Measure
 from ...core.numerics import pd
-from ...core.plugins.settings import near
+from ...core.plugins.problems import near
 from ..errors import SpecError
 from ..results.analysis import Summary
 from ..results.statistics import FEW, Estimate, between, exactly, stacked, two_figures

@@ -25,9 +25,10 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from ...core.plugins.problems import show
 from ...scenarios import SCENARIOS
 from ..catalogue.study import analysed, drawn, load_study
-from ..errors import SpecError, show
+from ..errors import SpecError
 from ..presentation.figures import styled
 from ..presentation.progress import count
 from ..presentation.tables import tabulate

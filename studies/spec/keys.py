@@ -10,7 +10,7 @@ import inspect
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
 from textwrap import dedent
@@ -21,11 +21,13 @@ from annotated_types import MinLen
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
-from ...core.plugins.settings import Settings, near
+from ...core.plugins.models import choice_of, models_of
+from ...core.plugins.problems import near
+from ...core.plugins.registry import Plugged, SettingsRegistry
+from ...core.plugins.settings import Settings
 from .conditions import ConditionSettings, Override, StageSettings
 from .presets import PRESETS
 from .spec import Spec
-from .tables import models_of, registry_of
 
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 """How the text beside a field names its unit."""
@@ -124,39 +126,76 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
     return tuple(below)
 
 
-def _below(model: type[Settings], name: str, within: str, seen: set[Any]) -> Iterator[Table]:
+def _below(
+    model: type[Settings], name: str, within: str, seen: set[tuple[str, type[Settings]]]
+) -> Iterator[Table]:
     """Yield the tables that the fields of a model hold, at any depth, each once."""
     for field, info in model.model_fields.items():
         place = f"{name}.{field}" if name else field
         for kind, held, inherited in _held(info):
-            if (place, held) not in seen:
-                seen.add((place, held))
-                table = _table(place, (kind, within), held, inherited)
-                if table.keys or kind:
-                    yield table
-                yield from _below(held, place, kind or within, seen)
+            if (place, held) in seen:
+                continue
+            seen.add((place, held))
+            table = _table(place, (kind, within), held, inherited)
+            if not kind and (kinds := kinds_of(info)):
+                table = table._replace(keys=(_kind(info, kinds), *table.keys))
+            if table.keys or kind:
+                yield table
+            yield from _below(held, place, kind or within, seen)
+
+
+def settings_of(info: FieldInfo) -> list[type[Settings]]:
+    """Return the settings models that a field's annotation allows, in order."""
+    return [model for model in models_of(info.annotation) if issubclass(model, Settings)]
+
+
+def registry_of(info: FieldInfo) -> SettingsRegistry | None:
+    """Return the registry whose things a field holds, if it does."""
+    choice = choice_of(info)
+    return choice.registry if isinstance(choice, Plugged) else None
+
+
+def kinds_of(info: FieldInfo) -> dict[str, type[Settings]]:
+    """Return the models of a field that a table's ``kind`` tells apart, by kind."""
+    registry = registry_of(info)
+    if registry is not None:
+        return {kind: registry.model(kind) for kind in registry.built_in}
+    models = settings_of(info)
+    return {m.model_fields["kind"].default: m for m in models if "kind" in m.model_fields}
 
 
 def _held(info: FieldInfo) -> Iterator[tuple[str, type[Settings], Mapping[str, FieldInfo]]]:
     """Yield what a field may hold: kind, model, and fields of the model that it inherits.
 
-    What all kinds inherit comes first, if it has keys.
+    What all kinds inherit comes first.
     """
-    plugged = registry_of(info)
-    models: list[Any] = [m for m in models_of(info.annotation) if issubclass(m, Settings)]
-    kinds = [(m.model_fields["kind"].default, m) for m in models if "kind" in m.model_fields]
-    base: Any = None
-    if plugged is not None:
-        base, models = plugged.base, []
-        kinds = [(kind, plugged.model(kind)) for kind in plugged.built_in]
-    elif kinds:
-        bases = kinds[0][1].__mro__[1:]
-        base = next(cls for cls in bases if all(issubclass(m, cls) for _, m in kinds))
-    inherited = getattr(base, "model_fields", {})
-    if inherited or plugged is not None:
+    registry, kinds = registry_of(info), kinds_of(info)
+    inherited: Mapping[str, FieldInfo] = {}
+    if registry is not None or kinds:
+        base = registry.base if registry is not None else _base(list(kinds.values()))
+        inherited = base.model_fields
         yield "", base, {}
-    yield from ((kind, model, inherited) for kind, model in kinds)
-    yield from (("", model, {}) for model in models if "kind" not in model.model_fields)
+    for kind, model in kinds.items():
+        yield kind, model, inherited
+    if registry is None:
+        yield from (("", m, {}) for m in settings_of(info) if "kind" not in m.model_fields)
+
+
+def _base(models: Sequence[type[Settings]]) -> type[Settings]:
+    """Return the nearest model that all of some models inherit."""
+    ancestors = (cls for cls in models[0].__mro__[1:] if issubclass(cls, Settings))
+    return next(cls for cls in ancestors if all(issubclass(m, cls) for m in models))
+
+
+def _kind(info: FieldInfo, kinds: Iterable[str]) -> Key:
+    """Return the key that says of which kind a field's table is."""
+    own = "; or one of your own, file.py:NAME" if registry_of(info) is not None else ""
+    default = "required"
+    value = None if info.is_required() else info.get_default(call_default_factory=True)
+    if isinstance(value, Settings):
+        default = json.dumps(value.model_dump().get("kind", ""))
+    meaning = "Which of them it is; what else may stand in the table depends on it."
+    return Key("kind", "text", default, ", ".join(kinds) + own, "", meaning, "")
 
 
 def _table(
@@ -226,11 +265,14 @@ def _docstrings(cls: type) -> Mapping[str, str]:
     }
 
 
-def _key(name: str, info: FieldInfo, meaning: str, laid: Any) -> Key:
+def _key(name: str, info: FieldInfo, meaning: str, laid: object) -> Key:
     """Return a key; `laid` is what the preset has in place of its default, if anything."""
-    plugged, default, unit = registry_of(info), _shown(info), UNIT.search(meaning)
-    if plugged is not None:
-        type_, allowed = "table", f"kind: {', '.join(plugged.built_in)}"
+    registry = registry_of(info)
+    default = _default(info)
+    unit = UNIT.search(meaning)
+    if registry is not None:
+        type_ = "table"
+        allowed = f"kind: {', '.join(registry.built_in)}"
     else:
         type_ = _type(info.annotation)
         allowed = ", ".join(dict.fromkeys([*_bounds(info.metadata), *_allowed(info.annotation)]))
@@ -241,14 +283,14 @@ def _key(name: str, info: FieldInfo, meaning: str, laid: Any) -> Key:
     return Key(name, type_, default, allowed, unit[1] if unit else "", meaning, preset)
 
 
-def _shown(info: FieldInfo) -> str:
+def _default(info: FieldInfo) -> str:
     if info.is_required():
         return "required"
     value = info.get_default(call_default_factory=True)
     if value is None:
         return "none"
     if isinstance(value, Settings):
-        kind = getattr(value, "kind", "")
+        kind = value.model_dump().get("kind")
         return json.dumps(kind) if kind else "{}"
     if value == tuple(range(8)):
         return "8"  # the seeds, which are written as their number

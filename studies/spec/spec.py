@@ -28,17 +28,19 @@ from ...core.evaluators import EVALUATORS
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.learners import LEARNERS, LearnerSettings
 from ...core.numerics import nx
+from ...core.plugins.problems import closest, explain
 from ...core.plugins.registry import Registry
-from ...core.plugins.settings import Settings, closest, tuples
-from ...core.plugins.sources import Sources, is_reference, named
+from ...core.plugins.settings import Settings, tuples
+from ...core.plugins.sources import Sources, is_reference, mentions
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ...topologies.builders import listed
 from ..errors import SpecError, refused
-from .conditions import Condition, Curriculum, Length, Name, Override, below, expand, grid, section
+from .conditions import Condition, Curriculum, Length, Name, Override
+from .layers import below, expand, grid, section
 from .presets import PRESETS
 from .studies import STUDIES
-from .tables import TomlTable, assignment, explain, overlay
+from .tables import TomlTable, assignment, overlay
 
 REGISTRIES: dict[str, Registry] = {
     "study": STUDIES,
@@ -123,6 +125,9 @@ def _name(thing: Any, registry: Registry) -> str:
 
 MOST_TRIALS = 100_000
 """A larger grid is taken for a mistake."""
+
+MOST_KEYS = 6
+"""A remark names no more of them."""
 
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 
@@ -265,9 +270,15 @@ class Spec(Settings):
             spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations,
             spec.curriculum,
         )  # fmt: skip
-        spec._sources = sources.only(
-            named([spec.study, *(condition.tables for condition in spec._conditions)])
-        )
+        tables = [table for condition in spec._conditions for table in condition.tables]
+        names = dict(mentions([{"study": spec.study}, *tables]))
+        for name, key in names.items():
+            try:
+                sources.text(name)
+            except ValueError as error:
+                problem = str(error).removeprefix(f"{name}: ")
+                raise SpecError(f"{key} = {name!r}: {problem}") from None
+        spec._sources = sources.only(set(names))
         return spec
 
     @classmethod
@@ -336,10 +347,15 @@ class Spec(Settings):
     def warnings(self) -> tuple[str, ...]:
         """Return what looks wrong and is not refused, a line each: sizes in another unit.
 
-        Also which keys are left out: of its learner for controls, see `conditions`, and of its
-        topology for learners that pass nothing down.
+        Also which keys are left out: of its learner for controls, see `conditions`, of its topology
+        for learners that pass nothing down, and of its preset for kinds that have none such.
         """
         lines = []
+        left_out = dict.fromkeys(key for c in self.conditions() for key in c.left_out)
+        if left_out:
+            kinds = dict.fromkeys(kind for c in self.conditions() for kind in c.other_kinds)
+            keys = listed(left_out, MOST_KEYS)
+            lines.append(f"{keys}: of the preset, left out for {listed(kinds, MOST_KEYS)}")
         controls = [c for c in self.conditions() if c.settings.learner.kind == "frozen"]
         tuned = self.learner.keys() - LearnerSettings.model_fields.keys() - {"kind"}
         if tuned and controls:

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ...core.interface.scenario import Measure
-from ...core.plugins.settings import closest
+from ...core.plugins.problems import closest, show
 from ...core.plugins.sources import FOLDER, Sources, kept_name
-from ..errors import SpecError, show
+from ..errors import SpecError
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import aliases, dumps, flat, named

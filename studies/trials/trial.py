@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...core.interface.scenario import Measure, Scenario, Transition
-from ...core.plugins.sources import Sources, named
+from ...core.plugins.sources import Sources, files_in
 from ..errors import SpecError
 from ..spec.conditions import ConditionSettings, Stage
 from ..spec.outline import lengths
@@ -250,7 +250,7 @@ class Trial:
             ]
         if self.curriculum:
             content["curriculum"] = [stage.table() for stage in self.curriculum]
-        if files := sorted(named([self.study, content])):
+        if files := sorted(files_in([self.study, content])):
             content["sources"] = {name: self.sources.digest(name) for name in files}
         return content
 
