@@ -42,7 +42,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
-from nested_agents.core.interface.scenario import Measure
+from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.api.study import load

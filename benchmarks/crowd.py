@@ -13,7 +13,7 @@ from pathlib import Path
 from nested_agents.core.agents.loop import control_loop, policy_seed, world_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.scenario import EpisodeRecorder
+from nested_agents.core.interface.recording import EpisodeRecorder
 from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings

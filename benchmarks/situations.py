@@ -11,7 +11,7 @@ import numpy as np
 
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.spaces import Prediction
+from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.td import TDLambda
 from nested_agents.core.numerics import FloatArray, IntArray

@@ -23,7 +23,7 @@ import numpy as np
 
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.coordination.graphs import Elimination, MaxPlus, Scope
-from nested_agents.core.interface.spaces import Prediction
+from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.numerics import FloatArray, IntArray
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import EVALUATION_WORLDS, Session

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 import nested_agents
-from nested_agents.core.interface.scenario import Measure
+from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.adapters.adapted import AdaptedWorld
 from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
@@ -54,7 +54,8 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "interface.hierarchy", "interface.spaces", "interface.scenario", "agents.team",
+        "interface.hierarchy", "interface.spaces", "interface.prediction", "interface.scenario",
+        "interface.measures", "interface.experience", "interface.plain", "agents.team",
         "adaptation.predictors", "agents.loop", "agents.joint", "decision.exploration",
         "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
         "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",

@@ -15,7 +15,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from nested_agents.core.interface.scenario import EpisodeRecorder
+from nested_agents.core.interface.recording import EpisodeRecorder
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import AXES, SIDES, picture
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing

@@ -21,8 +21,10 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..core.interface.scenario import SUCCESS, Measure, Transition
-from ..core.interface.spaces import ActionSet, Blocks, StateSpace, Variable
+from ..core.interface.measures import SUCCESS, Measure
+from ..core.interface.prediction import Blocks, Prediction, Tables
+from ..core.interface.scenario import Scenario, Transition
+from ..core.interface.spaces import ActionSet, StateSpace, Variable
 from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 
@@ -58,7 +60,7 @@ class LineUpSettings(ScenarioSettings):
     factory: ClassVar[str] = f"{__name__}:LineUp"
 
 
-class LineUp:
+class LineUp(Scenario):
     """The line-up scenario; a `Scenario`.
 
     Parameters
@@ -134,7 +136,7 @@ class LineUp:
         return np.stack([self._places, lead], axis=1)
 
 
-class LineUpPrediction:
+class LineUpPrediction(Prediction, Tables):
     """Exact prediction; a `Prediction`.
 
     Parameters
@@ -166,6 +168,10 @@ class LineUpPrediction:
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
         return reward(self._after(joint_actions))
+
+    def tables(self) -> Tables:
+        """Return itself: it has tables of all joint actions."""
+        return self
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions."""

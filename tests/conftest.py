@@ -15,8 +15,9 @@ import pytest
 from hypothesis import settings
 
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.scenario import Transition
-from nested_agents.core.interface.spaces import ActionSet, Blocks, StateSpace, Variable
+from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from ..interface.spaces import Blocks, first_alike
+from ..interface.prediction import Blocks, Prediction, Tables, first_alike
 from ..numerics import FloatArray, IntArray
 
 
-class LearnedPrediction:
+class LearnedPrediction(Prediction):
     """Predicts from one situation; see `Prediction`.
 
     Parameters
@@ -29,13 +29,19 @@ class LearnedPrediction:
         self._predictor, self.present = predictor, present
         self._reached = predictor.reached(present)
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
+        self._first: IntArray | None = None
         n, a, _ = self._reached.shape
         same = (self._reached[:, :, None] == self._reached[:, None]).all(axis=3)
         self._level = same.argmax(axis=2) if predictor.own_rules else np.tile(np.arange(a), (n, 1))
         if predictor.digits.size:
             groups, digits = np.array(predictor.groups), predictor.digits
             places = a ** np.arange(digits.shape[1])[::-1]
-            self.alike = first_alike(self._level[groups[:, None], digits[None]] @ places)
+            self._first = first_alike(self._level[groups[:, None], digits[None]] @ places)
+
+    @cached_property
+    def alike(self) -> IntArray | None:
+        """The first robot-action index that comes to the same, see `Prediction`."""
+        return self._first
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return own variables ``(n, m, n_own)`` and shared ones ``(G, m, d - n_own)``."""
@@ -53,16 +59,23 @@ class LearnedPrediction:
         return np.concatenate([own[agent], shared[self._predictor.group_of[agent]]], axis=1)
 
 
-class TabulatedPrediction(LearnedPrediction):
+class TabulatedPrediction(LearnedPrediction, Tables):
     """The same of few agents, with tables of all their joint actions."""
 
     @cached_property
     def _table(self) -> tuple[FloatArray, IntArray]:
         """Shared variables ``(G, rows, s)``, and the row of every joint-action index."""
         p = self._predictor
-        same = self.alike[np.arange(len(p.groups)), p.local] @ p.divisors
+        assert self._first is not None  # tables are of groups of equal size
+        same = self._first[np.arange(len(p.groups)), p.local] @ p.divisors
         first, row = np.unique(same, return_index=True, return_inverse=True)[1:]
         return self.states_by_group(p.joint[first])[1], row
+
+    rewarded = False
+
+    def tables(self) -> Tables:
+        """Return itself: it has tables of all joint actions."""
+        return self
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions."""

@@ -16,14 +16,14 @@ what agents do in the first is held.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, cast
 
 import numpy as np
 
-from ..interface.scenario import Scenario, Transition, groups_of, rows_of
+from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
+from .adaptive import Adaptive, DynamicsModel
 from .learned_prediction import LearnedPrediction, TabulatedPrediction
 from .predictors import DrivenBodies, LearnedPredictorSettings, Mirror, driven_states
 
@@ -41,7 +41,7 @@ GRAIN = 1e-3
 """Own variables that differ by less than this, in units of their range, are the same."""
 
 
-class LearnedPredictor:
+class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
     """Regresses what agents' actions lead to; see the module.
 
     Parameters
@@ -61,16 +61,17 @@ class LearnedPredictor:
 
     def __init__(self, settings: LearnedPredictorSettings, scenario: Scenario) -> None:
         self.settings, self.space = settings, scenario.state_space
-        self.groups, self.n_actions = groups_of(scenario), len(scenario.action_set)
+        self.groups, self.n_actions = scenario.groups, len(scenario.action_set)
         space = self.space
         if not space.shared:
             raise ValueError("learner.predictor: all state variables are an agent's own")
-        self.horizon = settings.horizon or cast(Any, getattr(scenario, "horizon", 1))
-        # What an action is in the mirror is not known, only what own variables are.
-        known = hasattr(scenario, "partners") and space.n_own > 0
+        self.horizon = settings.horizon or scenario.horizon
         if settings.mirrored and not space.n_own:
             raise ValueError("learner.predictor.mirrored: without own variables there is no mirror")
-        mirrored = known if settings.mirrored is None else settings.mirrored
+        mirrored = settings.mirrored
+        if mirrored is None:
+            # What an action is in the mirror is not known, only what own variables are.
+            mirrored = space.n_own > 0 and scenario.partners() is not None
         self.mirror = Mirror.of(scenario) if mirrored else None
         self.bodies = DrivenBodies(
             scenario, products=settings.products, memberships=settings.memberships
@@ -126,7 +127,9 @@ class LearnedPredictor:
         """Predict from states ``(n, d)``."""
         return (TabulatedPrediction if len(self.joint) else LearnedPrediction)(self, states)
 
-    def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
+    def adapt(
+        self, prediction: LearnedPrediction, joint_action: IntArray, transition: Transition
+    ) -> None:
         """Note what a joint action led to from the states of a prediction, as `observe`."""
         self.observe(prediction.present, joint_action, transition.states)
 

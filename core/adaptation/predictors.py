@@ -21,12 +21,14 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..interface.scenario import Scenario, groups_of, roles_of
+from ..interface.prediction import Prediction
+from ..interface.scenario import Scenario
 from ..numerics import FloatArray, IntArray, njit
 from ..plugins.settings import PartSettings, Positive, unwritten
 from ..rules.kernels.fuzzy import Packed, Partition
 from ..rules.kernels.states import active_compact
 from ..rules.rule_base import RuleBase
+from .adaptive import DynamicsModel
 
 
 class GivenPredictor(PartSettings):
@@ -71,7 +73,7 @@ Predictor = Annotated[
 """The settings of any predictor, distinguished by ``kind``."""
 
 
-class Persistence:
+class Persistence(DynamicsModel):
     """Predicts that nothing changes."""
 
     def __init__(self, settings: StaticPredictor, scenario: Scenario) -> None:
@@ -82,7 +84,7 @@ class Persistence:
         return StaticPrediction(states)
 
 
-class StaticPrediction:
+class StaticPrediction(Prediction):
     """The present states ``(n, d)``, whatever is done."""
 
     def __init__(self, present: FloatArray) -> None:
@@ -124,7 +126,8 @@ class Mirror:
         ValueError
             If it has none, or a state variable does not say what a mirror does to it; one line.
         """
-        if not hasattr(scenario, "partners"):
+        partners = scenario.partners()
+        if partners is None:
             raise ValueError("learner.mirrored: the scenario does not tell what a mirror does")
         variables = scenario.state_space.variables
         for variable in variables:
@@ -134,7 +137,7 @@ class Mirror:
                     "mirror turns its sign; declare mirrored = 'same' or 'opposite'"
                 )
         signs = [-1.0 if variable.mirrored == "opposite" else 1.0 for variable in variables]
-        return cls(np.array(signs), np.array(scenario.partners()))
+        return cls(np.array(signs), np.array(partners))
 
     def rows(self, rows: IntArray) -> IntArray:
         """Return the rows of weights ``(2 n,)`` of agents and images, of those ``(n,)`` of agents.
@@ -182,7 +185,7 @@ class DrivenBodies:
     """
 
     def __init__(self, scenario: Scenario, *, products: str, memberships: int | None) -> None:
-        space, groups, roles = scenario.state_space, groups_of(scenario), roles_of(scenario)
+        space, groups, roles = scenario.state_space, scenario.groups, scenario.roles
         common = {j for j, v in enumerate(space.variables) if v.name in space.common}
         columns = range(space.n_own, space.n_variables)
         alike = len({tuple(roles[i] for i in group) for group in groups}) == 1

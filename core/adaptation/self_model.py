@@ -35,13 +35,14 @@ decision little is learned. What drifts is added to P, so that it never falls to
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, cast
 
 import numpy as np
 
-from ..interface.scenario import EmbodiedScenario, Scenario, Transition
+from ..interface.prediction import EmbodiedPrediction
+from ..interface.scenario import Scenario, Transition
 from ..numerics import FloatArray, IntArray
 from ..plugins.settings import NonNegative, Positive, Settings
+from .adaptive import Adaptive
 
 MEMORY = 100
 """Decisions over which the size of innovations is averaged."""
@@ -64,7 +65,7 @@ class SelfModelSettings(Settings):
     """Share of the prior covariance that is added then."""
 
 
-class SelfModel:
+class SelfModel(Adaptive[EmbodiedPrediction]):
     """Kalman filters on the wheel effects of all bodies.
 
     Parameters
@@ -124,11 +125,14 @@ class SelfModel:
         """
         if not settings.enabled:
             return None
-        if not isinstance(scenario, EmbodiedScenario):
+        bodies = scenario.embodiment()
+        if bodies is None:
             raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
-        return cls(settings, scenario.nominal_effects)
+        return cls(settings, bodies.nominal_effects)
 
-    def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
+    def adapt(
+        self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
+    ) -> None:
         """Revise all effects by how the bodies moved by a joint action.
 
         What contact is predicted to take from the motion is given back: a body that moves a load
@@ -191,7 +195,7 @@ class CalibrationSettings(Settings):
     """What is added to the standard deviation (as squares) by every decision that pushes."""
 
 
-class Calibration:
+class Calibration(Adaptive[EmbodiedPrediction]):
     """Estimates the logarithms of ``n`` constants, in units of what was believed at first.
 
     Parameters
@@ -235,15 +239,17 @@ class Calibration:
         """
         if not settings.enabled:
             return None
-        constants = getattr(scenario, "constants", ())
-        if not isinstance(scenario, EmbodiedScenario) or not constants:
+        bodies = scenario.embodiment()
+        if bodies is None or not bodies.constants:
             raise ValueError(
                 "learner.calibration.enabled: the scenario's predictor has no constants to "
                 "calibrate"
             )
-        return cls(settings, len(constants), cast(Any, scenario).levers)
+        return cls(settings, len(bodies.constants), bodies.levers)
 
-    def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
+    def adapt(
+        self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
+    ) -> None:
         """Hold the constants against how what bodies push moved by a joint action, if it did."""
         twists, n_bodies = transition.twists, len(prediction.groups)
         if twists is not None and twists[:-n_bodies].any():

@@ -17,30 +17,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
-from typing import Any, Literal
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
-from ..interface.scenario import (
-    EmbodiedScenario,
-    Scenario,
-    Transition,
-    groups_of,
-    measures_of,
-    roles_of,
+from ..interface.prediction import (
+    Blocks,
+    EmbodiedPrediction,
+    Prediction,
+    Tables,
+    rewards_of,
 )
-from ..interface.spaces import ActionSet, Blocks, Prediction, StateSpace
+from ..interface.scenario import Embodiment, Scenario, Transition
+from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 
 Granularity = Literal["actuator", "body", "team"]
 """What there is one agent for."""
 MOST_ACTIONS = {"body": 4**4, "team": 4**6}
 """The most actions of a body, those of four wheels, and of a team."""
-OF_JOINT_ACTIONS = ("rewards", "commands", "slips", "outcomes")
-"""What a prediction may offer whose first argument are joint actions."""
-OF_BODIES = ("nominal_effects", "constants", "levers")
-"""What a scenario open to self-models, and perhaps to calibration, tells of its bodies."""
 
 
 def join_agents(scenario: Scenario, agents: Granularity) -> Scenario:
@@ -103,7 +99,7 @@ def body_of(agent: str) -> str:
     return agent.rpartition(".")[0] or agent
 
 
-class JointAgents:
+class JointAgents(Scenario):
     """A scenario seen as that of one agent per block of agents; see `join_agents`.
 
     Parameters
@@ -116,38 +112,33 @@ class JointAgents:
     """
 
     def __init__(self, scenario: Scenario, each: Granularity) -> None:
-        single, space, groups = scenario.action_set, scenario.state_space, groups_of(scenario)
-        self.agents, self.blocks = joint_blocks(scenario.agents, groups, len(single), each)
-        self.scenario, self.whole, n_block = scenario, each == "team", len(self.blocks[0])
-        self.measures = measures_of(scenario)
-        self.horizon = getattr(scenario, "horizon", 1)
-        self.groups = tuple((i,) for i in range(len(self.agents)))
+        single = scenario.action_set
+        space = scenario.state_space
+        self.agents, self.blocks = joint_blocks(scenario.agents, scenario.groups, len(single), each)
+        self.scenario = scenario
+        self.whole = each == "team"
+        self.measures = scenario.measures
+        self.horizon = scenario.horizon
         self._n_each = space.n_variables if self.whole else space.n_own
         of_block = [scenario.agents[i] for i in self.blocks[0]]
         if self.whole:
             self.roles = self.agents
         else:
             of_block = [agent.rpartition(".")[2] for agent in of_block]
-            roles = roles_of(scenario)
+            roles = scenario.roles
             self.roles = tuple("+".join(roles[i] for i in block) for block in self.blocks)
-        repeated, shared = space.variables[: self._n_each], space.variables[self._n_each :]
+        repeated = space.variables[: self._n_each]
+        shared = space.variables[self._n_each :]
         own = [replace(v, name=f"{agent}.{v.name}") for agent in of_block for v in repeated]
         name = f"joint {space.name}" if self.whole else f"bodies' {space.name}"
         self.state_space = StateSpace(name, (*own, *shared), 0 if self.whole else len(own))
         # Row c holds the actions of a block's agents of index c.
-        shape = (len(single),) * n_block
-        self._local = np.indices(shape).reshape(n_block, -1).T.copy()
+        shape = (len(single),) * len(self.blocks[0])
+        self._local = np.indices(shape).reshape(len(shape), -1).T.copy()
         names = tuple("+".join(single.names[a] for a in row) for row in self._local)
-        neutral = int(np.ravel_multi_index((single.neutral,) * n_block, shape))
+        neutral = int(np.ravel_multi_index((single.neutral,) * len(shape), shape))
         zeros = (0.0,) * len(names)
         self.action_set = ActionSet(names, zeros, zeros, neutral)
-        if hasattr(scenario, "predict"):
-            self.predict = self._predict
-        if not self.whole and isinstance(scenario, EmbodiedScenario):
-            for name in OF_BODIES:
-                if hasattr(scenario, name):
-                    setattr(self, name, getattr(scenario, name))
-            self.predict_with = self._predict
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode; return the states of those who act."""
@@ -161,14 +152,28 @@ class JointAgents:
             reward = np.array([np.take(reward, block).mean() for block in self.blocks])
         return replace(transition, states=self._states(transition.states), reward=reward)
 
-    def _predict(self, *beliefs: Any) -> JointPrediction:
-        """Predict from the present state, believing in effects and constants if they are given."""
-        scenario: Any = self.scenario
-        known = scenario.predict_with(*beliefs) if beliefs else scenario.predict()
-        return JointPrediction(known, self)
+    @property
+    def predicts(self) -> bool:
+        """Whether the scenario predicts."""
+        return self.scenario.predicts
+
+    @property
+    def lacks_prediction(self) -> str:
+        """Why it predicts nothing."""
+        return self.scenario.lacks_prediction
+
+    def predict(self) -> JointPrediction | None:
+        """Predict from the present state, if the scenario does."""
+        prediction = self.scenario.predict()
+        return None if prediction is None else JointPrediction(prediction, self)
+
+    def embodiment(self) -> Embodiment | None:
+        """Return the scenario's bodies, if there is an agent for each of them."""
+        bodies = None if self.whole else self.scenario.embodiment()
+        return None if bodies is None else JointEmbodiment(bodies, self)
 
     def actions(self, joint_actions: IntArray) -> IntArray:
-        """Return the actions ``(..., n)`` of all agents for those of who acts for them."""
+        """Return the actions ``(..., n)`` of all agents, of the actions of those who act."""
         shape = (*joint_actions.shape[:-1], len(self.scenario.agents))
         return self._local[joint_actions].reshape(shape)
 
@@ -185,10 +190,10 @@ class JointAgents:
         return np.array([self.joined([states[i] for i in block]) for block in self.blocks])
 
 
-class JointPrediction:
+class JointPrediction(Prediction, Tables):
     """The prediction of a scenario of all agents, for those who act for blocks of them.
 
-    It can do what the scenario's own can; one who acts for all has tables of next states, too.
+    One who acts for all has tables of next states, also where the scenario's own has none.
 
     Parameters
     ----------
@@ -199,36 +204,81 @@ class JointPrediction:
     """
 
     def __init__(self, prediction: Prediction, joint: JointAgents) -> None:
-        self._prediction: Any = prediction
+        self._prediction = prediction
         self._joint = joint
-
-    def __getattr__(self, name: str) -> Any:
-        """Return what the scenario's own prediction can do, for the actions of those who act."""
-        own, joint = self._prediction, self._joint
-        if name in OF_JOINT_ACTIONS:
-            method = getattr(own, name)
-            return lambda joint_actions, *rest: method(joint.actions(joint_actions), *rest)
-        if name == "reward_table" and joint.whole:
-            return partial(self.rewards, joint.every())
-        # The tables of next states are used with those of rewards.
-        if name == "blocks" and (joint.whole or hasattr(own, "reward_table")):
-            return self._whole if joint.whole else self._by_body
-        if name in ("groups", "reward_table"):
-            return getattr(own, name)
-        raise AttributeError(name)
-
-    def _whole(self, agent: int) -> Blocks:
-        """Return the next states of one who acts for all, of which no variable is its own alone."""
-        return Blocks(np.zeros((1, 0)), self.states(agent, self._joint.every()), 1)
-
-    def _by_body(self, agent: int) -> Blocks:
-        """Return the next states of who acts for a body, for all joint actions."""
-        blocks = [self._prediction.blocks(i) for i in self._joint.blocks[agent]]
-        own = np.concatenate([b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks], 1)
-        return replace(blocks[0], own=own, own_rows=np.zeros(0, dtype=np.int64))
+        self._tables = prediction.tables()
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of who acts for a block, for actions ``(m, M)``."""
         actions = self._joint.actions(joint_actions)
         block = self._joint.blocks[agent]
         return self._joint.joined([self._prediction.states(i, actions) for i in block])
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray | None:
+        """Return the rewards of actions ``(m, M)``, if the scenario predicts them."""
+        return self._prediction.rewards(self._joint.actions(joint_actions))
+
+    @cached_property
+    def rewarded(self) -> bool:  # type: ignore[override]  # known of a prediction, not of its class
+        """Whether there is a table of rewards."""
+        if self._joint.whole:
+            return self.rewards(self._joint.every()[:1]) is not None
+        return self._tables is not None and self._tables.rewarded
+
+    def tables(self) -> Tables | None:
+        """Return tables: of who acts for all, or the scenario's own that have rewards, too."""
+        return self if self._joint.whole or self.rewarded else None
+
+    def blocks(self, agent: int) -> Blocks:
+        """Return the next states of who acts for a block, for all joint actions."""
+        if self._joint.whole:  # no variable is its own alone
+            return Blocks(np.zeros((1, 0)), self.states(agent, self._joint.every()), 1)
+        assert self._tables is not None
+        blocks = [self._tables.blocks(i) for i in self._joint.blocks[agent]]
+        own = np.concatenate([b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks], 1)
+        return replace(blocks[0], own=own, own_rows=np.zeros(0, dtype=np.int64))
+
+    def reward_table(self) -> FloatArray:
+        """Return the rewards of all joint actions."""
+        if self._joint.whole:
+            return rewards_of(self, self._joint.every())
+        assert self._tables is not None
+        return self._tables.reward_table()
+
+
+class JointEmbodiment(Embodiment):
+    """The bodies of a scenario, of which each is one agent."""
+
+    def __init__(self, bodies: Embodiment, joint: JointAgents) -> None:
+        self._bodies = bodies
+        self._joint = joint
+        self.nominal_effects = bodies.nominal_effects
+        self.constants = bodies.constants
+        self.levers = bodies.levers
+
+    def predict_with(
+        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
+    ) -> EmbodiedPrediction:
+        """Predict, believing in these effects and constants."""
+        return JointBodiesPrediction(self._bodies.predict_with(effects, constants), self._joint)
+
+
+class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
+    """The same, for self-models and calibration."""
+
+    def __init__(self, prediction: EmbodiedPrediction, joint: JointAgents) -> None:
+        super().__init__(prediction, joint)
+        self._bodies = prediction
+        self.groups = prediction.groups
+
+    def commands(self, joint_action: IntArray) -> FloatArray:
+        """Return the wheel speeds that the actions of bodies would command."""
+        return self._bodies.commands(self._joint.actions(joint_action))
+
+    def slips(self, joint_action: IntArray) -> FloatArray:
+        """Return by how much contact changes the bodies' twists."""
+        return self._bodies.slips(self._joint.actions(joint_action))
+
+    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
+        """Return what the actions of bodies would lead to by choices of constants."""
+        return self._bodies.outcomes(self._joint.actions(joint_action), constants)

@@ -16,8 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..interface.scenario import Actors, Scenario, Transition, check_reward
+from ..interface.experience import Experience, Observation
+from ..interface.plain import as_scenario
+from ..interface.scenario import Transition, check_reward
 from ..numerics import FloatArray, IntArray
+from .team import Team
 
 
 @dataclass(frozen=True)
@@ -43,12 +46,7 @@ class StepRecord:
 
 
 class EpisodeSummary(NamedTuple):
-    """What a whole episode came to.
-
-    A scenario's own ``run_episode(team, seed, episode, steps, learn=...)`` returns it, and leaves
-    scenario and team as `control_loop` would; or it returns None and changes nothing, if the team
-    has parts that it does not know.
-    """
+    """What a whole episode came to that was run in one call."""
 
     steps: int
     measures: Mapping[str, float]
@@ -68,8 +66,8 @@ def policy_seed(seed: int) -> np.random.SeedSequence:
 
 
 def control_loop(
-    scenario: Scenario,
-    team: Actors,
+    scenario: object,
+    team: Team,
     *,
     episodes: int,
     steps: int,
@@ -106,37 +104,37 @@ def control_loop(
     """
     first_world = first_episode if first_world is None else first_world
     explore = learn if explore is None else explore
-    space, agents = scenario.state_space, scenario.agents
+    world = as_scenario(scenario)
+    space = world.state_space
     for k in range(episodes):
         episode = first_episode + k
-        world = world_seed(seed, first_world + k)
-        states = space.checked(scenario.reset(world, episode), agents)
-        if hasattr(team, "begin_world"):
-            team.begin_world(world, episode)
+        seed_of_world = world_seed(seed, first_world + k)
+        seen = Observation(space.checked(world.reset(seed_of_world, episode), world.agents), world)
+        team.begin_world(seed_of_world, episode)
         if learn:
             team.begin_episode()
-        prediction = team.predict(scenario, states)
-        team.check(prediction)
+        team.check(seen)
         for step in range(steps):
             begin = perf_counter()
-            joint_action = team.act(prediction, explore=explore)
+            decision = team.act(seen, explore=explore)
             decided = perf_counter()
-            transition = scenario.step(joint_action)
+            transition = world.step(decision.joint_action)
             last = transition.terminated or transition.truncated or step == steps - 1
-            space.checked(transition.states, agents)
-            check_reward(transition.reward, agents)
+            space.checked(transition.states, world.agents)
+            check_reward(transition.reward, world.agents)
             moved = perf_counter()
             if learn:
-                team.adapt(prediction, joint_action, transition)
-            prediction = team.predict(scenario, transition.states)
-            if learn:
-                team.learn(transition)
-                if last:
-                    team.end_episode()
+                team.learn(Experience(seen, decision, transition, last))
             yield StepRecord(
-                episode, step, states, joint_action, transition, last,
-                decided - begin, perf_counter() - moved,
-            )  # fmt: skip
-            states = transition.states
+                episode=episode,
+                step=step,
+                states=seen.present,
+                joint_action=decision.joint_action,
+                transition=transition,
+                last=last,
+                deciding=decided - begin,
+                learning=perf_counter() - moved,
+            )
             if last:
                 break
+            seen = Observation(transition.states, world, previous=decision.joint_action)

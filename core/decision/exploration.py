@@ -8,12 +8,13 @@ resting wheel lead to the same state).
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Protocol
+from abc import ABC, abstractmethod
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
-from ..interface.spaces import Exploring
+from ..interface.prediction import Exploring
 from ..numerics import FloatArray, greatest
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import Fraction, NonNegative, PartSettings, Positive
@@ -29,23 +30,43 @@ def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
     return weights / weights.sum()
 
 
-class Explorer(Protocol):
-    """Chooses actions; its whole memory is one array.
+def no_way_on(key: str, part: object) -> str:
+    """Return that a part of a team cannot go on with another team, in one line."""
+    return (
+        f"{key}: {type(part).__name__} has no continue_from, by which it would go on with another "
+        "team"
+    )
 
-    An explorer that can go on from one of the same settings, which served other agents, also has
-    ``continue_from(former)``.
-    """
+
+class Explorer(ABC):
+    """Chooses actions; its whole memory is one array."""
 
     memory: FloatArray
 
-    def begin_episode(self) -> None:
-        """Note that an episode begins."""
+    @property
+    def exploring(self) -> Exploring | None:
+        """How it explores, if that is by random actions that are held; None: in another way."""
+        return None
 
+    def begin_episode(self) -> None:  # noqa: B027 - by default nothing is to be done
+        """Begin an episode of learning."""
+
+    @abstractmethod
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
         """Return the action of `agent` given the values ``(A,)`` of its actions."""
 
-    def advance(self) -> None:
-        """Note that all agents have decided this step."""
+    def advance(self) -> None:  # noqa: B027
+        """Go on to the next step: all agents have decided this one."""
+
+    def continue_from(self, former: Self) -> None:
+        """Go on from an explorer of the same settings, which served other agents.
+
+        Raises
+        ------
+        ValueError
+            If it cannot; one line.
+        """
+        raise ValueError(no_way_on("learner.exploration.kind", self))
 
 
 class ExplorationSettings(PartSettings):
@@ -70,7 +91,7 @@ class BoltzmannExploration(ExplorationSettings):
 class Boltzmann(Explorer):
     """Samples the Boltzmann distribution; the clock counts the steps of the whole run."""
 
-    def __init__(self, settings: Any, n_agents: int) -> None:
+    def __init__(self, settings: BoltzmannExploration | PaperExploration, n_agents: int) -> None:
         self.settings = settings
         self.memory: FloatArray = np.zeros(1)  # t, the steps counted by the clock
 
@@ -80,7 +101,7 @@ class Boltzmann(Explorer):
         s = self.settings
         return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
 
-    def continue_from(self, former: Boltzmann) -> None:
+    def continue_from(self, former: Self) -> None:
         """Go on with the clock."""
         self.memory[:] = former.memory
 
@@ -119,23 +140,27 @@ class PaperExploration(ExplorationSettings):
 class EpsilonDecreasingBoltzmann(Boltzmann):
     """The paper's epsilon-decreasing exploration with a diminishing temperature (Section V)."""
 
+    def __init__(self, settings: PaperExploration, n_agents: int) -> None:
+        super().__init__(settings, n_agents)
+        self.paper = settings
+
     @property
     def rate(self) -> float:
         """Exploration probability epsilon (T(t) - 1) / (T_max - 1), at most 1."""
-        s = self.settings
+        s = self.paper
         return min(1.0, s.epsilon * (self.temperature - 1.0) / (s.max_temperature - 1.0))
 
     def begin_episode(self) -> None:
         """Restart the clock if it counts the steps of the episode."""
-        if self.settings.clock == "episode":
+        if self.paper.clock == "episode":
             self.memory[0] = 0.0
 
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
         """Exploit with probability 1 - rate, else explore, each as the settings say."""
         if rng.random() < self.rate:
-            if self.settings.explore == "uniform":
+            if self.paper.explore == "uniform":
                 return int(rng.integers(len(values)))
-        elif self.settings.exploit == "greatest":
+        elif self.paper.exploit == "greatest":
             # Eq. 14 is increasing in the value: the greatest probability is the greatest value.
             return greatest(values, rng)
         return super().choose(agent, values, rng)
@@ -195,7 +220,7 @@ class Bursts(Explorer):
         self.memory[0] += 1.0
         self.memory[1:] = 0.0
 
-    def continue_from(self, former: Bursts) -> None:
+    def continue_from(self, former: Self) -> None:
         """Go on counting episodes; bursts end with an episode."""
         self.memory[0] = former.memory[0]
 

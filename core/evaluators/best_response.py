@@ -21,14 +21,17 @@ If the unseen are expected to keep to the plan, an agent plans for all of whom i
 The number of joint actions tried grows linearly with the number of bodies.
 """
 
-from typing import Annotated, Any, Literal, NamedTuple
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from ..interface.spaces import BestResponses, Exploring, Prediction
+from ..interface.prediction import Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
+from ..rules.rule_base import RuleBase
 from .enumeration import combinations
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
 
@@ -36,6 +39,23 @@ MOST_AHEAD = 4
 """Bodies that are valued at a time, if most keep to the plan: more would be valued in vain."""
 CUTS = (0.25, 0.5, 0.75)
 """Where a team is cut in two, as shares of its bodies in the order of decision."""
+
+
+Responses = Callable[[FloatArray, IntArray, IntArray, Exploring, np.random.Generator], IntArray]
+"""Returns the joint action ``(n,)`` by the agents' weights ``(n, n_rules)``, a plan ``(n,)`` to
+start from, the order of decision ``(n,)``, how they explore, and a source of randomness."""
+
+
+class RespondingPrediction(Prediction):
+    """A prediction that knows a way of its own to the best responses of all agents."""
+
+    @abstractmethod
+    def best_responses(self, rules: RuleBase) -> Responses | None:
+        """Return what `BestResponse` comes to by such rules, but sooner; None if it cannot.
+
+        Asked for where all agents are bodies of their own that hear all and decide by the value of
+        the team: the very same joint actions, with the same draws.
+        """
 
 
 class BestResponseSettings(EvaluatorSettings):
@@ -99,7 +119,8 @@ class BestResponse(Aggregation):
     def __init__(self, problem: DecisionProblem, sweeps: int = 1) -> None:
         super().__init__(problem)
         self._sweeps = sweeps
-        self.require("teammates", "best-response", "best-response plans for 'best-response' only")
+        why = "best-response plans for 'best-response' only"
+        self.require("teammates", problem.teammates, "best-response", why)
         hierarchy, groups = problem.hierarchy, problem.groups
         n = len(hierarchy)
         nobody = problem.unseen != "plan" and not any(map(hierarchy.below, range(n)))
@@ -162,17 +183,18 @@ class BestResponse(Aggregation):
 
         None where the prediction has no way to it but to ask every agent in its turn.
         """
-        prediction: Any = first.prediction
+        prediction = first.prediction
         by_team = self.problem.rule == "value" and self.problem.value_of == "team"
         one_plan = {*self._planner} == {first.agent} and self._widest == self._sweeps == 1
-        if not (by_team and one_plan and hasattr(prediction, "best_responses")):
+        if not (by_team and one_plan and isinstance(prediction, RespondingPrediction)):
             return None
-        respond: BestResponses | None = prediction.best_responses(self.rules)
+        respond = prediction.best_responses(self.rules)
         if respond is None or self.indifferent(first):
             return None
         plan = self._started(first, self._free[first.agent])
         order, weights = np.array(self.hierarchy.order), self._pooled(first).weights[0]
-        tried = int(np.count_nonzero(prediction.alike == np.arange(self.n_actions)))
+        alike = self._numbers[: self.n_actions] if prediction.alike is None else prediction.alike
+        tried = int(np.count_nonzero(alike == np.arange(self.n_actions)))
         self.count(first.agent, tried + self.n_actions * len(order))
         return respond(weights, plan, order, exploring, first.rng)
 
@@ -292,7 +314,7 @@ class BestResponse(Aggregation):
     def _compared(self, prediction: Prediction) -> list[tuple[IntArray, IntArray]]:
         """Return for every body which action each comes to the same as, and the distinct ones."""
         sizes = [len(self._actions[len(group)]) for group in self.problem.groups]
-        alike = getattr(prediction, "alike", [self._numbers] * len(sizes))
+        alike = [self._numbers] * len(sizes) if prediction.alike is None else prediction.alike
         rows = [row[:size] for row, size in zip(alike, sizes, strict=True)]
         return [(row, np.flatnonzero(row == self._numbers[: len(row)])) for row in rows]
 

@@ -21,12 +21,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from ..coordination.graphs import Elimination, MaxPlus
+from ..interface.prediction import Prediction, rewards_of
 from ..numerics import FloatArray, IntArray
 from .enumeration import combinations
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
@@ -89,10 +90,14 @@ class Coordination(Aggregation):
                 f"learner.decision.evaluator = {name!r}: the topology joins no neighbours, "
                 "use coordination-graph"
             )
-        allowed = {"rule": "value", "teammates": "best-response", "value_of": "own"}
-        for key, value in allowed.items():
-            why = f"{name} adds up own values over neighbours, allowed: {value!r}"
-            self.require(key, value, why)
+        required = (
+            ("rule", problem.rule, "value"),
+            ("teammates", problem.teammates, "best-response"),
+            ("value_of", problem.value_of, "own"),
+        )
+        for key, value, allowed in required:
+            why = f"{name} adds up own values over neighbours, allowed: {allowed!r}"
+            self.require(key, value, allowed, why)
         n = len(hierarchy)
         self.scopes = [tuple(sorted((i, *hierarchy.below(i)))) for i in range(n)]
         try:
@@ -168,7 +173,7 @@ class CrossEntropy(Aggregation):
 
     def __init__(self, settings: CrossEntropySettings, problem: DecisionProblem) -> None:
         super().__init__(problem)
-        self.require("rule", "reward", f"{settings.kind} plans by 'reward' only")
+        self.require("rule", problem.rule, "reward", f"{settings.kind} plans by 'reward' only")
         hierarchy = problem.hierarchy
         if len(hierarchy.below(hierarchy.order[0])) < len(hierarchy) - 1:
             raise ValueError(
@@ -189,7 +194,7 @@ class CrossEntropy(Aggregation):
     def _planned(self, deliberation: Deliberation) -> IntArray:
         """Return the joint action ``(n,)`` that the best plan begins with."""
         s, rng = self.settings, deliberation.rng
-        prediction: Any = deliberation.prediction
+        prediction = deliberation.prediction
         shape = s.horizon, len(self.hierarchy), self.n_actions
         probabilities = np.full(shape, 1.0 / self.n_actions)
         n_elite = max(1, round(s.elite * s.samples))
@@ -203,7 +208,7 @@ class CrossEntropy(Aggregation):
             probabilities = s.smoothing / self.n_actions + (1.0 - s.smoothing) * seen
         return elite[0, 0]
 
-    def _worths(self, agent: int, prediction: Any, plans: IntArray) -> FloatArray:
+    def _worths(self, agent: int, prediction: Prediction, plans: IntArray) -> FloatArray:
         """Return what plans ``(samples, horizon, n)`` are paid, predicted once where they agree."""
         worths = np.zeros(len(plans))
         waiting = [(prediction, np.arange(len(plans)), 0)]
@@ -212,9 +217,12 @@ class CrossEntropy(Aggregation):
             tried, which = np.unique(plans[rows, step], axis=0, return_inverse=True)
             which = which.reshape(-1)
             self.count(agent, len(tried))
-            worths[rows] += self.problem.discount**step * seen.rewards(tried)[which]
-            if step + 1 < self.settings.horizon:
-                waiting += [
-                    (seen.after(j), rows[which == k], step + 1) for k, j in enumerate(tried)
-                ]
+            worths[rows] += self.problem.discount**step * rewards_of(seen, tried)[which]
+            if step + 1 == self.settings.horizon:
+                continue
+            for k, joint in enumerate(tried):
+                onward = seen.after(joint)
+                if onward is None:
+                    raise ValueError(f"{type(seen).__name__} does not go on")
+                waiting.append((onward, rows[which == k], step + 1))
         return worths

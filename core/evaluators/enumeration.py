@@ -5,12 +5,12 @@ a plan reach greater values than a sample, in half of its time. They are also ta
 values of others decide too, and wherever there must be a plan.
 """
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ..interface.spaces import has_tables
+from ..interface.prediction import Tables
 from ..numerics import FloatArray, IntArray
 from ..rules.kernels.dense import Tried
 from .evaluator import (
@@ -90,11 +90,13 @@ class ExactEnumeration(Aggregation):
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
         agent, problem = deliberation.agent, self.problem
-        prediction: Any = deliberation.prediction
         conditional = problem.teammates == "conditional"
         own_value = problem.rule == "value" and len(self.concerned[agent]) == 1
-        if own_value and not conditional and self._tried and hasattr(prediction, "blocks"):
-            tried, blocks = self._tried[agent], prediction.blocks(agent)
+        tables = None
+        if own_value and not conditional and self._tried:
+            tables = deliberation.prediction.tables()
+        if tables is not None:
+            tried, blocks = self._tried[agent], tables.blocks(agent)
             self.count(agent, tried[0].size)
             empirical = problem.teammates == "empirical"
             expected = deliberation.frequencies if empirical else self._expected
@@ -109,25 +111,25 @@ class ExactEnumeration(Aggregation):
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value each own action with each of the joint actions below, from tables if there are."""
-        prediction: Any = deliberation.prediction
-        if not (self._tried and has_tables(prediction)):
+        tables = deliberation.prediction.tables() if self._tried else None
+        if tables is None or not tables.rewarded:
             return super().worths(deliberation, tried)
         known, places, _ = self._tried[deliberation.agent]
         indices = (known + int(deliberation.joint_action @ places)).ravel()
         self.count(deliberation.agent, len(indices))
         worth = self.combine(
-            lambda: prediction.reward_table()[indices], lambda: self._mean(deliberation)[indices]
+            lambda: tables.reward_table()[indices],
+            lambda: self._mean(deliberation, tables)[indices],
         )
         return worth.reshape(self.n_actions, -1)
 
-    def _mean(self, deliberation: Deliberation) -> FloatArray:
+    def _mean(self, deliberation: Deliberation, tables: Tables) -> FloatArray:
         """Return the mean value ``(A ** n,)`` of all joint actions, once for a whole decision."""
-        prediction: Any = deliberation.prediction
         weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
-        of = prediction, weights, concerned
+        of = tables, weights, concerned
         if self._means is None or any(a is not b for a, b in zip(self._means[0], of, strict=True)):
             indices, value = np.arange(self.n_actions ** len(weights)), self.rules.block_values
-            each = [value(weights[i], prediction.blocks(i), indices) for i in concerned]
+            each = [value(weights[i], tables.blocks(i), indices) for i in concerned]
             self._means = of, np.mean(each, axis=0)
         return self._means[1]
 

@@ -6,14 +6,16 @@ the sum of their consequent weights; likewise for the agents of one body and the
 share. So the mean of many agents costs little more than the value of a few.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.spaces import Prediction, states_by_group
+from ..interface.agents import Counts
+from ..interface.prediction import Exploring, Prediction, rewards_of, states_by_group
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import PartSettings
@@ -73,26 +75,29 @@ class Deliberation(NamedTuple):
         return self.weights[self.agent]
 
 
-@dataclass
-class Counts:
-    """What a team has evaluated so far."""
-
-    joint_actions: int = 0
-    """Joint actions tried."""
-    rule_evaluations: int = 0
-    """Joint actions tried times the rules of the rule base that valued each."""
-    weight_updates: int = 0
-    """Consequent weights changed by learning."""
-
-
-class Evaluator(Protocol):
+class Evaluator(ABC):
     """Values the actions of one agent."""
 
+    continues: ClassVar[bool] = False
+    """Whether it needs a prediction that goes on from where it leads, see `Prediction.after`."""
     counts: Counts
-    """What has been evaluated so far; the team adds what it learns."""
+    """What has been evaluated so far; the agents add what they learn."""
 
+    @abstractmethod
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
+
+    def decide(self, first: Deliberation, exploring: Exploring) -> IntArray | None:
+        """Return what all agents decide ``(n,)``, who all hear all; None: ask one by one.
+
+        Parameters
+        ----------
+        first
+            What the first agent knows.
+        exploring
+            How agents explore, by actions that are held.
+        """
+        return None
 
 
 @dataclass(frozen=True)
@@ -157,7 +162,7 @@ def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
     return [np.array(sorted((i, *below[i]))) for i in every]
 
 
-class Aggregation:
+class Aggregation(Evaluator):
     """What evaluators share: the decision rule, and the aggregation over teammates.
 
     Raises
@@ -170,14 +175,16 @@ class Aggregation:
     """Whether it makes plans for the other agents."""
 
     def __init__(self, problem: DecisionProblem) -> None:
-        for key, of_plans in (("unseen", "plan"), ("plan", "common")):
-            if (value := getattr(problem, key)) == of_plans and not self.plans:
-                raise ValueError(
-                    f"learner.decision.{key} = {value!r}: needs an evaluator that makes plans, use "
-                    "best-response"
-                )
+        wants_plans = {"unseen": problem.unseen == "plan", "plan": problem.plan == "common"}
+        for key in (key for key, wanted in wants_plans.items() if wanted and not self.plans):
+            value = "plan" if key == "unseen" else "common"
+            raise ValueError(
+                f"learner.decision.{key} = {value!r}: needs an evaluator that makes plans, use "
+                "best-response"
+            )
         self.problem = problem
-        self.rules, self.hierarchy = problem.rules, problem.hierarchy
+        self.rules = problem.rules
+        self.hierarchy = problem.hierarchy
         self.n_actions = problem.n_actions
         self.counts = Counts()
         self._prediction: Prediction | None = None
@@ -186,9 +193,9 @@ class Aggregation:
         self._body_of = np.array([g for g, group in enumerate(problem.groups) for _ in group])
         self._last: tuple[Sequence[FloatArray], IntArray, Pooled] | None = None
 
-    def require(self, key: str, allowed: str, why: str) -> None:
-        """Refuse decision settings whose `key` is not what is allowed here."""
-        value = getattr(self.problem, key)
+    @staticmethod
+    def require(key: str, value: str, allowed: str, why: str) -> None:
+        """Refuse decision settings whose `key` has another `value` than is allowed here."""
         if value != allowed:
             raise ValueError(f"learner.decision.{key} = {value!r}: {why}")
 
@@ -221,7 +228,7 @@ class Aggregation:
 
     def predicted_worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
         """Return the same of joint actions, which the caller counts."""
-        prediction: Any = deliberation.prediction
+        prediction = deliberation.prediction
         concerned = self.concerned[deliberation.agent]
 
         def values() -> FloatArray:
@@ -230,7 +237,7 @@ class Aggregation:
             states = prediction.states(deliberation.agent, joint_actions)
             return self.rules.values(deliberation.own_weights, states)
 
-        return self.combine(lambda: prediction.rewards(joint_actions), values)
+        return self.combine(lambda: rewards_of(prediction, joint_actions), values)
 
     def _pooled(self, deliberation: Deliberation) -> Pooled:
         """Return the pooled weights of those concerned, once for agents of one decision."""

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import BeforeValidator, Field, NonNegativeInt, model_validator
 
-from ..hierarchy.hierarchy import Hierarchy
 from ..numerics import BoolArray, IntArray, stream_of
 from ..plugins.settings import Fraction, Settings
+from .hierarchy import Hierarchy
+from .turns import Turn
 
 
 def _names(value: object) -> object:
@@ -48,6 +49,11 @@ class Scheduled(Settings):
     end_step: NonNegativeInt = 0
     """Step of that episode at which it ends."""
 
+    @property
+    def named(self) -> tuple[str, ...]:
+        """What it names, by name, pattern or number."""
+        return ()
+
     def lasts(self, episode: int, step: int) -> bool:
         """Return whether it is on at a step of an episode."""
         now = episode, step
@@ -63,7 +69,7 @@ class Scheduled(Settings):
             If it names one that there is not; the line begins with the key `where` it stands.
         """
         mask = np.zeros(len(agents), dtype=bool)
-        for name in getattr(self, self.part):
+        for name in self.named:
             hit = np.array([fnmatchcase(agent, name) for agent in agents])
             if not hit.any():
                 shown = ", ".join(agents[:8]) + (", ..." if len(agents) > 8 else "")
@@ -112,6 +118,7 @@ class MessageFailure(Scheduled):
 
     part: ClassVar[str] = "agents"
 
+    kind: str = ""
     agents: Names
     """Agents by name or pattern, one or a list."""
 
@@ -120,7 +127,17 @@ class MessageFailure(Scheduled):
         """What fails, in a line."""
         written = self.model_dump(exclude={"kind", "agents"}, exclude_defaults=True).items()
         rest = "".join(f", {key} {value}" for key, value in written)
-        return f"{getattr(self, 'kind', 'failing')}: {', '.join(self.agents)}{rest}"
+        return f"{self.kind or 'failing'}: {', '.join(self.agents)}{rest}"
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The agents that it names."""
+        return self.agents
+
+    @property
+    def memory(self) -> int:
+        """How many decisions back it needs what was decided."""
+        return 0
 
     def passed(self, sent: Sent) -> IntArray:
         """Return what arrives ``(k,)``, `LOST` where nothing does."""
@@ -146,6 +163,11 @@ class DelayedMessages(MessageFailure):
     kind: Literal["delayed"] = "delayed"
     decisions: Annotated[int, Field(ge=1, le=1000)] = 1
     """How many; before as many have been made, nothing is said."""
+
+    @property
+    def memory(self) -> int:
+        """As many decisions back."""
+        return self.decisions
 
     def passed(self, sent: Sent) -> IntArray:
         """Return what the agents did as many decisions before."""
@@ -234,7 +256,7 @@ class Messages:
             for k, failure in enumerate(failures)
             if isinstance(failure, ReparentedAgents)
         }
-        self._memory = max([getattr(f, "decisions", 0) for f in failures], default=0)
+        self._memory = max([failure.memory for failure in failures], default=0)
         self.begin(0, 0)
 
     def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:
@@ -263,12 +285,21 @@ class Messages:
         when = [[f.lasts(episode, step) for f in self.failures] for step in range(moments)]
         return np.array(when) @ np.array(self._masks)
 
-    def is_absent(self, agent: int) -> bool:
-        """Return whether an agent takes no part in the present decision."""
-        return any(
-            isinstance(self.failures[k], AbsentAgents) and self._masks[k][agent]
-            for k in self._active
-        )
+    def absent(self, agents: IntArray) -> IntArray:
+        """Return who of some agents takes no part in the present decision."""
+        absent = np.zeros(len(self.told), dtype=bool)
+        for k in self._active:
+            if isinstance(self.failures[k], AbsentAgents):
+                absent |= self._masks[k]
+        return agents[absent[agents]]
+
+    def failed_turn(self, agents: IntArray, joint_action: IntArray) -> Turn:
+        """Return the turn of some agents, with what of the messages arrives and as it does."""
+        messages = [self.heard(agent, joint_action) for agent in agents.tolist()]
+        senders = [senders for senders, _ in messages]
+        receivers = np.repeat(agents, [len(of_agent) for of_agent in senders])
+        actions = np.concatenate([actions for _, actions in messages])
+        return Turn(agents, receivers, np.concatenate(senders), actions)
 
     def heard(self, agent: int, joint_action: IntArray) -> tuple[IntArray, IntArray]:
         """Return whom an agent hears of, ``(k,)``, and what, given what has been decided."""

@@ -44,10 +44,9 @@ def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
     ValueError
         If it is so; one line, which names the learners that need none.
     """
-    if not settings.needs_prediction or hasattr(scenario, "predict"):
+    if not settings.needs_prediction or scenario.predicts:
         return
-    unnamed = f"the scenario {type(scenario).__name__} has no method predict"
-    lack = getattr(scenario, "lacks_prediction", unnamed)
+    lack = scenario.lacks_prediction
     others = [k for k in LEARNERS.built_in if not LEARNERS.parsed(k).needs_prediction]
     raise ValueError(
         f"learner.kind = {settings.kind!r}: decides by predicted states, and {lack}; without it "

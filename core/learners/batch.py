@@ -10,7 +10,7 @@ Agents that share weights share the regression: the experience of all of them is
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +18,7 @@ from pydantic import Field
 from ..numerics import FloatArray, IntArray, njit
 from ..plugins.settings import Fraction, Positive
 from ..rules.rule_base import RuleBase
-from .learner import LearnerSettings
+from .learner import Learner, LearnerSettings
 
 TERMINAL, CUT_OFF = -1, -2
 """In place of the index of the next after-state: it is entered for ever; it is not known."""
@@ -49,6 +49,11 @@ class BatchTDSettings(LearnerSettings):
     trace_decay: Fraction = 0.0
     """Trace decay lambda: 0 bootstraps from the next state, 1 sums the rewards of an episode."""
 
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether what the mirror image of the team would have met is experience as well."""
+        return self.mirrored
+
 
 def solver(gram: FloatArray) -> Function:
     """Return what solves ``gram theta = moment`` for theta, the matrix being factored once."""
@@ -70,7 +75,7 @@ class Earlier(NamedTuple):
     """``(m,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
 
 
-class BatchTD:
+class BatchTD(Learner):
     """Batch TD(lambda): a memory of after-states, and regressions on all of them.
 
     Raises
@@ -208,10 +213,9 @@ class BatchTD:
             "rewards": np.array(self._rewards).reshape(-1, n),
             "follower": np.array(self._follower, dtype=np.int64),
             "earlier_rows": np.repeat(np.arange(len(held)), held),
-            **{
-                f"earlier_{name}": np.concatenate([getattr(e, name) for e in self._earlier])
-                for name in Earlier._fields
-            },
+            "earlier_states": np.concatenate([e.states for e in self._earlier]),
+            "earlier_rewards": np.concatenate([e.rewards for e in self._earlier]),
+            "earlier_follower": np.concatenate([e.follower for e in self._earlier]),
         }
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
@@ -229,7 +233,7 @@ class BatchTD:
         ]
         self._active, self._regressed, self._summed = [], 0, {}
 
-    def continue_from(self, former: BatchTD, rows: IntArray) -> None:
+    def continue_from(self, former: Self, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
         self.theta = former.theta[rows]
         self._earlier = [Earlier(former.states_of(row), *former._outcomes(row)) for row in rows]

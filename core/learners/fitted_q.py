@@ -19,13 +19,14 @@ one reward and one target for each *joint* step, so that no agent learns from an
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
-from ..evaluators.evaluator import Counts, Deliberation
+from ..evaluators.evaluator import Deliberation, Evaluator
+from ..interface.agents import Counts
 from ..interface.spaces import ActionSet, StateSpace, choice
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
@@ -65,6 +66,11 @@ class FittedQSettings(LearnerSettings):
     )
     """How agents explore: without a predictor they begin at random."""
 
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether what the mirror image of the team would have met is experience as well."""
+        return self.mirrored
+
     def rules_over(
         self, space: StateSpace, actions: ActionSet, n_told: int
     ) -> tuple[StateSpace, RuleBase]:
@@ -88,13 +94,19 @@ class FittedQSettings(LearnerSettings):
 
     def _check_decision(self) -> None:
         """Refuse what takes a prediction."""
-        taken = Decision(rule=self.decision.rule, unseen=self.decision.unseen)
-        for key, allowed in taken:
-            if (value := getattr(self.decision, key)) != allowed:
+        decision = self.decision
+        allowed = Decision(rule=decision.rule, unseen=decision.unseen)
+        refused = {
+            "teammates": (decision.teammates, decision.teammates == allowed.teammates),
+            "value_of": (decision.value_of, decision.value_of == allowed.value_of),
+            "plan": (decision.plan, decision.plan == allowed.plan),
+            "evaluator": (decision.evaluator.kind, decision.evaluator == allowed.evaluator),
+        }
+        for key, (value, is_allowed) in refused.items():
+            if not is_allowed:
                 raise ValueError(
-                    f"learner.decision.{key} = {getattr(value, 'kind', value)!r}: fitted-q "
-                    "predicts nothing and decides by its own value; leave it out, or set preset = "
-                    "'fitted-q'"
+                    f"learner.decision.{key} = {value!r}: fitted-q predicts nothing and decides by "
+                    "its own value; leave it out, or set preset = 'fitted-q'"
                 )
         if self.decision.rule not in ("value", "random") or self.decision.unseen == "plan":
             raise ValueError(
@@ -105,7 +117,7 @@ class FittedQSettings(LearnerSettings):
             raise ValueError("learner.self_model, calibration: fitted-q has no predictor to adapt")
 
 
-class FittedQ(BatchTD):
+class FittedQ(BatchTD, Evaluator):
     """Fitted Q: learns the values of actions, and tells them.
 
     Weights are laid out rule by rule, the own action last: ``theta.reshape(-1, A)`` has a column
@@ -131,17 +143,16 @@ class FittedQ(BatchTD):
         weights = deliberation.own_weights.reshape(-1, self._n_actions)
         return strengths[0] @ weights[active[0]]
 
-    def observe(  # type: ignore[override]  # what is asked for by name is given
+    def observe_decision(
         self,
+        left: FloatArray,
+        joint_action: IntArray,
         states: FloatArray,
         reward: float | FloatArray,
         terminated: bool,
-        *,
-        left: FloatArray,
-        joint_action: IntArray,
     ) -> int:
         """Remember what the agents knew, did and got; regress if the episode has gone on."""
-        return super().observe(np.column_stack([left, joint_action]), reward, terminated)
+        return self.observe(np.column_stack([left, joint_action]), reward, terminated)
 
     def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the active rules of decisions, by the action that was taken, and strengths."""
@@ -194,7 +205,7 @@ class FittedQ(BatchTD):
         self._gram = arrays["gram"].copy()
         self._weights = np.split(arrays["weights"], arrays["held"].astype(int)[:-1])
 
-    def continue_from(self, former: Any, rows: IntArray) -> None:
+    def continue_from(self, former: Self, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way.
 
         Raises

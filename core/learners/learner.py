@@ -1,21 +1,34 @@
 """What every learner is to a team, and what the settings of all learners share."""
 
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, Protocol
+from pkgutil import resolve_name
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
 from ..adaptation.predictors import GivenPredictor, Predictor
 from ..adaptation.self_model import CalibrationSettings, SelfModelSettings
-from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
+from ..decision.exploration import (
+    EXPLORATIONS,
+    BurstExploration,
+    ExplorationSettings,
+    no_way_on,
+)
 from ..evaluators import EVALUATORS, EvaluatorSettings
 from ..evaluators.enumeration import AutoSettings
 from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
+from ..interface.agents import Agents, Placement
 from ..interface.spaces import ActionSet, StateSpace
-from ..numerics import FloatArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
 from ..plugins.settings import PartSettings, Settings, unwritten
 from ..rules.rule_base import RuleBase, RuleBaseSettings
+
+CORE = __name__.rpartition(".learners")[0]
+"""Where the rooms are in which agents are found by name."""
 
 
 class Decision(Settings):
@@ -43,27 +56,21 @@ class Decision(Settings):
     """Which joint actions of the agents below are tried: the name of an evaluator, or its table."""
 
 
-class Learner(Protocol):
+class Learner(ABC):
     """Turns experience into consequent weights.
 
     Agents that share weights have one row of them in common; `rows`, which a learner is built with,
     says which row is whose.
-
-    A learner whose ``observe`` has arguments of these names is also given, by name, ``left``
-    ``(n, d)``, the states that the agents were in, and ``joint_action`` ``(n,)``, what they then
-    did: what learners of state-action values, such as SARSA, learn from.
-
-    A learner that can begin with what one of the same settings has learned for other agents also
-    has ``continue_from(former, rows)``: ``rows`` ``(n_rows,)`` says from which row of ``former``,
-    which is not modified and whose episodes are over, each row goes on.
     """
 
     theta: FloatArray
     """``(n_rows, n_rules)`` consequent weights."""
 
+    @abstractmethod
     def begin_episode(self) -> None:
         """Forget what reached into the past: an episode begins."""
 
+    @abstractmethod
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
         """Take in the states entered; return the number of consequent weights changed.
 
@@ -77,33 +84,92 @@ class Learner(Protocol):
             Whether they are terminal.
         """
 
+    def observe_decision(
+        self,
+        left: FloatArray,
+        joint_action: IntArray,
+        states: FloatArray,
+        reward: float | FloatArray,
+        terminated: bool,
+    ) -> int:
+        """Take in what a decision led to; learners of after-states `observe` that alone.
+
+        Parameters
+        ----------
+        left
+            ``(n, d)`` what the agents knew when they decided: the states that they were in, with
+            the actions that they were told if the learner values actions.
+        joint_action
+            ``(n,)`` what they then did.
+        states, reward, terminated
+            As of `observe`.
+        """
+        return self.observe(states, reward, terminated)
+
+    @abstractmethod
     def end_episode(self) -> int:
         """Learn what is learned after an episode. Returns the number of weights changed."""
 
+    @abstractmethod
     def arrays(self) -> dict[str, FloatArray]:
         """Return everything that `restore` needs."""
 
+    @abstractmethod
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
+
+    def continue_from(self, former: Self, rows: IntArray) -> None:
+        """Begin with what a learner of the same settings has learned for other agents.
+
+        Parameters
+        ----------
+        former
+            The other one, which is not modified and whose episodes are over.
+        rows
+            ``(n_rows,)`` from which of its rows each row goes on.
+
+        Raises
+        ------
+        ValueError
+            If it cannot; one line.
+        """
+        raise ValueError(no_way_on("learner.kind", self))
 
 
 class TeamSettings(PartSettings):
     """What stands in the ``[learner]`` table of a spec: how those who act learn.
 
-    `LearnerSettings` are of a hierarchy of fuzzy agents, built by `core.agents.team`; those of
-    whoever acts for all by itself are built as they are, see `core.networks`.
+    `LearnerSettings` are of fuzzy agents; others are in `core.networks`.
     """
 
     uses_hierarchy: ClassVar[bool] = False
-    """Whether those who act pass actions down a hierarchy, which `build` is then given last."""
+    """Whether those who act pass actions down a hierarchy."""
+    kind_of_agents: ClassVar[str] = ""
+    """Where the class of `Agents` is that they are settings of, imported when it is wanted."""
 
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
     """Discount per decision, gamma of Eq. 7: low where actions pay at once, high where they pay
     late."""
 
+    def agents(self, placement: Placement) -> Agents[Any]:
+        """Return the agents that act in a scenario, in their place of a hierarchy.
+
+        Raises
+        ------
+        ValueError
+            If they cannot act there; one line.
+        """
+        agents: Agents[Any] = resolve_name(self.kind_of_agents)(self, placement)
+        return agents
+
     @property
     def needs_prediction(self) -> bool:
         """Whether it acts only in scenarios that predict, see `core.interface.scenario`."""
+        return False
+
+    @property
+    def needs_rewards(self) -> bool:
+        """Whether it decides by predicted rewards, so that a world is asked for them."""
         return False
 
 
@@ -115,6 +181,7 @@ class LearnerSettings(TeamSettings):
     """
 
     uses_hierarchy = True
+    kind_of_agents = f"{CORE}.agents.fuzzy:FuzzyAgents"
 
     values_actions: ClassVar[bool] = False
     """Whether the learner values an agent's own actions in its present state and given what it is
@@ -135,6 +202,16 @@ class LearnerSettings(TeamSettings):
     """What the team learns of the constants of its predictor."""
     predictor: Annotated[Predictor, unwritten(GivenPredictor())] = GivenPredictor()
     """What predicts: the scenario, nothing but persistence, or what has been learned."""
+
+    @property
+    def needs_rewards(self) -> bool:
+        """Whether it decides by predicted rewards."""
+        return self.decision.rule in ("reward", "reward-and-value")
+
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether what the mirror image of the team would have met is experience as well."""
+        return False
 
     def rules_over(
         self, space: StateSpace, actions: ActionSet, n_told: int

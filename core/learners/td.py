@@ -21,10 +21,10 @@ goes back to every agent alike (Sunehag et al. 2018).
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from itertools import product
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -33,10 +33,10 @@ from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Fraction, NonNegative, Positive
 from ..rules.kernels.states import add_features, td_update
 from ..rules.rule_base import RuleBase
-from .learner import LearnerSettings
+from .learner import Learner, LearnerSettings
 
 
-class Online(ABC):
+class Online(Learner):
     """Learns from one state to the next, agent by agent; those of one row change it in turn.
 
     A terminal state is followed by itself for ever, which adds one update with the reward
@@ -104,24 +104,29 @@ class Online(ABC):
         Returns the number of weights changed.
         """
 
+    def _kept(self) -> dict[str, FloatArray]:
+        """Return the arrays that are saved, by name."""
+        own = vars(self)
+        return {name: own[name] for name in self.kept}
+
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights, traces and the previous states with their rewards."""
         previous = self._previous if self._previous is not None else np.zeros((0, 0))
-        named: dict[str, FloatArray] = {name: getattr(self, name) for name in self.kept}
-        return named | {"previous": previous, "rewards": self._rewards}
+        return self._kept() | {"previous": previous, "rewards": self._rewards}
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
-        for name in self.kept:
-            getattr(self, name)[...] = arrays[name]
+        for name, array in self._kept().items():
+            array[...] = arrays[name]
         self._previous = arrays["previous"].copy() if arrays["previous"].size else None
         self._rewards = arrays["rewards"].copy()
 
-    def continue_from(self, former: Online, rows: IntArray) -> None:
+    def continue_from(self, former: Self, rows: IntArray) -> None:
         """Begin with all weights of another team; traces are of an episode, and begin anew."""
-        for name in (name for name in self.kept if name not in self.traces):
-            array = getattr(former, name)
-            getattr(self, name)[...] = array[rows] if array.ndim else array
+        others = former._kept()
+        for name, own in self._kept().items():
+            if name not in self.traces:
+                own[...] = others[name][rows] if others[name].ndim else others[name]
 
 
 class FrozenSettings(LearnerSettings):

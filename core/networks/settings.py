@@ -1,4 +1,4 @@
-"""The settings of peers, as they stand in the ``[learner]`` table of a spec.
+"""The settings of learners with networks, as they stand in the ``[learner]`` table of a spec.
 
 Defaults are those of stable-baselines3, but for those that docs/peers.md names and accounts for.
 """
@@ -7,7 +7,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from ..learners.learner import TeamSettings
+from ..interface.agents import Agents, Placement
+from ..learners.learner import CORE, TeamSettings
 from ..plugins.settings import Fraction, NonNegative, Positive, unwritten
 
 Count = Annotated[int, Field(ge=1)]
@@ -15,31 +16,21 @@ Width = Annotated[int, Field(ge=1, le=4096)]
 
 
 class PeerSettings(TeamSettings):
-    """What the settings of all peers share."""
+    """What the settings of all share who act by themselves.
 
+    `build` returns the `Peer`, of a scenario, a seed and, if it uses one, a hierarchy.
+    """
+
+    kind_of_agents = f"{CORE}.agents.peer:PeerAgents"
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.97
     """Discount per decision."""
 
-    def build(self, *given: Any) -> Any:
-        """Return the peer that acts in a scenario, of that and a seed.
 
-        Raises
-        ------
-        ValueError
-            If it cannot act there; one line.
-        """
-        try:
-            return super().build(*given)
-        except ImportError as error:
-            raise ValueError(
-                f"learner.kind = {self.kind!r}: needs the extra peers, pip install "
-                "'nested-agents[peers]', in a checkout ./dev exec pip install stable-baselines3 "
-                f"({error})"
-            ) from None
+class NetworkSettings(TeamSettings):
+    """What the settings of learners with networks share, which need stable-baselines3."""
 
-
-class NetworkSettings(PeerSettings):
-    """What the settings of peers of stable-baselines3 share."""
+    discount: Annotated[float, Field(ge=0, lt=1)] = 0.97
+    """Discount per decision."""
 
     learning_rate: Positive = 3e-4
     """Step size of Adam."""
@@ -47,6 +38,23 @@ class NetworkSettings(PeerSettings):
     """Transitions in a minibatch."""
     hidden: Annotated[tuple[Width, ...], Field(min_length=1)] = (64, 64)
     """Units of the hidden layers of every network."""
+
+    def agents(self, placement: Placement) -> Agents[Any]:
+        """Return the agents that act in a scenario.
+
+        Raises
+        ------
+        ValueError
+            If they cannot act there, or the extra is missing; one line.
+        """
+        try:
+            return super().agents(placement)
+        except ImportError as error:
+            raise ValueError(
+                f"learner.kind = {self.kind!r}: needs the extra peers, pip install "
+                "'nested-agents[peers]', in a checkout ./dev exec pip install stable-baselines3 "
+                f"({error})"
+            ) from None
 
 
 class PolicyGradientSettings(NetworkSettings):
@@ -72,7 +80,7 @@ class PPOSettings(PolicyGradientSettings):
     """PPO (Schulman et al. 2017): one centralised policy sees all states and acts for all."""
 
     kind: Literal["ppo"] = "ppo"
-    factory: ClassVar[str] = f"{__package__}.networks:CentralPPO"
+    kind_of_agents = f"{CORE}.networks.policies:CentralPPO"
     weights: ClassVar[str] = "all"
     numbered: ClassVar[bool] = True
     critic: ClassVar[str] = "own"
@@ -82,7 +90,7 @@ class PPOSettings(PolicyGradientSettings):
 class MultiAgentPPOSettings(PolicyGradientSettings):
     """What the settings of PPO with a policy for every agent share."""
 
-    factory: ClassVar[str] = f"{__package__}.networks:HierarchyPPO"
+    kind_of_agents = f"{CORE}.networks.policies:HierarchyPPO"
     weights: Annotated[Literal["all", "role", "own"], unwritten("all")] = "all"
     """Whether all agents share the weights of one policy and one critic, those of a role do, or
     every agent has its own."""
@@ -121,7 +129,7 @@ class DQNSettings(NetworkSettings):
     """DQN (Mnih et al. 2015) for one agent, such as that of ``agents = "team"``."""
 
     kind: Literal["dqn"] = "dqn"
-    factory: ClassVar[str] = f"{__package__}.networks:DeepQ"
+    kind_of_agents = f"{CORE}.networks.deep_q:DeepQ"
     memory: Count = 50_000
     """Transitions in the replay memory."""
     begin: Count = 500

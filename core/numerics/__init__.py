@@ -2,6 +2,7 @@
 
 from .arrays import (
     SAME,
+    AnyArray,
     BoolArray,
     FloatArray,
     IntArray,
@@ -17,6 +18,7 @@ __all__ = [
     "INNER",
     "LOCK",
     "SAME",
+    "AnyArray",
     "BoolArray",
     "Deferred",
     "FloatArray",

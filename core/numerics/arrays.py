@@ -11,6 +11,8 @@ FloatArray = NDArray[np.floating[Any]]
 """Array of floating-point numbers of any precision."""
 IntArray = NDArray[np.integer[Any]]
 """Array of whole numbers of any precision."""
+AnyArray = NDArray[Any]
+"""Array of anything."""
 BoolArray = NDArray[np.bool_]
 """Mask."""
 

@@ -22,7 +22,8 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..interface.spaces import Blocks, StateSpace
+from ..interface.prediction import Blocks
+from ..interface.spaces import StateSpace
 from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Positive, Settings
 from .kernels.dense import Tried, enumerate_dense, enumerate_looked_up, values_dense

@@ -17,7 +17,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from ...core.interface.scenario import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.prediction import Prediction
+from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import StateSpace
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.sources import format_error
@@ -46,7 +48,7 @@ MEASURES = (
 )
 
 
-class AdaptedWorld:
+class AdaptedWorld(Scenario):
     """A world of Gymnasium or PettingZoo; a `Scenario`, which predicts if it is to be copied.
 
     Parameters
@@ -95,14 +97,16 @@ class AdaptedWorld:
         self.horizon, self._seed, self._return = settings.horizon, 0, 0.0
         self._last: IntArray = np.full(len(self.agents), self.action_set.neutral)
         self._states: FloatArray = np.zeros((len(self.agents), self.state_space.n_variables))
-        self.lacks_prediction = (
-            f"scenario.predictor = {settings.predictor!r} gives none ('copy' does)"
-        )
-        if settings.predictor == "copy":
-            self.predict = self._predict
-            self.with_exact_prediction = self._with_exact_prediction
-        if "rgb_array" in (self._simulator.env.metadata or {}).get("render_modes", ()):
-            self.animate = self._animate
+
+    @property
+    def predicts(self) -> bool:
+        """Whether copies of the simulator are played ahead."""
+        return self.settings.predictor == "copy"
+
+    @property
+    def lacks_prediction(self) -> str:
+        """Why it predicts nothing."""
+        return f"scenario.predictor = {self.settings.predictor!r} gives none ('copy' does)"
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Let the environment start an episode; return states ``(n, d)``."""
@@ -150,14 +154,16 @@ class AdaptedWorld:
         """Return the states ``(n, d)`` of all agents."""
         return self._perception.states(observations)[self._body]
 
-    def _predict(self) -> CopiedPrediction:
-        """Predict from the present state."""
-        return CopiedPrediction(self, self._simulator)
+    def predict(self) -> CopiedPrediction | None:
+        """Predict from the present state, if copies are played."""
+        return CopiedPrediction(self, self._simulator) if self.predicts else None
 
-    def _with_exact_prediction(self) -> AdaptedWorld:
-        """Return the same world, which predicts one decision ahead."""
+    def with_exact_prediction(self) -> AdaptedWorld | None:
+        """Return the same world, which predicts one decision ahead, if copies are played."""
+        if not self.predicts:
+            return None
         exact = copy(self)
-        exact.horizon, exact.predict = 1, exact._predict
+        exact.horizon = 1
         return exact
 
     def _has_succeeded(self) -> bool:
@@ -171,7 +177,12 @@ class AdaptedWorld:
         )
         return bool(self.settings.success) and self._return >= least and all(inside)
 
-    def _animate(self, recording: Mapping[str, Any], path: Path) -> None:
+    @property
+    def draws(self) -> bool:
+        """Whether the environment renders pictures."""
+        return "rgb_array" in (self._simulator.env.metadata or {}).get("render_modes", ())
+
+    def animate(self, recording: Mapping[str, Any], path: Path) -> None:
         """Play a recorded episode again and write it as an animation."""
         try:
             simulator = self._make(self.settings, "rgb_array")
@@ -186,7 +197,7 @@ class AdaptedWorld:
         film(frames.__getitem__, len(frames) - 1, self.settings.hold / rate, path)
 
 
-class CopiedPrediction:
+class CopiedPrediction(Prediction):
     """What copies of the simulator come to; each joint action is played once.
 
     Parameters

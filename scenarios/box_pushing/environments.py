@@ -23,7 +23,8 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo import ParallelEnv
 
-from ...core.interface.scenario import EpisodeRecorder, Transition
+from ...core.interface.recording import EpisodeRecorder
+from ...core.interface.scenario import Transition
 from ...core.numerics import FloatArray, IntArray
 from .config import BoxPushingSettings
 from .scenario import BoxPushing

@@ -33,7 +33,8 @@ import numpy as np
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
-from ...core.interface.scenario import Transition
+from ...core.interface.prediction import Prediction
+from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.numerics import FloatArray, IntArray, njit, wrap
 from .config import BoxPushingSettings, BoxTaskSettings, PushingPointsSettings
@@ -313,7 +314,7 @@ MOST_VALUES = 10**6
 """The most action values of an agent, of a team that learns of joint choices."""
 
 
-class PushingPoints:
+class PushingPoints(Scenario, Prediction):
     """A box, a goal, and robots as agents that choose where to push.
 
     Fulfils `Scenario` and `Prediction`; its episodes can be recorded and drawn.

@@ -6,15 +6,16 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.agents.team import Team
-from ...core.interface.scenario import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.prediction import Prediction
+from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from .config import BoxPushingSettings
@@ -55,7 +56,7 @@ MEASURES = (
 speed, whether it was there once the robots had stopped, ..."""
 
 
-class BoxPushing:
+class BoxPushing(Scenario, Embodiment):
     """A box, a goal, and robots whose wheels are the agents.
 
     Fulfils `Scenario`, and can be drawn, calibrated and predicted
@@ -191,6 +192,10 @@ class BoxPushing:
         truncated = not terminated and away > farthest
         return Transition(states, paid, terminated, truncated, measured, twists)
 
+    def embodiment(self) -> Embodiment:
+        """Return itself: its robots are open to self-models."""
+        return self
+
     def predict(self) -> BoxPrediction:
         """Predict from the present state, every robot taken as nominal."""
         return self.predict_with(self.nominal_effects)
@@ -227,8 +232,12 @@ class BoxPushing:
 
         animate(recording, path)
 
-    def show_policy(self, team: Team) -> Policy:
-        """Return what a team does around the box; the scenario begins another episode.
+    def show_policy(
+        self,
+        choose: Callable[[Prediction], IntArray],
+        predict: Callable[[], Prediction | None],
+    ) -> Policy:
+        """Return what those do around the box who choose so; the scenario begins another episode.
 
         Raises
         ------
@@ -239,7 +248,7 @@ class BoxPushing:
 
         self.reset(0)
         robots = list(self.world.robots)
-        return policy_of(team, team.predict(self), self.box, robots, self.settings.start)
+        return policy_of(choose, predict(), self.box, robots, self.settings.start)
 
     def _save(self) -> None:
         # After every step, asked for or not, as saving costs the world its order of contacts.

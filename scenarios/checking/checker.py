@@ -25,8 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.agents.loop import world_seed
-from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, lacking, roles_of
-from ...core.interface.spaces import has_tables
+from ...core.interface.plain import as_scenario
+from ...core.interface.scenario import Scenario
 from ...core.numerics import FloatArray, IntArray
 from .frames import Examination, Frame, at, bits, differences, fields, measured, opening
 from .predictions import apart, faults_of_prediction, faults_of_sharing, too_many
@@ -81,7 +81,7 @@ def predicted_steps(
         or do the same again in a scenario that ``repeats``.
     """
     steps, paid = [], 0.0
-    repeats = getattr(scenario, "repeats", False)
+    repeats = scenario.repeats
     neutral: IntArray = np.full(len(scenario.agents), scenario.action_set.neutral)
     states = np.array(scenario.reset(world_seed(seed, episode), episode))
     for action in joint_actions:
@@ -100,12 +100,13 @@ def predicted_steps(
 
 def _predicted(scenario: Scenario, joint_action: IntArray, before: FloatArray) -> FloatArray:
     """Return states and reward after a joint action, NaN where they are not predicted."""
-    if not hasattr(scenario, "predict"):
+    prediction = scenario.predict()
+    if prediction is None:
         return np.full_like(before, np.nan)
-    prediction, action = scenario.predict(), joint_action[None]
+    action = joint_action[None]
     states = [prediction.states(i, action)[0] for i in range(len(joint_action))]
-    rewards = getattr(prediction, "rewards", None)
-    return _with_reward(states, np.nan if rewards is None else rewards(action)[0])
+    rewards = prediction.rewards(action)
+    return _with_reward(states, np.nan if rewards is None else rewards[0])
 
 
 def _with_reward(states: FloatArray | list[FloatArray], reward: float) -> FloatArray:
@@ -176,7 +177,7 @@ class ScenarioError(ValueError):
 
 
 def check_scenario(
-    factory: Callable[[], Scenario],
+    factory: Callable[[], object],
     *,
     steps: int = 40,
     seeds: Sequence[int] = (0, 1),
@@ -214,7 +215,7 @@ def check_scenario(
     for name, numbers, least in (("seeds", seeds, 2), ("episodes", episodes, 1)):
         if len(numbers) < least:
             raise ValueError(f"{name} = {list(numbers)}: must hold at least {least}")
-    examination = Examination(factory, steps, tuple(seeds), tuple(episodes))
+    examination = Examination(lambda: as_scenario(factory()), steps, tuple(seeds), tuple(episodes))
     for name, check in CHECKS.items():
         try:
             fault = next(check(examination), None)
@@ -222,9 +223,10 @@ def check_scenario(
             fault = _raised(error)
         if fault is not None:
             raise ScenarioError(f"{name}: {fault}")
-    scenario, unchecked = factory(), examination.unchecked
+    scenario = examination.factory()
+    unchecked = examination.unchecked
     actions = examination.actions(scenario, seeds[0])
-    ahead = getattr(scenario, "horizon", 1)
+    ahead = scenario.horizon
     played = [predicted_steps(scenario, s, e, actions, ahead) for s, e in product(seeds, episodes)]
     passed = tuple(name for name in CHECKS if name not in unchecked)
     return Findings(passed, unchecked, met_variables(scenario, np.concatenate(played)))
@@ -240,12 +242,10 @@ def _raised(error: BaseException) -> str:
 def _form(of: Examination) -> Iterator[str]:
     """Check names, groups, shapes and types."""
     scenario: Any = of.factory()
-    if problem := lacking(scenario):
-        yield problem
     n, d = len(scenario.agents), scenario.state_space.n_variables
     if not n or len(set(scenario.agents)) != n:
         yield f"agents {scenario.agents} must be at least one, of different names"
-    groups, roles = groups_of(scenario), roles_of(scenario)
+    groups, roles = scenario.groups, scenario.roles
     if [i for group in groups for i in group] != list(range(n)):
         yield f"groups {groups} must hold the {n} agents once each, in order"
     if len(roles) != n:
@@ -267,12 +267,12 @@ def _form(of: Examination) -> Iterator[str]:
 def _measures(of: Examination) -> Iterator[str]:
     """Check that what a scenario declares to be measured and recorded is there."""
     scenario: Any = of.factory()
-    measures = tuple(getattr(scenario, "measures", ()))
+    measures = scenario.measures
     names = [measure.name for measure in measures]
     if len(set(names)) != len(names):
         yield f"names {names} must be distinct"
     opening(scenario, of.seeds[0], of.episodes[0])
-    kept = scenario.recorded if isinstance(scenario, RecordedScenario) else ()
+    kept = scenario.recorded
     for step, action in enumerate(of.actions(scenario, of.seeds[0])[:STEPS], 1):
         transition = scenario.step(action)
         info, measurements = transition.info, measured(scenario)
@@ -299,7 +299,7 @@ def _values(of: Examination) -> Iterator[str]:
         for step, frame in enumerate(of.play(scenario, seed, episode)):
             for fault in _wrong_values(scenario, frame):
                 yield f"{fault} {at(step)} of seed {seed}"
-    roles = roles_of(of.factory())
+    roles = of.factory().roles
     if len(set(roles)) < len(roles):
         of.unchecked["roles"] = "whether agents of one role are alike is not seen from outside"
 
@@ -311,7 +311,7 @@ def _wrong_values(scenario: Scenario, frame: Frame) -> Iterator[str]:
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             yield f"{name} is not finite"
     states, variables = np.asarray(frame["states"]), scenario.state_space.variables
-    low, high = np.array(getattr(scenario, "bounds", scenario.state_space.bounds)).T
+    low, high = np.array(scenario.bounds).T
     for _, i in np.argwhere((states < low) | (states > high)):
         yield f"{variables[i].name} leaves [{low[i]}, {high[i]}]"
     yield from faults_of_sharing(scenario, states)
@@ -362,7 +362,7 @@ def _predicts(of: Examination) -> Iterator[str]:
     """Check that predictions have their shapes, are finite, and that their tables agree."""
     scenario: Any = of.factory()
     rng = np.random.default_rng(of.seeds[0])
-    if not hasattr(scenario, "predict"):
+    if not scenario.predicts:
         of.unchecked["predictions"] = "the scenario has no method predict"
         return
     opening(scenario, of.seeds[0], of.episodes[0])
@@ -370,19 +370,22 @@ def _predicts(of: Examination) -> Iterator[str]:
     for action in actions[:STEPS]:
         yield from faults_of_prediction(scenario, actions, rng)
         scenario.step(action)
-    if has_tables(scenario.predict()) and (why := too_many(scenario)):
+    prediction = scenario.predict()
+    tables = None if prediction is None else prediction.tables()
+    if tables is not None and (why := too_many(scenario)):
         of.unchecked["tables"] = why
 
 
 def _senses(of: Examination) -> Iterator[str]:
     """Check that variables mean the same in sensing and prediction, where that can be checked."""
     for seed, episode in product(of.seeds, of.episodes):
-        scenario: Any = of.factory()
-        if not hasattr(scenario, "with_exact_prediction"):
+        scenario = of.factory()
+        exact = scenario.with_exact_prediction()
+        if exact is None:
             why = "without with_exact_prediction, predictions may be off; see their errors"
             of.unchecked["sensed and predicted"] = why
             return
-        exact, actions = scenario.with_exact_prediction(), of.actions(scenario, seed)
+        actions = of.actions(scenario, seed)
         for fault in faults_of_sensing(exact, predicted_steps(exact, seed, episode, actions)):
             yield f"{fault} of seed {seed}"
 

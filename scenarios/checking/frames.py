@@ -82,13 +82,13 @@ def opening(scenario: Scenario, seed: int, episode: int) -> Frame:
 
 def measured(scenario: Scenario) -> Mapping[str, Any]:
     """Return the measurements of the present state, of a scenario that has them between steps."""
-    measure = getattr(scenario, "measure", None)
-    return {} if measure is None else measure()
+    return scenario.measure()
 
 
 def fields(transition: Transition) -> Iterator[tuple[str, Any]]:
     """Yield what a transition holds, by dotted name, not copied."""
-    return _flat({name: getattr(transition, name) for name in FIELDS})
+    held = vars(transition)
+    return _flat({name: held[name] for name in FIELDS})
 
 
 def differences(
@@ -132,14 +132,13 @@ def _contrast(one: Any, other: Any) -> str:
 def look_ahead(scenario: Scenario) -> None:
     """Ask for predictions, of a scenario that predicts, and measurements."""
     measured(scenario)
-    if not hasattr(scenario, "predict"):
-        return
     prediction = scenario.predict()
+    if prediction is None:
+        return
     some = np.repeat([[0], [len(scenario.action_set) - 1]], len(scenario.agents), axis=1)
     for agent in range(len(scenario.agents)):
         prediction.states(agent, some)
-    if hasattr(prediction, "rewards"):
-        prediction.rewards(some)
+    prediction.rewards(some)
     measured(scenario)
 
 

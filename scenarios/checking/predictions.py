@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.scenario import Scenario, groups_of
-from ...core.interface.spaces import Blocks, has_tables, states_by_group
+from ...core.interface.prediction import Blocks, Prediction, Tables, states_by_group
+from ...core.interface.scenario import Scenario
 from ...core.numerics import BoolArray, FloatArray, IntArray
 
 MOST_JOINT_ACTIONS = 4**8
@@ -39,7 +39,10 @@ def faults_of_prediction(
     rng
         Draws the joint actions for which tables are compared, where there are many.
     """
-    prediction, given = scenario.predict(), joint_actions.copy()
+    prediction = scenario.predict()
+    if prediction is None:
+        return
+    given = joint_actions.copy()
     faults = [*_misformed(scenario, prediction, joint_actions)]
     if not np.array_equal(joint_actions, given):
         yield "the joint actions that are to be predicted are changed"
@@ -50,8 +53,9 @@ def faults_of_prediction(
             yield f"states of agent {i} after a joint action depend on those predicted with it"
     yield from faults_of_sharing(scenario, states)
     yield from _wrong_groups(scenario, prediction, given, states)
-    if has_tables(prediction):
-        yield from _wrong_tables(scenario, prediction, rng)
+    tables = prediction.tables()
+    if tables is not None and tables.rewarded:
+        yield from _wrong_tables(scenario, prediction, tables, rng)
     else:
         yield from _own_variable_moved(scenario, prediction, given, rng)
 
@@ -62,18 +66,21 @@ def too_many(scenario: Scenario) -> str:
     return f"more than {MOST_JOINT_ACTIONS:,} joint actions" if count > MOST_JOINT_ACTIONS else ""
 
 
-def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> Iterator[str]:
+def _misformed(
+    scenario: Scenario, prediction: Prediction, joint_actions: IntArray
+) -> Iterator[str]:
     """Yield what is predicted in a wrong shape, or is not finite."""
     n, m, d = len(scenario.agents), len(joint_actions), scenario.state_space.n_variables
-    groups, n_own = groups_of(scenario), scenario.state_space.n_own
+    groups, n_own = scenario.groups, scenario.state_space.n_own
     wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
         f"states of agent {i}": (prediction.states(i, joint_actions), (m, d)) for i in range(n)
     }
     own, shared = states_by_group(prediction, joint_actions, groups, n_own)
     wanted["own variables of all agents"] = own, (n, m, n_own)
     wanted["shared variables of all groups"] = shared, (len(groups), m, d - n_own)
-    if hasattr(prediction, "rewards"):
-        wanted["rewards"] = prediction.rewards(joint_actions), (m,)
+    rewards = prediction.rewards(joint_actions)
+    if rewards is not None:
+        wanted["rewards"] = rewards, (m,)
     for name, (value, shape) in wanted.items():
         if np.shape(value) != shape:
             yield f"predicted {name} of shape {np.shape(value)}, must be {shape}"
@@ -82,10 +89,10 @@ def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> 
 
 
 def _wrong_groups(
-    scenario: Scenario, prediction: Any, joint_actions: IntArray, states: FloatArray
+    scenario: Scenario, prediction: Prediction, joint_actions: IntArray, states: FloatArray
 ) -> Iterator[str]:
     """Yield where the prediction of all agents at once differs from that of each."""
-    groups = groups_of(scenario)
+    groups = scenario.groups
     own, shared = states_by_group(prediction, joint_actions, groups, scenario.state_space.n_own)
     body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     wrong = differs(scenario, np.concatenate([own, shared[body]], axis=2), states)
@@ -94,7 +101,9 @@ def _wrong_groups(
         yield f"states_by_group and states differ in {name} of agent {agent}"
 
 
-def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator) -> Iterator[str]:
+def _wrong_tables(
+    scenario: Scenario, prediction: Prediction, tables: Tables, rng: np.random.Generator
+) -> Iterator[str]:
     """Yield where the tables differ from the prediction, whose states are taken to be right."""
     n, n_actions = len(scenario.agents), len(scenario.action_set)
     count = n_actions**n
@@ -102,10 +111,10 @@ def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator)
         return
     indices = np.sort(rng.choice(count, min(count, SAMPLED), replace=False))
     joint_actions = np.stack(np.unravel_index(indices, (n_actions,) * n), axis=-1)
-    for group in groups_of(scenario):
+    for group in scenario.groups:
         divisor = n_actions ** (n - 1 - group[-1])
         for agent in group:
-            blocks, which = prediction.blocks(agent), f"blocks of agent {agent}:"
+            blocks, which = tables.blocks(agent), f"blocks of agent {agent}:"
             if blocks.divisor != divisor:
                 yield f"{which} divisor = {blocks.divisor}, must be {divisor}"
             for fault in _misshapen(blocks, n_actions ** len(group), count, scenario):
@@ -120,8 +129,7 @@ def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator)
                     f"after joint action {joint_actions[row].tolist()}, "
                     f"states has {expected[row, j]:.6g}"
                 )
-    if hasattr(prediction, "rewards"):
-        yield from _wrong_rewards(prediction, indices, joint_actions, count)
+    yield from _wrong_rewards(prediction, tables, indices, joint_actions, count)
 
 
 def _misshapen(blocks: Blocks, n_own_rows: int, count: int, scenario: Scenario) -> Iterator[str]:
@@ -146,9 +154,17 @@ def _misshapen(blocks: Blocks, n_own_rows: int, count: int, scenario: Scenario) 
 
 
 def _wrong_rewards(
-    prediction: Any, indices: IntArray, joint_actions: IntArray, count: int
+    prediction: Prediction,
+    tables: Tables,
+    indices: IntArray,
+    joint_actions: IntArray,
+    count: int,
 ) -> Iterator[str]:
-    table, expected = prediction.reward_table(), np.asarray(prediction.rewards(joint_actions))
+    rewards = prediction.rewards(joint_actions)
+    if rewards is None:
+        return
+    table = tables.reward_table()
+    expected = np.asarray(rewards)
     if np.shape(table) != (count,):
         yield f"reward_table of shape {np.shape(table)}, must be {(count,)}"
     actual = np.asarray(table)[indices]
@@ -186,7 +202,7 @@ def faults_of_sharing(scenario: Scenario, states: FloatArray) -> Iterator[str]:
     """
     space = scenario.state_space
     names = [variable.name for variable in space.variables]
-    shared = [(group, names[space.n_own :], "shared by a group") for group in groups_of(scenario)]
+    shared = [(group, names[space.n_own :], "shared by a group") for group in scenario.groups]
     for agents, claimed, claim in [*shared, (range(len(states)), space.common, "common")]:
         first, columns = agents[0], [names.index(name) for name in claimed]
         wrong = differs(scenario, states[list(agents)], states[[first]])[..., columns]
@@ -199,7 +215,7 @@ def faults_of_sharing(scenario: Scenario, states: FloatArray) -> Iterator[str]:
 
 
 def _own_variable_moved(
-    scenario: Scenario, prediction: Any, joint_actions: IntArray, rng: np.random.Generator
+    scenario: Scenario, prediction: Prediction, joint_actions: IntArray, rng: np.random.Generator
 ) -> Iterator[str]:
     """Yield which own variable is predicted to change by what other groups do.
 
@@ -207,7 +223,7 @@ def _own_variable_moved(
     """
     space = scenario.state_space
     drawn = rng.integers(len(scenario.action_set), size=joint_actions.shape)
-    for group in groups_of(scenario) if space.n_own else ():
+    for group in scenario.groups if space.n_own else ():
         changed = drawn.copy()
         changed[:, list(group)] = joint_actions[:, list(group)]
         for agent in group:

@@ -16,8 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.scenario import SUCCESS, Measure, Transition
-from ...core.interface.spaces import ActionSet, BestResponses, Exploring, first_alike
+from ...core.evaluators.best_response import RespondingPrediction, Responses
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.prediction import EmbodiedPrediction, Exploring, first_alike
+from ...core.interface.scenario import Embodiment, Scenario, Transition
+from ...core.interface.spaces import ActionSet
 from ...core.numerics import FloatArray, IntArray
 from ...core.rules.rule_base import RuleBase
 from ..faults.settings import Failures
@@ -37,7 +40,7 @@ MOST_BEND = 2.5
 """Greatest angle of a joint behind the base at the start [rad]."""
 
 
-class KinematicChain:
+class KinematicChain(Scenario, Embodiment):
     """A planar arm; a `Scenario` that can be drawn.
 
     It is predicted exactly, and open to self-models.
@@ -129,12 +132,18 @@ class KinematicChain:
         measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
         return Transition(states, paid, terminated, truncated, measured, twists)
 
+    def embodiment(self) -> Embodiment:
+        """Return itself: its joints are open to self-models."""
+        return self
+
     def predict(self) -> ChainPrediction:
         """Predict from the present state, by joints as built or, failures known, as they are."""
         nominal = self.settings.predictor == "nominal"
         return self.predict_with(self.nominal_effects if nominal else self._actual_effects())
 
-    def predict_with(self, effects: Sequence[FloatArray]) -> ChainPrediction:
+    def predict_with(
+        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
+    ) -> ChainPrediction:
         """Predict from the present state, believing in these effects ``(3, 2)`` of the joints."""
         return ChainPrediction(self, effects, self._angles, self._speeds, self._distance())
 
@@ -201,7 +210,7 @@ class KinematicChain:
         return self._states.of_joints(view, 0, len(self.agents))[:, 0]
 
 
-class ChainPrediction:
+class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
     """What joint actions lead to: exactly if joints do what they are believed to do.
 
     A decision turns every joint by its speed times the period, or up to its limit. What each of
@@ -279,7 +288,7 @@ class ChainPrediction:
         """The first action of each joint that comes to the same ``(n, A)``."""
         return first_alike(self.speeds)
 
-    def best_responses(self, rules: RuleBase) -> BestResponses | None:
+    def best_responses(self, rules: RuleBase) -> Responses | None:
         """Return best responses of all joints by what each turn changes, see `responses`.
 
         None if values are no sums over the default variables.

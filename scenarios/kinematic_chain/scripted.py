@@ -24,7 +24,8 @@ import numpy as np
 from pydantic import Field
 
 from ...core.evaluators import EvaluatorSettings
-from ...core.evaluators.evaluator import Counts, DecisionProblem, Deliberation
+from ...core.evaluators.evaluator import DecisionProblem, Deliberation
+from ...core.interface.agents import Counts
 from ...core.numerics import FloatArray
 from .scenario import ChainPrediction
 from .variables import ends_of, jacobian_of

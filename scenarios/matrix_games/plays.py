@@ -15,16 +15,20 @@ The compiled loop follows `Team.act`, the explorers and the learners statement b
 agents, ``A`` actions; joint actions are joint-action indices.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from ...core.agents.fuzzy import FuzzyAgents
 from ...core.agents.loop import EpisodeSummary
 from ...core.agents.team import Team
-from ...core.decision.exploration import Boltzmann, EpsilonDecreasingBoltzmann
+from ...core.decision.exploration import Boltzmann, EpsilonDecreasingBoltzmann, Explorer
 from ...core.evaluators.enumeration import ExactEnumeration
-from ...core.learners.td import FMQ, Frozen, OptimisticTD, TDLambda
+from ...core.interface.scenario import Scenario
+from ...core.learners.learner import Learner
+from ...core.learners.td import FMQ, Frozen, Online, OptimisticTD, TDLambda
 from ...core.numerics import FloatArray, IntArray, njit
+from .scenario import MatrixGame
 
 BEST, UNIFORM, EMPIRICAL, CONDITIONAL = range(4)
 """Teammate models."""
@@ -216,11 +220,41 @@ Parts = tuple[Deciding, ExplorationParameters, Learning]
 """A team as the kernel knows it."""
 
 
-def parts_of(game: Any, team: Team, *, learn: bool) -> Parts | None:
-    """Return what a team is made of; None if it has a part that the kernel does not know."""
+def whole_episode(
+    scenario: Scenario,
+    team: Team,
+    seed: np.random.SeedSequence,
+    episode: int,
+    steps: int,
+    *,
+    learn: bool,
+) -> EpisodeSummary | None:
+    """Run an episode at once; or return None and change nothing, of a team that is not known.
+
+    Scenario and team are left as `control_loop` would leave them.
+    """
+    (agents,) = team.parts
+    if not isinstance(scenario, MatrixGame) or not isinstance(agents, FuzzyAgents):
+        return None
+    if team.messages.failures:
+        return None
+    parts = parts_of(scenario, agents, learn=learn)
+    if parts is None:
+        return None
+    scenario.reset(seed, episode)
+    if learn:
+        team.begin_episode()
+    summary = run(scenario, agents, parts, steps)
+    if learn:
+        agents.end_episode()
+    return summary
+
+
+def parts_of(game: MatrixGame, team: FuzzyAgents, *, learn: bool) -> Parts | None:
+    """Return what agents are made of; None if they have a part that the kernel does not know."""
     if type(team.evaluator) is not ExactEnumeration or not _is_table(team.evaluator):
         return None
-    if team.messages.failures or team.predictor is not None:
+    if team.foresight.predictor is not None:
         return None
     learning = _learning(team.learner) if learn else STILL
     exploring = _exploring(team.explorer) if learn else NO_EXPLORATION
@@ -229,10 +263,11 @@ def parts_of(game: Any, team: Team, *, learn: bool) -> Parts | None:
     return _deciding(game, team, team.evaluator), exploring, learning
 
 
-def run(game: Any, team: Team, parts: Parts, plays: int) -> EpisodeSummary:
+def run(game: MatrixGame, team: FuzzyAgents, parts: Parts, plays: int) -> EpisodeSummary:
     """Run an episode that has begun."""
     deciding, exploring, learning = parts
-    n, learner = len(team.hierarchy), team.learner
+    learner = team.learner
+    n = len(team.hierarchy)
     joints, paid = np.zeros((2, n), dtype=np.int64), np.zeros(2)
     payoffs = game.payoffs.reshape(2, -1)[: 2 if game.is_stochastic else 1]
     total, optima = play(
@@ -270,8 +305,9 @@ def _is_table(evaluator: ExactEnumeration) -> bool:
     return own and rules.compact and at_actions and rules.terms == (whole,)
 
 
-def _deciding(game: Any, team: Team, evaluator: ExactEnumeration) -> Deciding:
-    n, a = len(team.hierarchy), evaluator.n_actions
+def _deciding(game: MatrixGame, team: FuzzyAgents, evaluator: ExactEnumeration) -> Deciding:
+    n = len(team.hierarchy)
+    a = evaluator.n_actions
     below, above = np.zeros((2, n, n), dtype=np.int64)
     for i in range(n):
         below[i, list(team.hierarchy.below(i))] = 1
@@ -285,30 +321,40 @@ def _deciding(game: Any, team: Team, evaluator: ExactEnumeration) -> Deciding:
     return Deciding(order, below, above, teammates, team.action_set.neutral, cells)
 
 
-def _learning(learner: Any) -> Learning | None:
+def _learning(learner: Learner) -> Learning | None:
     """Return how a learner learns; None if it is not known."""
     known = STILL._replace(learns=True)
-    s: Any = getattr(learner, "settings", None)
     if type(learner) is Frozen:
         return known
-    if getattr(learner, "discount", 1.0) > 0.0:
+    if not isinstance(learner, Online) or learner.discount > 0.0:
         return None
+    s = learner.settings
     if type(learner) is TDLambda and s.averaging == 1:
         return known._replace(step_size=s.step_size)
     if type(learner) is OptimisticTD:
         return known._replace(step_size=s.step_size, falling=s.falling)
     if type(learner) is FMQ:
-        tables = learner.weights, learner.greatest, learner.hits, learner.visits
-        return Learning(True, s.step_size, 1.0, s.weight, *tables)
+        return Learning(
+            learns=True,
+            step_size=s.step_size,
+            falling=1.0,
+            weight=s.weight,
+            weights=learner.weights,
+            greatest=learner.greatest,
+            hits=learner.hits,
+            visits=learner.visits,
+        )
     return None
 
 
-def _exploring(explorer: Any) -> ExplorationParameters | None:
+def _exploring(explorer: Explorer) -> ExplorationParameters | None:
     """Return how an explorer explores; None if it is not known."""
-    s: Any = getattr(explorer, "settings", None)
     if type(explorer) is Boltzmann:
+        s = explorer.settings
         return ExplorationParameters(SAMPLED, s.max_temperature, s.decay, 0.0)
-    is_known = type(explorer) is EpsilonDecreasingBoltzmann
-    if is_known and (s.explore, s.exploit) == ("uniform", "greatest"):
-        return ExplorationParameters(DECREASING, s.max_temperature, s.decay, s.epsilon)
-    return None
+    if type(explorer) is not EpsilonDecreasingBoltzmann:
+        return None
+    paper = explorer.paper
+    if (paper.explore, paper.exploit) != ("uniform", "greatest"):
+        return None
+    return ExplorationParameters(DECREASING, paper.max_temperature, paper.decay, paper.epsilon)

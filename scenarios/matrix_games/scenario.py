@@ -34,9 +34,9 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from ...core.agents.loop import EpisodeSummary
-from ...core.agents.team import Team
-from ...core.interface.scenario import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.prediction import Prediction
+from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.problems import closest
@@ -154,7 +154,7 @@ class MatrixGameSettings(ScenarioSettings):
     factory: ClassVar[str] = f"{__name__}:MatrixGame"
 
 
-class MatrixGame:
+class MatrixGame(Scenario, Prediction):
     """A matrix game; a `Scenario`, and its own `Prediction`.
 
     Parameters
@@ -237,23 +237,6 @@ class MatrixGame:
             return every
         above = np.where(np.arange(n - 1) < np.arange(n)[:, None], every[..., :-1], 0.0)
         return np.concatenate([played[..., None], above], axis=-1)
-
-    def run_episode(
-        self, team: Team, seed: np.random.SeedSequence, episode: int, steps: int, *, learn: bool
-    ) -> EpisodeSummary | None:
-        """Run an episode at once, see `nested_agents.core.agents.loop.EpisodeSummary`."""
-        from .plays import parts_of, run  # the kernel takes its time to load
-
-        parts = parts_of(self, team, learn=learn)
-        if parts is None:
-            return None
-        self.reset(seed, episode)
-        if learn:
-            team.begin_episode()
-        summary = run(self, team, parts, steps)
-        if learn:
-            team.end_episode()
-        return summary
 
 
 def _state_space(

@@ -24,7 +24,8 @@ import numpy as np
 from pydantic import Field
 
 from ...core.coordination.graphs import Elimination, Shape, shaped
-from ...core.interface.scenario import Measure, Transition
+from ...core.interface.measures import Measure
+from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings
@@ -157,7 +158,7 @@ def distinct(joint_actions: IntArray) -> IntArray:
     return 1 + (np.diff(np.sort(joint_actions, axis=1), axis=1) > 0).sum(axis=1)
 
 
-class TeamGame:
+class TeamGame(Scenario):
     """A game of many agents; a `Scenario`.
 
     Parameters
@@ -188,8 +189,8 @@ class TeamGame:
         number = (choice("number", self.agents),) if settings.numbered else ()
         self.state_space = StateSpace(settings.game, (*seen, *number))
         edges = shaped(settings.shape, n) if settings.game == "polymatrix" else nx.complete_graph(n)
-        self.interactions = sorted(tuple(sorted(edge)) for edge in edges.edges)
-        """Pairs of agents whose actions matter to each other."""
+        self._edges: list[tuple[int, int]] = sorted(tuple(sorted(edge)) for edge in edges.edges)
+        self.interactions = self._edges
         self._numbers = np.arange(float(n))[:, None][:, : len(number)]
         self._drawn: Any = None
         TeamGame.reset(self, 0)
@@ -200,7 +201,7 @@ class TeamGame:
             return Permutation(np.zeros((s.players, 1)))
         if s.game == "landmarks":
             return Landmarks(s.players, s.distance_cost)
-        edges = self.interactions
+        edges = self._edges
         rng = np.random.default_rng(seed if s.seed is None else s.seed)
         return Polymatrix(edges, rng.random((len(edges), s.actions, s.actions)))
 

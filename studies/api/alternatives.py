@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.scenario import roles_of
 from ...core.numerics import pd
 from ...core.plugins.problems import show
 from ...core.plugins.sources import Sources
@@ -241,7 +240,7 @@ def _space(spec: Spec) -> dict[str, Sequence[Any]]:
         return dict(spec.tune)
     with spec.sources.active():
         scenario = spec.conditions()[0].settings.scenario.build()
-    has_roles = len({*roles_of(scenario)}) < len(scenario.agents)
+    has_roles = len({*scenario.roles}) < len(scenario.agents)
     possible = dict[str, Sequence[Any]]()
     for key, values in USUAL.items():
         for value in values if has_roles or key != "learner.weights" else ():

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.interface.scenario import Measure
+from ...core.interface.measures import Measure
 from ...core.numerics import FloatArray, IntArray, optimize, pd
 from ...core.plugins.sources import is_reference
 from ..catalogue.study import load_study, measured

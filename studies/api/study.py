@@ -24,7 +24,9 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core.interface.scenario import SUCCESS, Actors, Scenario, can_draw
+from ...core.agents.team import Team
+from ...core.interface.measures import SUCCESS
+from ...core.interface.scenario import Scenario
 from ...core.numerics import pd
 from ...core.plugins.problems import closest
 from ...core.plugins.sources import Sources
@@ -315,8 +317,8 @@ class StudyResults:
                 episode = "last"  # of one episode
             if episode not in recorded:
                 raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
-            scenario: Any = trial.world()
-            if not can_draw(scenario):
+            scenario = trial.world()
+            if not scenario.draws:
                 raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
             kept = self.directory / "replay" / f"{trial.identity[:8]}-{episode}.gif"
             where = kept if path is None else Path(path)
@@ -326,9 +328,7 @@ class StudyResults:
                 scenario.animate(store.recording(trial.identity, episode), where)
         return Replay(where, f"{trial.condition}, seed {trial.seed}, {episode} episode")
 
-    def team(
-        self, condition: str | None = None, seed: int | None = None
-    ) -> tuple[Scenario, Actors]:
+    def team(self, condition: str | None = None, seed: int | None = None) -> tuple[Scenario, Team]:
         """Return the world of a trial, and the team that was trained in it, ready to act.
 
         Parameters

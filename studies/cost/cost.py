@@ -28,8 +28,8 @@ from ...core.agents.loop import control_loop, policy_seed
 from ...core.agents.team import Team
 from ...core.evaluators.best_response import CUTS
 from ...core.evaluators.coordination import MaxPlusSettings
-from ...core.evaluators.evaluator import Counts
 from ...core.hierarchy.hierarchy import Hierarchy
+from ...core.interface.agents import Counts
 from ...core.interface.scenario import Scenario
 from ...core.learners.learner import Decision
 from ...core.learners.td import TDLambdaSettings
@@ -195,12 +195,11 @@ def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
         memory = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert team.evaluator is not None
-    before = astuple(team.evaluator.counts)
+    before = astuple(team.counts)
     times = [_timed(team, scenario)]
     # An episode here has two steps, of which the second alone changes weights.
     steps = 2 * len(times[0]), 2 * len(times[0]), len(times[0])
-    after = astuple(team.evaluator.counts)
+    after = astuple(team.counts)
     counted = (int(b - a) // n for a, b, n in zip(before, after, steps, strict=True))
     for seed in range(1, repeats):
         team = Team(learner, scenario, hierarchy, policy_seed(seed))

@@ -33,11 +33,14 @@ from rich.progress import track
 
 from ...core.adaptation.learned_predictor import LearnedPredictor
 from ...core.adaptation.self_model import SelfModel
+from ...core.agents.fuzzy import FuzzyAgents
 from ...core.agents.loop import world_seed
-from ...core.agents.team import Team, of_fuzzy_agents
-from ...core.interface.scenario import Scenario
+from ...core.agents.team import Team
+from ...core.interface.experience import Observation
+from ...core.interface.prediction import Prediction
+from ...core.interface.scenario import PolicyMap, Scenario
 from ...core.interface.spaces import Variable
-from ...core.numerics import FloatArray
+from ...core.numerics import FloatArray, IntArray
 from ...core.rules.kernels.fuzzy import Partition
 from ...core.rules.rule_base import RuleBase
 from ...scenarios.checking.predictions import apart
@@ -229,7 +232,7 @@ class Explanation:
     """Its state variables."""
     parts: tuple[Parts, ...]
     """What each agent's f consists of."""
-    policy: Any
+    policy: PolicyMap | str
     """What its scenario shows of what it does: text by ``lines()``, a drawing by ``figure()``; or
     why there is none."""
     bodies: BodyEffects | None
@@ -248,54 +251,66 @@ def explain(store: Store, trial: Trial) -> Explanation:
         to the last bit, the one that is kept.
     """
     with trial.sources.active():
-        team, scenario, bodies = _trained(store, trial)
-        taken = [take_apart(team.rules, theta) for theta in team.learner.theta]
+        session, bodies = _trained(store, trial)
+        agents = session.team.only(FuzzyAgents)
+        taken = [take_apart(agents.rules, theta) for theta in agents.learner.theta]
         return Explanation(
             trial=trial,
-            agents=scenario.agents,
-            actuators=trial.settings.scenario.build().agents,
-            rules=team.rules,
-            variables=team.space.variables,
-            parts=tuple(taken[row] for row in team.rows),
-            policy=_policy(trial, team, scenario),
+            agents=session.scenario.agents,
+            actuators=session.world.agents,
+            rules=agents.rules,
+            variables=agents.space.variables,
+            parts=tuple(taken[row] for row in agents.rows),
+            policy=_policy(session),
             bodies=bodies,
-            errors=errors_of(team, scenario, trial.seed),
+            errors=errors_of(session.team, session.scenario, trial.seed),
         )
 
 
-def _policy(trial: Trial, team: Team, scenario: Any) -> Any:
+def _policy(session: Session) -> PolicyMap | str:
     """Return what a scenario shows of what a team does, or why it does not."""
-    if not hasattr(scenario, "show_policy"):
-        return "the scenario has no method show_policy for agents such as these"
-    if team.evaluator is None:
+    agents = session.team.only(FuzzyAgents)
+    scenario = session.scenario
+    if agents.evaluator is None:
         return "actions are drawn at random"
-    if not trial.settings.learner.needs_prediction:
+    if not session.trial.settings.learner.needs_prediction:
         return "the agents value their actions where they are, and predict nothing elsewhere"
+    nowhere: FloatArray = np.zeros((len(scenario.agents), scenario.state_space.n_variables))
+
+    def choose(prediction: Prediction) -> IntArray:
+        seen = Observation(nowhere, scenario, imagined=prediction)
+        return session.team.act(seen, explore=False).joint_action
+
+    def predict() -> Prediction | None:
+        return agents.foresight.predict(Observation(nowhere, scenario))
+
     try:
-        return scenario.show_policy(team)
+        policy = scenario.show_policy(choose, predict)
     except ValueError as error:
         return str(error)
+    return policy or "the scenario has no method show_policy for agents such as these"
 
 
-def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, BodyEffects | None]:
+def _trained(store: Store, trial: Trial) -> tuple[Session, BodyEffects | None]:
     arrays = store.recording(trial.identity, TEAM) if trial.keep_teams else None
     with refused(f"{store.directory}: "):  # a file that settings name may not be what it was
         session = Session(trial)
-        team = of_fuzzy_agents(session.team)
-    model, bodies = team.self_model, BodyEffects({}, ())
+        model = session.team.only(FuzzyAgents).foresight.self_model
+    bodies = BodyEffects({}, ())
     if model:
         bodies.note("built", model)
     if arrays is None:
         _train(store, session, bodies)
     else:
-        team.restore(arrays)
+        session.team.restore(arrays)
     if model:
         bodies.note("after", model)
-    return team, session.scenario, bodies if model else None
+    return session, bodies if model else None
 
 
 def _train(store: Store, session: Session, bodies: BodyEffects) -> None:
-    trial, model = session.trial, of_fuzzy_agents(session.team).self_model
+    trial = session.trial
+    model = session.team.only(FuzzyAgents).foresight.self_model
     episodes = track(
         range(trial.episodes),
         f"training {trial.condition}, seed {trial.seed} again",
@@ -343,7 +358,7 @@ EPISODES, DECISIONS = 10, 30
 """What is played: worlds of the evaluation, and predictions of each."""
 
 
-def errors_of(team: Team, scenario: Any, seed: int) -> pd.DataFrame | None:
+def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
     """Return root mean square errors by variable, or None if nothing is predicted by experience.
 
     The team acts by what it has learned. Each decision is held for as long as predictions look
@@ -356,22 +371,23 @@ def errors_of(team: Team, scenario: Any, seed: int) -> pd.DataFrame | None:
     seed
         Of the trial.
     """
-    predictor = team.predictor
+    agents = team.parts[0]
+    predictor = agents.foresight.predictor if isinstance(agents, FuzzyAgents) else None
     if not isinstance(predictor, LearnedPredictor):
         return None
-    horizon, neutral = predictor.horizon, scenario.action_set.neutral
-    given = hasattr(scenario, "predict") and getattr(scenario, "horizon", 1) == horizon
+    horizon = predictor.horizon
+    neutral = scenario.action_set.neutral
     errors: dict[str, list[Any]] = defaultdict(list)
     for episode in range(EVALUATION_WORLDS, EVALUATION_WORLDS + EPISODES):
         world = world_seed(seed, episode)
         states, over = scenario.reset(world, episode), False
         team.begin_world(world, episode)
         for _ in range(DECISIONS):
-            prediction = team.predict(scenario, states)
-            joint = team.act(prediction, explore=False)
-            guesses = {"learned": _states(prediction, joint), "as it is": states}
-            if given:
-                guesses["given"] = _states(scenario.predict(), joint)
+            joint = team.act(Observation(states, scenario), explore=False).joint_action
+            guesses = {"learned": _states(predictor.predict(states), joint), "as it is": states}
+            given = scenario.predict() if scenario.horizon == horizon else None
+            if given is not None:
+                guesses["given"] = _states(given, joint)
             held = np.full_like(joint, neutral) if scenario.state_space.n_own else joint
             for action in [joint, *[held] * (horizon - 1)]:
                 transition = scenario.step(action)
@@ -388,7 +404,7 @@ def errors_of(team: Team, scenario: Any, seed: int) -> pd.DataFrame | None:
     return pd.DataFrame(roots, index=index)
 
 
-def _states(prediction: Any, joint_action: Any) -> Any:
+def _states(prediction: Prediction, joint_action: IntArray) -> FloatArray:
     """Return the states ``(n, d)`` that a joint action is predicted to lead to."""
     each = range(len(joint_action))
     return np.array([prediction.states(i, joint_action[None])[0] for i in each])

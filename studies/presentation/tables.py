@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ...core.interface.scenario import Measure
+from ...core.interface.measures import Measure
 from ...core.numerics import pd
 from ...core.plugins.problems import near
 from ..errors import SpecError

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.interface.scenario import SUCCESS
+from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
 from ..errors import WIDTH
 from .power import power_lines

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.interface.scenario import Measure
+from ...core.interface.measures import Measure
 from ...core.numerics import pd, stats
 from ...core.plugins.problems import closest
 from ..errors import SpecError

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.interface.scenario import SUCCESS, Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
 from ..store.database import RESULTS_VERSION, measures_from, tables

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.interface.scenario import SUCCESS, Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins import sources
 from ..errors import SpecError

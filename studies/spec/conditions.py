@@ -8,14 +8,14 @@ override says of it holds in the stages, too, unless they say otherwise.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple, cast
 
 from pydantic import AfterValidator, Field
 
 from ...core.agents.joint import Granularity, join_agents
 from ...core.hierarchy.hierarchy import Hierarchy
-from ...core.interface.scenario import Scenario, groups_of
+from ...core.interface.scenario import Scenario
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.registry import Plugged
@@ -98,8 +98,8 @@ class ConditionSettings(Settings):
             check_team(len(scenario.agents), SECONDS_PER_PAIR)
         except ValueError as error:
             raise ValueError(f"scenario: has {len(scenario.agents)} agents: {error}") from None
-        own: Sequence[tuple[int, int]] | None = getattr(scenario, "interactions", None)
-        return scenario, build(self.topology, scenario.agents, groups_of(scenario), own)
+        pairs = scenario.interactions
+        return scenario, build(self.topology, scenario.agents, scenario.groups, pairs)
 
     def acts_as(self, other: ConditionSettings) -> bool:
         """Return whether topology and learner are those of `other`."""

@@ -21,7 +21,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...core.interface.scenario import Measure
+from ...core.interface.measures import Measure
 from ..errors import SpecError
 
 DATABASE = "results.sqlite"

@@ -24,7 +24,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
-from ...core.interface.scenario import Measure
+from ...core.interface.measures import Measure
 from ..errors import SpecError
 from . import database, durable
 from .database import DATABASE, DamageError, NoStudyError, Noted, Planned

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...core.interface.scenario import Measure
+from ...core.interface.measures import Measure
 from ...core.plugins.problems import closest, show
 from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ..errors import SpecError

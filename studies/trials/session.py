@@ -10,24 +10,23 @@ from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ...core.agents.loop import StepRecord, control_loop, policy_seed, world_seed
-from ...core.agents.team import Team, of_fuzzy_agents
-from ...core.interface.scenario import (
-    Actors,
-    EpisodeRecorder,
-    Measure,
-    RecordedScenario,
-    Scenario,
-    carried_rows,
-    lacking,
-    measures_of,
+from ...core.agents.loop import (
+    EpisodeSummary,
+    StepRecord,
+    control_loop,
+    policy_seed,
+    world_seed,
 )
-from ...core.learners import LearnerSettings, TeamSettings, check_prediction
-from ...core.numerics import IntArray
+from ...core.agents.team import Team
+from ...core.interface.experience import Observation
+from ...core.interface.measures import Measure, measures_of
+from ...core.interface.plain import as_scenario
+from ...core.interface.recording import EpisodeRecorder
+from ...core.interface.scenario import Scenario
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings, Stage
@@ -47,24 +46,8 @@ class Arrangement(NamedTuple):
     """As the settings describe it."""
     scenario: Scenario
     """The same as the agents see it, which may be as one agent."""
-    team: Actors
+    team: Team
     """The agents."""
-
-    def continue_from(self, former: Arrangement, settings: TeamSettings) -> None:
-        """Let the team begin where that of another world ended.
-
-        Raises
-        ------
-        ValueError
-            If it cannot, see `carried_rows` and `Team.continue_from`; one line.
-        """
-        rows = self.rows_from(former, settings)
-        of_fuzzy_agents(self.team).continue_from(of_fuzzy_agents(former.team), rows)
-
-    def rows_from(self, former: Arrangement, settings: TeamSettings) -> IntArray:
-        """Return the row of weights that each of its rows goes on from, see `carried_rows`."""
-        shared = isinstance(settings, LearnerSettings) and settings.weights == "role"
-        return carried_rows(former.scenario, self.scenario, shared=shared)
 
 
 def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
@@ -75,23 +58,10 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     ValueError
         If the settings do not fit together; one line.
     """
-    world = settings.scenario.build()
-    if problem := lacking(world):
-        raise ValueError(f"scenario.kind: {problem}")
+    world = as_scenario(settings.scenario.build())
     scenario, hierarchy = settings.arrange(world)
-    check_prediction(settings.learner, scenario)
-    learner, source = settings.learner, policy_seed(seed)
     failures = settings.topology.failures
-    if isinstance(learner, LearnerSettings):
-        team: Actors = Team(learner, scenario, hierarchy, source, failures)
-    elif learner.uses_hierarchy and failures:
-        raise ValueError(
-            f"topology.failures: messages of learner.kind = {learner.kind!r} cannot fail, "
-            "those of agents with rule bases can"
-        )
-    else:
-        hierarchies = (hierarchy,) if learner.uses_hierarchy else ()
-        team = learner.build(scenario, source, *hierarchies)
+    team = Team(settings.learner, scenario, hierarchy, policy_seed(seed), failures)
     return Arrangement(world, scenario, team)
 
 
@@ -112,12 +82,12 @@ def teach(
         with _naming(f"curriculum.{stage.name}"):
             there = arrange(settings.model_copy(update={"scenario": stage.scenario}), seed)
             if reached is not None:
-                there.continue_from(reached, settings.learner)
+                there.team.continue_from(reached.team)
         yield stage, there
         reached = there
     if reached is not None:
         with _naming("curriculum"):
-            own.continue_from(reached, settings.learner)
+            own.team.continue_from(reached.team)
 
 
 def transfer(
@@ -137,10 +107,10 @@ def transfer(
         with _naming(f"evaluations.{name}"):
             there = arrange(other, seed)
             if other.acts_as(settings) and there.scenario.agents == own.scenario.agents:
-                there.rows_from(own, settings.learner)
+                own.team.check_world(there.scenario)
                 there = there._replace(team=own.team)
             else:
-                there.continue_from(own, settings.learner)
+                there.team.continue_from(own.team)
         yield name, there
 
 
@@ -178,7 +148,9 @@ def check(
         for condition in conditions:
             where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
             try:
-                measures += [measures_of(there.world) for there in _arrangements(condition)]
+                measures += [
+                    measures_of(there.world.measures) for there in _arrangements(condition)
+                ]
                 if spec.keep_teams:
                     _check_saved(condition.settings)
             except ValueError as error:
@@ -200,7 +172,7 @@ def check(
 
 def _check_saved(settings: ConditionSettings) -> None:
     """Refuse a team that arrays cannot bring back."""
-    team: Any = arrange(settings, 0).team
+    team = arrange(settings, 0).team
     try:
         arrays = {name: np.array(array) for name, array in team.arrays().items()}
         if objects := [name for name, array in arrays.items() if array.dtype.hasobject]:
@@ -215,14 +187,13 @@ def _check_saved(settings: ConditionSettings) -> None:
 
 def _arrangements(condition: Condition) -> Iterator[Arrangement]:
     """Yield a condition's own arrangement and those of its stages and evaluations."""
-    settings, learner = condition.settings, condition.settings.learner
+    settings = condition.settings
     own = arrange(settings, 0)
     stages = teach(own, settings, condition.curriculum, 0)
     evaluations = transfer(own, settings, condition.evaluations, 0)
     for there in (own, *(a for _, a in stages), *(a for _, a in evaluations)):
-        if isinstance(learner, LearnerSettings) and learner.decision.rule != "value":
-            team, states = of_fuzzy_agents(there.team), there.scenario.reset(0)
-            team.check(team.predict(there.scenario, states))
+        if settings.learner.needs_rewards:
+            there.team.check(Observation(there.scenario.reset(0), there.scenario))
         yield there
 
 
@@ -255,6 +226,22 @@ Observer = Callable[[StepRecord], None]
 """Is shown every step of some episodes, as it is done."""
 
 
+class WholeEpisode(Protocol):
+    """Runs whole episodes of teams that it knows in one call each, as `control_loop` would."""
+
+    def __call__(
+        self,
+        scenario: Scenario,
+        team: Team,
+        seed: np.random.SeedSequence,
+        episode: int,
+        steps: int,
+        *,
+        learn: bool,
+    ) -> EpisodeSummary | None:
+        """Leave scenario and team as the loop would; or return None and change nothing."""
+
+
 class Session:
     """A trial under way: its scenario, its team, and what has been measured so far.
 
@@ -262,6 +249,8 @@ class Session:
     ----------
     trial
         The trial; its team is untrained to begin with.
+    whole_episode
+        Runs episodes that nobody needs to see step by step, if it can; none: the loop runs all.
 
     Attributes
     ----------
@@ -273,13 +262,14 @@ class Session:
         The agents.
     """
 
-    def __init__(self, trial: Trial) -> None:
+    def __init__(self, trial: Trial, whole_episode: WholeEpisode | None = None) -> None:
         self.trial = trial
+        self._whole_episode = whole_episode
         self._own = arrange(trial.settings, trial.seed)
         self.world, self.scenario, self.team = self._own
         self._stages = trial.curriculum  # those that the team has not gone through
         self._rows: list[EpisodeRow] = []
-        self._measures = measures_of(self.world)
+        self._measures = measures_of(self.world.measures)
         self._recordings: dict[str, Recording] = {}
         self._watch = Stopwatch()
         self.deciding = self._watch.decisions
@@ -301,13 +291,12 @@ class Session:
             If the trial cannot be built, or the arrays are of another team.
         """
         session = cls(trial)
-        team: Any = session.team
-        team.restore(arrays)
+        session.team.restore(arrays)
         session._stages = ()
         return session
 
     def train(
-        self, episodes: int, first: int = 0, *, phase: str = "training", team: Actors | None = None
+        self, episodes: int, first: int = 0, *, phase: str = "training", team: Team | None = None
     ) -> None:
         """Let the team (or another one, whose time is not counted) explore, learn, be measured.
 
@@ -315,8 +304,8 @@ class Session:
         trial's own team, the episodes of `Trial.recorded`.
         """
         self._go_through_curriculum()
-        is_recorded = isinstance(self.world, RecordedScenario) and len(self.world.recorded) > 0
-        kept = self.trial.recorded if team is None and is_recorded else {}
+        is_recorded = team is None and len(self.world.recorded) > 0
+        kept = self.trial.recorded if is_recorded else {}
         there = self._own if team is None else self._own._replace(team=team)
         time = self._watch.add if team is None else None
         record = self._record if kept else None
@@ -331,13 +320,13 @@ class Session:
         if name is None:
             return
         if record.step == 0:  # no record holds what there was before
-            scenario = self.trial.settings.scenario.build()
+            scenario = as_scenario(self.trial.settings.scenario.build())
             scenario.reset(world_seed(self.trial.seed, record.episode), record.episode)
             self._recorder = EpisodeRecorder(scenario)
         self._recorder.add(record.transition)
         if record.last:
             recording = self._recorder.recording()
-            if isinstance(self.team, Team) and self.team.messages.failures:
+            if self.team.messages.failures:
                 failing = self.team.messages.failing(record.episode, record.step + 2)
                 recording["messages_fail"] = failing
             self._recordings[name] = recording
@@ -359,14 +348,14 @@ class Session:
         probabilities, which says so by ``is_sampled``, is evaluated by sampled actions as well.
         """
         self._go_through_curriculum()
-        trial, rng = self.trial, self.team.rng.bit_generator
-        state = rng.state
-        if getattr(self.team, "is_sampled", False):
-            self._evaluate(self._own, SAMPLED, None, explore=True)
-            rng.state = state
-        for name, there in transfer(self._own, trial.settings, trial.evaluations, trial.seed):
-            self._evaluate(there, f"{EVALUATION}{name}", (observers or {}).get(name))
-            rng.state = state
+        trial = self.trial
+        if self.team.is_sampled:
+            with self.team.drawing_apart():
+                self._evaluate(self._own, SAMPLED, None, explore=True)
+        others = transfer(self._own, trial.settings, trial.evaluations, trial.seed)
+        for name, there in others:
+            with self.team.drawing_apart():
+                self._evaluate(there, f"{EVALUATION}{name}", (observers or {}).get(name))
 
     def finish(
         self, numbers: Mapping[str, float] | None = None, usage: Mapping[str, float] | None = None
@@ -417,7 +406,7 @@ class Session:
         The number of an episode in its row is counted from `counted_from`. If nobody needs to see
         the steps, whole episodes may be run `at_once`, compiled.
         """
-        measures = measures_of(there.world)
+        measures = measures_of(there.world.measures)
         self._measures = joined((self._measures, measures))
         if at_once and self._at_once(there, phase, counted_from, **loop):
             return
@@ -431,22 +420,27 @@ class Session:
                 self._rows.append(meter.row())
 
     def _at_once(self, there: Arrangement, phase: str, counted_from: int, **loop: Any) -> bool:
-        """Run whole episodes compiled and keep their rows, or return that it cannot be done."""
-        scenario, first, learn = there.scenario, loop["first_episode"], loop.get("learn", True)
-        if not hasattr(scenario, "run_episode") or not isinstance(there.team, Team):
+        """Run whole episodes in one call each and keep their rows, or return that none can be."""
+        if self._whole_episode is None:
             return False
+        first = loop["first_episode"]
+        learn = loop.get("learn", True)
         for episode in range(first, first + loop["episodes"]):
             begin = perf_counter()
             seed = world_seed(self.trial.seed, episode)
-            summary = scenario.run_episode(there.team, seed, episode, loop["steps"], learn=learn)
+            summary = self._whole_episode(
+                there.scenario, there.team, seed, episode, loop["steps"], learn=learn
+            )
             if summary is None:
                 return False
             if learn and there.team is self.team:
                 spent = perf_counter() - begin
                 self._watch.seconds["decision"] += spent
                 self.deciding += [spent / summary.steps] * summary.steps
-            row = phase, episode - counted_from, summary.steps, summary.measures, summary.return_
-            self._rows.append(EpisodeRow(*row))
+            row = EpisodeRow(
+                phase, episode - counted_from, summary.steps, summary.measures, summary.return_
+            )
+            self._rows.append(row)
         return True
 
     def result(

@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...core.interface.scenario import Measure, Scenario, Transition
+from ...core.interface.measures import Measure
+from ...core.interface.plain import as_scenario
+from ...core.interface.scenario import Scenario, Transition
 from ...core.plugins.sources import Sources, files_in
 from ..errors import SpecError
 from ..spec.conditions import ConditionSettings, Stage
@@ -263,8 +265,7 @@ class Trial:
     def world(self) -> Scenario:
         """Return its scenario as the settings describe it, built anew."""
         with self.sources.active():
-            built: Scenario = self.settings.scenario.build()
-        return built
+            return as_scenario(self.settings.scenario.build())
 
     @property
     def planned(self) -> Planned:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nested_agents.core.interface.spaces import Blocks
+from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.numerics import FloatArray, IntArray
 from nested_agents.core.rules.rule_base import RuleBase
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.scenario import RecordedScenario, measures_of, roles_of
+from nested_agents.core.interface.measures import measures_of
+from nested_agents.core.interface.scenario import RecordedScenario
 from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
@@ -14,8 +15,8 @@ def test_it_is_a_scenario_like_any_other() -> None:
     assert isinstance(scenario, LineUp)
     assert isinstance(scenario, RecordedScenario)
     assert hasattr(scenario, "with_exact_prediction")
-    assert roles_of(scenario) == ("cart",) * 3
-    assert [m.heading for m in measures_of(scenario)] == [
+    assert scenario.roles == ("cart",) * 3
+    assert [m.heading for m in measures_of(scenario.measures)] == [
         "success", "mean distance [m]", "spread [m]"
     ]  # fmt: skip
     scenario.reset(0)

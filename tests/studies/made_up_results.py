@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from nested_agents.core.interface.scenario import SUCCESS
+from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.results.results import Results, from_arrays
 

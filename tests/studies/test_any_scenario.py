@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 import nested_agents as na
-from nested_agents.core.interface.scenario import SUCCESS, Measure, groups_of
+from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.studies.api.study import load
@@ -226,7 +226,7 @@ def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
     spec = Spec.of(SPEC.table() | {"agents": "team"})
     session = Session(trials_of(spec)[1])
     assert session.scenario is not session.world
-    assert len(groups_of(session.world)) == 2
+    assert len(session.world.groups) == 2
     session.train(1)
     assert np.isfinite(session.result().rows[0].measures["spread_m"])
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 import nested_agents as na
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.scenario import SUCCESS
+from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.api import running
 from nested_agents.studies.catalogue.learning_curve import metrics_of
 from nested_agents.studies.catalogue.wheel_failure import analyse as analyse_failures

@@ -6,7 +6,7 @@ greedily, and the predictor tells how the robot would move in the decision perio
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import ceil, radians
 
@@ -17,8 +17,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, PathPatch
 from shapely.geometry import Point, Polygon
 
-from ....core.agents.team import Team
-from ....core.numerics import FloatArray, wrap
+from ....core.interface.prediction import Prediction
+from ....core.interface.scenario import PolicyMap
+from ....core.numerics import FloatArray, IntArray, wrap
 from ..prediction.prediction import BoxPrediction
 from ..world.boxes import BoxSpec
 from ..world.geometry import surface
@@ -80,7 +81,7 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Policy:
+class Policy(PolicyMap):
     """What each of the first `MOST_ROBOTS` robots of a team does."""
 
     fields: tuple[Field, ...]
@@ -130,14 +131,18 @@ class Policy:
 
 
 def policy_of(
-    team: Team, prediction: object, box: BoxSpec, robots: list[RobotSettings], start: str
+    choose: Callable[[Prediction], IntArray],
+    prediction: object,
+    box: BoxSpec,
+    robots: list[RobotSettings],
+    start: str,
 ) -> Policy:
     """Return what a team does around the box.
 
     Parameters
     ----------
-    team
-        Decides.
+    choose
+        Decides on a joint action by a prediction.
     prediction
         What it predicts of any situation of the scenario; the goal, wheels and beliefs are taken
         from it.
@@ -167,7 +172,7 @@ def policy_of(
             placed[robot] = point + at
             seen = replace(situation, robots=placed)
             here = BoxPrediction(seen, prediction.model, prediction.premises)
-            view = here.poses(team.act(here, explore=False)[None])
+            view = here.poses(choose(here)[None])
             moved.append(view.robots[0, robot] - placed[robot])
         ways, turns = np.split(np.array(moved), [2], axis=1)
         fields.append(Field(robot, points, ways, wrap(turns[:, 0]), others[:, :2]))

@@ -14,7 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.spaces import ActionSet, Blocks, first_alike
+from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables, first_alike
+from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
 from ..states.state_spaces import BoxStateSpace
@@ -71,7 +72,7 @@ class Premises:
     """How far predictions look ahead [s]."""
 
 
-class BoxPrediction:
+class BoxPrediction(EmbodiedPrediction, Tables):
     """Predicts from one situation; see `Prediction`.
 
     Parameters
@@ -154,6 +155,10 @@ class BoxPrediction:
     def _shared(self) -> FloatArray:
         """The shared blocks ``(M, m, d - n_own)`` in the situations of the table."""
         return self.premises.space.shared_of(self._table[0], range(len(self.groups)))
+
+    def tables(self) -> Tables:
+        """Return itself: it has tables of all joint actions."""
+        return self
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions, own block as if alone.

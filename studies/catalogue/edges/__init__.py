@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from ....core.agents.loop import StepRecord
-from ....core.interface.scenario import groups_of
 from ...results.analysis import EVALUATED, Analysis, Figures
 from ...results.results import Results, Sizes
 from ...results.statistics import two_figures
@@ -52,7 +51,7 @@ def measure(trial: Trial) -> TrialResult:
 
     session.evaluate(partial(note, TRAINED))
     session.run_other_evaluations({name: partial(note, name) for name in deciding})
-    numbers = {"robots": float(len(groups_of(session.world)))}
+    numbers = {"robots": float(len(session.world.groups))}
     for name, settings in ((TRAINED, trial.settings), *trial.evaluations):
         numbers[f"messages.{name}"] = float(settings.arrange(session.world)[1].messages)
     usage = {f"decision.{name}": float(np.median(d)) for name, d in deciding.items()}

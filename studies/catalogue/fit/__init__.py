@@ -9,7 +9,6 @@ that are optimal: if one play is evaluated, that of seeds that reach the optimum
 edges are compared with none, as in the study `hierarchies`.
 """
 
-from ....core.interface.scenario import groups_of
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures
 from ...results.results import Results, Sizes
@@ -42,7 +41,7 @@ def measure(trial: Trial) -> TrialResult:
     session.train(trial.episodes)
     session.evaluate()
     hierarchy = trial.settings.arrange(session.world)[1]
-    bodies = float(len(groups_of(session.world)))
+    bodies = float(len(session.world.groups))
     return session.result({"robots": bodies, "messages": float(hierarchy.messages)})
 
 

@@ -13,6 +13,7 @@ from string import ascii_uppercase
 from textwrap import wrap
 from typing import Any
 
+from ....scenarios.matrix_games.plays import whole_episode
 from ...errors import WIDTH
 from ...results.analysis import Analysis, Case, Figures, Summary
 from ...results.results import Results
@@ -36,12 +37,10 @@ APART = 0.2
 
 def measure(trial: Trial) -> TrialResult:
     """Train, and evaluate after the first and the last episode; imported by name in workers."""
-    session = Session(trial)
+    session = Session(trial, whole_episode)
     session.train(1)
-    generator = session.team.rng.bit_generator
-    state = generator.state
-    session.evaluate(phase=AFTER_ONE)
-    generator.state = state
+    with session.team.drawing_apart():
+        session.evaluate(phase=AFTER_ONE)
     session.train(trial.episodes - 1, first=1)
     return session.finish()
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ....core.interface.scenario import SUCCESS, Measure
+from ....core.interface.measures import SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated
 from ...results.contrasts import EPISODES, STEPS

@@ -39,7 +39,6 @@ def stops(episodes: int) -> list[int]:
 def measure(trial: Trial) -> TrialResult:
     """Train, with evaluations on the way; imported by name in workers."""
     session = Session.compiled(trial)
-    generator = session.team.rng.bit_generator
     done, seconds, usage = 0, 0.0, {}
     for count in (*stops(trial.episodes), trial.episodes):
         begin = process_time()
@@ -47,9 +46,8 @@ def measure(trial: Trial) -> TrialResult:
         seconds += process_time() - begin
         done, usage[f"{CPU}{count}"] = count, seconds
         if count < trial.episodes:
-            state = generator.state
-            session.evaluate(phase=f"{AFTER}{count}")
-            generator.state = state
+            with session.team.drawing_apart():
+                session.evaluate(phase=f"{AFTER}{count}")
     return session.finish(usage=usage)
 
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.agents.team import of_fuzzy_agents
+from ....core.agents.fuzzy import FuzzyAgents
 from ...results.analysis import EVALUATED, Analysis, Case, Figures, Summary, evaluated
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, bootstrap
@@ -59,10 +59,11 @@ def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and count what it takes; imported by name in workers."""
     session = Session.compiled(trial)
     session.train(trial.episodes)
-    team = of_fuzzy_agents(session.team)
-    hierarchy, n_rules = team.hierarchy, team.learner.theta.shape[1]
+    team = session.team.only(FuzzyAgents)
+    hierarchy = team.hierarchy
+    n_rules = team.learner.theta.shape[1]
     tried = 0 if team.evaluator is None else hierarchy.joint_actions(len(team.action_set))
-    counted = 0 if team.evaluator is None else team.evaluator.counts.rule_evaluations
+    counted = team.counts.rule_evaluations
     numbers = {
         "agents": float(len(hierarchy)),
         "memory": 1e-3 * team.learner.theta.nbytes,

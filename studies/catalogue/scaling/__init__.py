@@ -17,8 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.agents.loop import StepRecord
-from ....core.agents.team import of_fuzzy_agents
-from ....core.interface.scenario import groups_of
 from ....core.numerics import FloatArray, pd
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, shared
 from ...results.results import Results, Sizes
@@ -60,16 +58,16 @@ def measure(trial: Trial) -> TrialResult:
         CLEAR.write_text("5")
     session.train(trial.episodes)
     peak = _peak()
-    team = of_fuzzy_agents(session.team)
+    team = session.team
     hierarchy = team.hierarchy
-    tried = team.evaluator.counts.joint_actions if team.evaluator is not None else 0
+    tried = team.counts.joint_actions
     numbers = {
-        "robots": float(len(groups_of(session.world))),
+        "robots": float(len(session.world.groups)),
         "agents": float(len(hierarchy)),
         "messages": float(hierarchy.messages),
         "joint_actions": tried / len(session.deciding),
         "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
-        "weight_bytes": float(team.learner.theta.nbytes),
+        "weight_bytes": float(team.weight_bytes),
     }
     period = getattr(trial.settings.scenario, "period", None)
     if period is not None:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.agents.team import Team, of_fuzzy_agents
+from ....core.agents.team import Team
 from ....core.learners.learner import LearnerSettings
 from ....core.learners.td import FrozenSettings
 from ....core.numerics import pd
@@ -97,8 +97,9 @@ def _keeping_weights(session: Session) -> Team:
     shared = LearnerSettings.model_fields.keys() - {"kind"}
     common = {name: value for name, value in settings.learner if name in shared}
     frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
-    team = of_fuzzy_agents(arrange(frozen, session.trial.seed).team)
-    own, arrays = team.arrays(), session.team.arrays()
+    team = arrange(frozen, session.trial.seed).team
+    own = team.arrays()
+    arrays = session.team.arrays()
     team.restore({name: arrays.get(name, own[name]) for name in own})
     return team
 

@@ -125,7 +125,6 @@ def _learned_errors(
 ) -> Iterator[tuple[str, DataFrame]]:
     """Yield the errors of learned predictors by variable, see `errors_of`, each once."""
     from ....core.adaptation.predictors import LearnedPredictorSettings
-    from ....core.agents.team import of_fuzzy_agents
     from ...explain.team import errors_of
     from ...spec.spec import Spec
     from ...trials.session import Session
@@ -140,7 +139,7 @@ def _learned_errors(
         seen.add(what)
         session = Session(replace(trial, episodes=LESSONS, steps=steps, curriculum=()))
         session.train(LESSONS)
-        errors = errors_of(of_fuzzy_agents(session.team), session.scenario, trial.seed)
+        errors = errors_of(session.team, session.scenario, trial.seed)
         if errors is not None:
             yield trial.condition, errors
 
@@ -357,7 +356,7 @@ def _of_spec(path: str) -> list[HierarchyView] | None:
         return None  # whoever reads it as a topology says why
     if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
         return None
-    from ....core.interface.scenario import groups_of
+
     from ....topologies.view import HierarchyView
     from ...spec.spec import Spec
 
@@ -370,7 +369,7 @@ def _of_spec(path: str) -> list[HierarchyView] | None:
                 with refused(after=f" (condition {label!r})"):
                     scenario, hierarchy = settings.arrange(settings.scenario.build())
                 own, failures = len(scenario.action_set), settings.topology.failures
-                shown = HierarchyView(label, hierarchy, groups_of(scenario), own, failures)
+                shown = HierarchyView(label, hierarchy, scenario.groups, own, failures)
                 parts = hierarchy.told, hierarchy.considers, failures, own
                 distinct.setdefault((hierarchy.agents, hierarchy.edges, *parts), shown)
     return list(distinct.values())

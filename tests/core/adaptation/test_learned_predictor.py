@@ -15,8 +15,9 @@ from nested_agents.core.adaptation.predictors import (
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
-from nested_agents.core.interface.scenario import Scenario, Transition, groups_of
-from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable, states_by_group
+from nested_agents.core.interface.prediction import states_by_group
+from nested_agents.core.interface.scenario import Scenario, Transition
+from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.checking.predictions import faults_of_prediction
@@ -292,5 +293,5 @@ def test_rewards_are_not_predicted() -> None:
 def test_states_by_group_are_those_of_all() -> None:
     predictor, states = trained(Rails(3))
     joint = np.array([[0, 1, 2], [3, 3, 0]])
-    own, shared = states_by_group(predictor.predict(states), joint, groups_of(Rails(3)), 1)  # type: ignore[arg-type]
+    own, shared = states_by_group(predictor.predict(states), joint, Rails(3).groups, 1)  # type: ignore[arg-type]
     assert own.shape, shared.shape == ((3, 2, 1), (3, 2, 2))

@@ -17,7 +17,7 @@ from nested_agents.core.agents.loop import StepRecord, control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.scenario import EmbodiedScenario, Scenario, roles_of
+from nested_agents.core.interface.scenario import EmbodiedScenario, Scenario
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
@@ -309,12 +309,12 @@ def test_predictions_by_blocks_are_those_by_states(line_world) -> None:
 
 def test_robots_whose_wheels_have_the_same_roles_are_of_one_role(line_world) -> None:
     world = line_world(2, 2)
-    assert roles_of(join_agents(world, "body")) == (
+    assert join_agents(world, "body").roles == (
         "cart0.wheel0+cart0.wheel1",
         "cart1.wheel0+cart1.wheel1",
     )
     world.roles = ("front", "rear") * 2
-    assert roles_of(join_agents(world, "body")) == ("front+rear", "front+rear")
+    assert join_agents(world, "body").roles == ("front+rear", "front+rear")
 
 
 @pytest.mark.parametrize(("agents", "n"), [("body", 2), ("team", 1)])

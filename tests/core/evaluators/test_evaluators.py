@@ -19,7 +19,8 @@ from nested_agents.core.evaluators.enumeration import (
 )
 from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation, Rule, Teammates
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.spaces import Blocks, StateSpace, Variable
+from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 A = 4

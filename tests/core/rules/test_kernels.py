@@ -9,7 +9,7 @@ import rule_oracles as oracle
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nested_agents.core.interface.spaces import Blocks
+from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.rules.kernels.contraction import exponential, many_strengths
 from nested_agents.core.rules.kernels.fuzzy import Partition, layout, unpack
 from nested_agents.core.rules.kernels.states import add_features, each_dense

@@ -7,7 +7,8 @@ from math import comb
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.spaces import Blocks, StateSpace, Variable
+from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 

@@ -10,7 +10,8 @@ import pytest
 from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.interface.scenario import can_draw, measures_of
+from nested_agents.core.interface.measures import measures_of
+from nested_agents.core.interface.scenario import can_draw
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios import SCENARIOS
@@ -105,7 +106,7 @@ def test_it_is_registered_and_its_settings_need_no_physics() -> None:
 
 def test_what_an_episode_is_told_by() -> None:
     scenario = with_box_at(0.97, BoxPushingSettings())
-    assert [measure.name for measure in measures_of(scenario)] == [
+    assert [measure.name for measure in measures_of(scenario.measures)] == [
         "success", "stopped_at_goal", "final_distance_m", "final_orientation_rad",
         "contact_fraction",
     ]  # fmt: skip

@@ -14,8 +14,10 @@ import pytest
 
 from nested_agents import View, state_variable
 from nested_agents.core.agents.joint import join_agents
-from nested_agents.core.interface.scenario import SUCCESS, Measure, Scenario, Transition
-from nested_agents.core.interface.spaces import ActionSet, Blocks, StateSpace, Variable
+from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.interface.scenario import Scenario, Transition
+from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import (

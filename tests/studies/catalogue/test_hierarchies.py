@@ -155,7 +155,7 @@ def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
             },
         }
     )  # fmt: skip
-    with made_up.opened(tmp_path, spec, measures_of(spec)) as store:
+    with made_up.opened(tmp_path, spec, measures_of(spec.measures)) as store:
         for trial in trials_of(spec):
             runner.save(store, trial, measure(trial), 1.0)
         results = read(store)

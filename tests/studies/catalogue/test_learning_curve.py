@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from made_up_results import Arrays
 
-from nested_agents.core.interface.scenario import SUCCESS, Measure
+from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.learning_curve import analyse, curves_of, draw, metrics_of
 from nested_agents.studies.presentation.figures import save

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_up_results import hierarchies, scaling
 
-from nested_agents.core.interface.scenario import SUCCESS, Measure
+from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.studies.catalogue.study import analysed
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import draw_profiles

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from nested_agents.core.interface.scenario import SUCCESS, Measure
+from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.store.database import columns, measures_from, tables
 from nested_agents.studies.trials.trial import joined

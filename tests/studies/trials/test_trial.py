@@ -10,7 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.scenario import SUCCESS, EpisodeRecorder, Measure, Transition
+from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.recording import EpisodeRecorder
+from nested_agents.core.interface.scenario import Transition
 from nested_agents.scenarios.box_pushing.scenario import MEASURES, BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
 from nested_agents.studies.errors import SpecError

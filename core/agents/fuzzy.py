@@ -1,0 +1,407 @@
+"""Fuzzy agents: rule bases whose values choose actions, and whose weights learn.
+
+Each agent values its own actions, by the states that they are predicted to lead to or, without a
+prediction, in the state that it is in. Consequent weights are an agent's own or a role's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from ..adaptation.foresight import Foresight
+from ..adaptation.predictors import GivenPredictor, Mirror
+from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
+from ..hierarchy.hierarchy import Hierarchy
+from ..hierarchy.turns import Turn, all_hear_all
+from ..interface.agents import Agents, Counts, Memory, Placement
+from ..interface.experience import Experience, Observation
+from ..interface.prediction import NOT_EXPLORING, UNPREDICTED, Prediction
+from ..interface.scenario import Scenario, carried_rows, rows_of
+from ..learners import check_prediction
+from ..learners.learner import LearnerSettings
+from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
+from .plain import as_evaluator, as_explorer, as_learner
+
+SHAPED = ("learner.theta", "learner.trace", "learner.reach", "seen", "explorer", "generator")
+"""What of a memory has a shape that the settings fix."""
+
+
+@dataclass
+class FuzzyInputs:
+    """What fuzzy agents decide by."""
+
+    left: FloatArray
+    """``(n, d)`` the states that they are in; where they value actions, with a column for each
+    action that they are told, filled in turn by turn."""
+    previous: IntArray | None
+    """``(n,)`` what all did in the decision before; none: there was none, or nobody asks."""
+    prediction: Prediction
+    """What joint actions would lead to."""
+    weights: list[FloatArray]
+    """The consequent weights of every agent."""
+    frequencies: FloatArray
+    """``(n, A)`` how often each agent was seen to take each action, rows summing to one."""
+    explore: bool
+    """Whether they explore."""
+
+
+class FuzzyAgents(Agents[FuzzyInputs]):
+    """Agents with one rule base each.
+
+    Parameters
+    ----------
+    settings
+        How they explore, decide and learn.
+    placement
+        Where they act.
+
+    Attributes
+    ----------
+    learner
+        Owns the consequent weights.
+    rows
+        ``(n,)`` which row of them each agent has.
+    space, rules
+        What values are functions of, and the rule base that all agents have.
+    explorer
+        Chooses actions by value.
+    evaluator
+        Values actions; none: actions are drawn at random.
+    foresight
+        What they predict by.
+    mirror
+        Doubles what is learned from; none: it is what the agents met.
+    seen
+        ``(n, A)`` how often each agent was seen to take each action, one of each to begin with.
+    given
+        ``(n, A, n, A)`` the same given each action of another, if the teammate model asks for it.
+
+    Raises
+    ------
+    ValueError
+        If the settings do not fit the state space, or need a prediction that the scenario has not.
+    """
+
+    def __init__(self, settings: LearnerSettings, placement: Placement) -> None:
+        scenario = placement.scenario
+        hierarchy = placement.hierarchy
+        check_prediction(settings, scenario)
+        self.settings = settings
+        self.scenario = scenario
+        self.hierarchy = hierarchy
+        self.action_set = scenario.action_set
+        n = len(hierarchy)
+        n_actions = len(scenario.action_set)
+        if settings.values_actions and not isinstance(settings.predictor, GivenPredictor):
+            raise ValueError(
+                f"learner.predictor.kind = {settings.predictor.kind!r}: learner.kind = "
+                f"{settings.kind!r} decides without a prediction"
+            )
+        self.foresight = Foresight(
+            settings.predictor, settings.self_model, settings.calibration, scenario
+        )
+        self.mirror = Mirror.of(scenario) if settings.is_mirrored else None
+        self.rows = rows_of(scenario, shared=settings.weights == "role")
+        self._senders = _senders(settings, hierarchy)
+        self._n_told = max(map(len, self._senders), default=0)
+        self.space, self.rules = settings.rules_over(
+            scenario.state_space, scenario.action_set, self._n_told
+        )
+        rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
+        self.learner = as_learner(settings.build(self.rules, rows))
+        self.evaluator = self._evaluator(placement)
+        self._decides_for_all = (
+            self.evaluator is not None
+            and type(self.evaluator).decide is not Evaluator.decide
+            and not placement.messages_fail
+            and all_hear_all(hierarchy)
+        )
+        self.explorer = as_explorer(settings.exploration.build(n))
+        self.rng = np.random.Generator(np.random.PCG64(placement.seed))
+        self.seen: FloatArray = np.ones((n, n_actions))
+        conditional = settings.decision.teammates == "conditional"
+        is_counted = conditional and self.evaluator is not None
+        self.given: FloatArray = np.ones((n, n_actions) * 2 if is_counted else (0, 0, 0, 0))
+
+    def _evaluator(self, placement: Placement) -> Evaluator | None:
+        settings = self.settings
+        decision = settings.decision
+        if decision.rule == "random":
+            return None
+        problem = DecisionProblem(
+            rules=self.rules,
+            hierarchy=self.hierarchy,
+            n_actions=len(self.action_set),
+            groups=self.scenario.groups,
+            rule=decision.rule,
+            teammates=decision.teammates,
+            discount=settings.discount,
+            value_of=decision.value_of,
+            unseen=decision.unseen,
+            plan=decision.plan,
+            handed_down=self.hierarchy.told == "ancestors" and not placement.messages_fail,
+        )
+        if isinstance(self.learner, Evaluator):
+            return self.learner
+        return as_evaluator(decision.evaluator.build(problem))
+
+    @property
+    def counts(self) -> Counts:
+        """What they have evaluated so far."""
+        return Counts() if self.evaluator is None else self.evaluator.counts
+
+    @property
+    def weight_bytes(self) -> int:
+        """How much memory the consequent weights take."""
+        return self.learner.theta.nbytes
+
+    def check(self, seen: Observation) -> None:
+        """Refuse a world without what they decide by.
+
+        Raises
+        ------
+        ValueError
+            If they decide by rewards, and none are predicted; or by plans, and the prediction does
+            not go on; one line.
+        """
+        rule = self.settings.decision.rule
+        if self.evaluator is None or rule == "value":
+            return
+        prediction = self.foresight.predict(seen)
+        neutral = np.full(len(self.hierarchy), self.action_set.neutral)
+        if prediction is None or prediction.rewards(neutral[None]) is None:
+            raise ValueError(
+                f"learner.decision.rule = {rule!r}: no rewards are predicted, use value"
+            )
+        if self.evaluator.continues and prediction.after(neutral) is None:
+            raise ValueError(
+                "learner.decision.evaluator: plans of several decisions need a scenario that "
+                "predicts from predicted states"
+            )
+
+    def begin_episode(self) -> None:
+        """Begin an episode of learning."""
+        self.explorer.begin_episode()
+        self.learner.begin_episode()
+
+    def perceive(self, seen: Observation, *, explore: bool) -> FuzzyInputs:
+        """Return what a decision is made by."""
+        left = seen.present
+        if self._n_told:  # a column for each action told, as yet that of nobody
+            nobody = np.full((len(left), self._n_told), float(len(self.action_set)))
+            left = np.hstack([left, nobody])
+        prediction = None if self.settings.values_actions else self.foresight.predict(seen)
+        theta = self.learner.theta
+        return FuzzyInputs(
+            left=left,
+            previous=seen.previous if self.settings.decision.unseen == "last" else None,
+            prediction=UNPREDICTED if prediction is None else prediction,
+            weights=[theta[row] for row in self.rows],
+            frequencies=self.seen / self.seen.sum(axis=1, keepdims=True),
+            explore=explore,
+        )
+
+    def decide_all(self, inputs: FuzzyInputs) -> IntArray | None:
+        """Return what all decide: at random, or by one call of the evaluator if it knows a way."""
+        n = len(self.hierarchy)
+        if self.evaluator is None:
+            return self.rng.integers(len(self.action_set), size=n)
+        if not self._decides_for_all:
+            return None
+        exploring = self.explorer.exploring if inputs.explore else NOT_EXPLORING
+        if exploring is None:
+            return None
+        first = Deliberation(
+            agent=self.hierarchy.order[0],
+            joint_action=np.full(n, self.action_set.neutral),
+            prediction=inputs.prediction,
+            weights=inputs.weights,
+            frequencies=inputs.frequencies,
+            rng=self.rng,
+            present=inputs.left,
+        )
+        return self.evaluator.decide(first, exploring)
+
+    def decide(self, inputs: FuzzyInputs, turn: Turn) -> IntArray:
+        """Return the actions ``(k,)`` of members whose turn it is, one after the other."""
+        if self.evaluator is None:
+            return self.rng.integers(len(self.action_set), size=len(turn.agents))
+        if len(turn.agents) == 1:
+            return np.array([self._choose(inputs, int(turn.agents[0]), turn.senders, turn.actions)])
+        chosen = []
+        for agent in turn.agents.tolist():
+            own = turn.receivers == agent
+            chosen.append(self._choose(inputs, agent, turn.senders[own], turn.actions[own]))
+        return np.array(chosen)
+
+    def _choose(self, inputs: FuzzyInputs, agent: int, senders: IntArray, actions: IntArray) -> int:
+        """Return the action of an agent that has been told those of others."""
+        assert self.evaluator is not None
+        if inputs.previous is None:
+            known = np.full(len(self.hierarchy), self.action_set.neutral)
+        else:
+            known = inputs.previous.copy()
+        known[senders] = actions
+        if self._senders:
+            told = known[self._senders[agent]]
+            inputs.left[agent, self.scenario.state_space.n_variables :][: len(told)] = told
+        given = NOTHING_GIVEN
+        if self.given.size:
+            given = self.given[agent] / self.given[agent].sum(axis=2, keepdims=True)
+        values = self.evaluator.values(
+            Deliberation(
+                agent=agent,
+                joint_action=known,
+                prediction=inputs.prediction,
+                weights=inputs.weights,
+                frequencies=inputs.frequencies,
+                rng=self.rng,
+                given=given,
+                told=senders,
+                present=inputs.left,
+            )
+        )
+        if len(values) != len(self.action_set):
+            raise ValueError(
+                f"the evaluator gave {len(values)} values of {len(self.action_set)} actions"
+            )
+        if inputs.explore:
+            return self.explorer.choose(agent, values, self.rng)
+        return greatest(values, self.rng)
+
+    def conclude(self, inputs: FuzzyInputs, joint_action: IntArray) -> None:
+        """Count what all have done, if they explore: the clock of exploration, the frequencies."""
+        if not inputs.explore or self.evaluator is None:
+            return
+        self.explorer.advance()
+        every = np.arange(len(joint_action))
+        self.seen[every, joint_action] += 1.0
+        if self.given.size:
+            self.given[every[:, None], joint_action[:, None], every, joint_action] += 1.0
+
+    def learn(self, experience: Experience, inputs: FuzzyInputs) -> None:
+        """Revise predictions, and learn from the states entered; after an episode, all of it."""
+        self.foresight.learn(experience, inputs.prediction)
+        transition = experience.transition
+        states = transition.states
+        reward = transition.reward
+        left = inputs.left
+        taken = experience.decision.joint_action
+        if transition.terminated and not transition.absorbing:
+            # Learners take a terminal state as entered again for ever.
+            reward = reward * (1.0 - self.settings.discount)
+        if self.mirror is not None:
+            states = self.mirror.states(states)
+            reward = self.mirror.reward(reward)
+            left = self.mirror.states(left)
+            taken = np.tile(taken, 2)
+        terminated = transition.terminated
+        self.count(self.learner.observe_decision(left, taken, states, reward, terminated))
+        if experience.last:
+            self.end_episode()
+
+    def end_episode(self) -> None:
+        """Learn what is learned after an episode."""
+        self.count(self.learner.end_episode())
+        self.foresight.end_episode()
+
+    def count(self, updates: int) -> None:
+        """Count weights that have changed."""
+        self.counts.weight_updates += updates
+
+    def check_world(self, scenario: Scenario) -> None:
+        """Refuse another world for the very same agents, if their values mean nothing there."""
+        self._carried_rows(scenario)
+
+    def _carried_rows(self, scenario: Scenario) -> IntArray:
+        """Return from which of these rows each row of agents in another scenario goes on."""
+        return carried_rows(self.scenario, scenario, shared=self.settings.weights == "role")
+
+    def continue_from(self, former: Self) -> None:
+        """Begin where agents of the same settings ended in another world.
+
+        They go on with weights and experience, with how often agents of each row were seen to take
+        each action, with exploration and random numbers; with self-model and calibration if the
+        bodies are alike, and with conditional frequencies if the agents are as many, which
+        otherwise begin anew.
+
+        Raises
+        ------
+        ValueError
+            If the learner or the exploration knows no way; one line.
+        """
+        rows = former._carried_rows(self.scenario)
+        self.learner.continue_from(former.learner, rows)
+        self.explorer.continue_from(former.explorer)
+        self.rng.bit_generator.state = former.rng.bit_generator.state
+        by_row = [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
+        self.seen = np.stack(by_row)
+        if self.given.shape == former.given.shape:
+            self.given = former.given.copy()
+        self.foresight.continue_from(former.foresight)
+
+    def memory(self) -> Memory:
+        """Return all that they remember."""
+        memory: Memory = {
+            "generator": words_of(self.rng),
+            "explorer": self.explorer.memory,
+            "seen": self.seen,
+        }
+        if self.given.size:
+            memory["given"] = self.given
+        memory |= {f"learner.{key}": array for key, array in self.learner.arrays().items()}
+        for name, part in self.foresight.adaptive.items():
+            memory |= {f"{name}.{key}": array for key, array in part.arrays().items()}
+        return memory
+
+    def restore(self, memory: Mapping[str, AnyArray]) -> None:
+        """Continue from what `memory` returned.
+
+        Raises
+        ------
+        ValueError
+            If it is that of other agents.
+        """
+        own = self.memory()
+        if memory.keys() != own.keys():
+            raise ValueError(
+                f"team: saved arrays {', '.join(sorted(memory))} are not this team's "
+                f"{', '.join(sorted(own))}"
+            )
+        for name in (name for name in SHAPED if name in own):
+            if memory[name].shape != own[name].shape:
+                raise ValueError(
+                    f"team: saved {name} has shape {memory[name].shape}, this team's "
+                    f"{own[name].shape}"
+                )
+        set_words(self.rng, memory["generator"])
+        self.explorer.memory[:] = memory["explorer"]
+        self.seen = memory["seen"].copy()
+        if self.given.size:
+            self.given = memory["given"].copy()
+        self.learner.restore(_under("learner", memory))
+        for name, part in self.foresight.adaptive.items():
+            part.restore(_under(name, memory))
+
+
+def _under(name: str, memory: Mapping[str, AnyArray]) -> Memory:
+    """Return the arrays of a part by their own names."""
+    head = f"{name}."
+    return {key.removeprefix(head): memory[key] for key in memory if key.startswith(head)}
+
+
+def _senders(settings: LearnerSettings, hierarchy: Hierarchy) -> list[list[int]]:
+    """Return, by agent, whose actions are part of its state, in the order of decision."""
+    if not settings.values_actions:
+        return []
+    if hierarchy.neighbours:
+        raise ValueError(
+            f"learner.kind = {settings.kind!r}: agents use what they are told, and neighbours tell "
+            "nothing; set topology.oriented, in which order they decide"
+        )
+    every = range(len(hierarchy))
+    return [sorted(hierarchy.above(i), key=hierarchy.order.index) for i in every]

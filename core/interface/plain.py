@@ -1,0 +1,190 @@
+"""The door for plain classes of users: scenarios and predictions that inherit nothing of ours.
+
+What they may have is asked for by name here, once, and nowhere else. Bodies that are open to
+self-models inherit `Scenario`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..numerics import FloatArray, IntArray
+from .prediction import Blocks, Prediction, Tables
+from .scenario import Scenario, Transition
+
+NECESSARY = ("agents", "state_space", "action_set", "reset", "step")
+"""What a scenario cannot do without."""
+DECLARED = (
+    "agents",
+    "state_space",
+    "action_set",
+    "measures",
+    "interactions",
+    "horizon",
+    "repeats",
+    "recorded",
+    "groups",
+    "roles",
+    "bounds",
+)
+"""What a scenario says of itself."""
+
+
+def as_scenario(thing: object) -> Scenario:
+    """Return a scenario: the thing itself if it is one, else one that plays it.
+
+    Raises
+    ------
+    ValueError
+        If the thing lacks what is necessary; one line.
+    """
+    if isinstance(thing, Scenario):
+        return thing
+    missing = ", ".join(name for name in NECESSARY if not hasattr(thing, name))
+    if missing:
+        raise ValueError(f"scenario.kind: {type(thing).__name__} lacks {missing}")
+    return PlainScenario(thing)
+
+
+def as_prediction(thing: Any) -> Prediction | None:
+    """Return a prediction: the thing itself if it is one, else one that asks it."""
+    if thing is None or isinstance(thing, Prediction):
+        return thing
+    return PlainPrediction(thing)
+
+
+class PlainScenario(Scenario):
+    """A scenario of a user's plain class.
+
+    Parameters
+    ----------
+    plain
+        An object that has what is `NECESSARY`; whatever else it has can be reached through this.
+    """
+
+    def __init__(self, plain: Any) -> None:
+        self.plain = plain
+        for name in DECLARED:
+            if hasattr(plain, name):
+                setattr(self, name, getattr(plain, name))
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the user's object has by this name."""
+        if name == "plain":  # not there yet: an object that is being copied or unpickled
+            raise AttributeError(name)
+        return getattr(self.plain, name)
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Start an episode and return states ``(n, d)``."""
+        states: FloatArray = self.plain.reset(seed, episode)
+        return states
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Carry out a joint action ``(n,)``."""
+        transition: Transition = self.plain.step(joint_action)
+        return transition
+
+    @property
+    def predicts(self) -> bool:
+        """Whether the user's object has a method predict."""
+        return hasattr(self.plain, "predict")
+
+    @property
+    def lacks_prediction(self) -> str:
+        """Why it predicts nothing, in the user's words if there are any."""
+        unnamed = f"the scenario {type(self.plain).__name__} has no method predict"
+        return str(getattr(self.plain, "lacks_prediction", unnamed))
+
+    def predict(self) -> Prediction | None:
+        """Return the prediction of the user's object."""
+        return as_prediction(self.plain.predict()) if self.predicts else None
+
+    def with_exact_prediction(self) -> Scenario | None:
+        """Return the user's exactly predicting scenario, if there is one."""
+        if not hasattr(self.plain, "with_exact_prediction"):
+            return None
+        exact = self.plain.with_exact_prediction()
+        return self if exact is self.plain else as_scenario(exact)
+
+    def partners(self) -> Sequence[int] | None:
+        """Return who stands in whose place in the mirror, if the user's object knows."""
+        return self.plain.partners() if hasattr(self.plain, "partners") else None
+
+    def measure(self) -> Mapping[str, Any]:
+        """Return the measurements of the present state, if the user's object takes them."""
+        return self.plain.measure() if hasattr(self.plain, "measure") else {}
+
+    def constants_of_episode(self) -> Mapping[str, Any]:
+        """Return what the user's object keeps once an episode."""
+        has_constants = hasattr(self.plain, "constants_of_episode")
+        return self.plain.constants_of_episode() if has_constants else {}
+
+    @property
+    def draws(self) -> bool:
+        """Whether the user's object draws recordings."""
+        return bool(self.recorded) and hasattr(self.plain, "animate")
+
+    def animate(self, recording: Mapping[str, Any], path: Path) -> None:
+        """Let the user's object draw a recording."""
+        if not self.draws:
+            super().animate(recording, path)
+        self.plain.animate(recording, path)
+
+
+class PlainPrediction(Prediction, Tables):
+    """A prediction of a user's plain class.
+
+    Parameters
+    ----------
+    plain
+        An object that has ``states(agent, joint_actions)``, and perhaps methods of the names that
+        `Prediction` and `Tables` have.
+    """
+
+    def __init__(self, plain: Any) -> None:
+        self.plain = plain
+        self._has_tables = hasattr(plain, "blocks")
+        self.alike = getattr(plain, "alike", None)
+
+    @property
+    def rewarded(self) -> bool:  # type: ignore[override]  # of users' classes it is not known before
+        """Whether there is a table of rewards."""
+        return hasattr(self.plain, "reward_table")
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent`."""
+        states: FloatArray = self.plain.states(agent, joint_actions)
+        return states
+
+    def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray] | None:
+        """Return own and shared variables of all, if the user's object knows a way."""
+        own_way = getattr(self.plain, "states_by_group", None)
+        return None if own_way is None else own_way(joint_actions)
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray | None:
+        """Return rewards, if the user's object predicts them."""
+        own_way = getattr(self.plain, "rewards", None)
+        return None if own_way is None else own_way(joint_actions)
+
+    def after(self, joint_action: IntArray) -> Prediction | None:
+        """Return the prediction from where a joint action leads, if it goes on."""
+        own_way = getattr(self.plain, "after", None)
+        return None if own_way is None else as_prediction(own_way(joint_action))
+
+    def tables(self) -> Tables | None:
+        """Return its tables, if it has such."""
+        return self if self._has_tables else None
+
+    def blocks(self, agent: int) -> Blocks:
+        """Return the next states of an agent for all joint actions."""
+        blocks: Blocks = self.plain.blocks(agent)
+        return blocks
+
+    def reward_table(self) -> FloatArray:
+        """Return the rewards of all joint actions."""
+        rewards: FloatArray = self.plain.reward_table()
+        return rewards

@@ -1,0 +1,37 @@
+"""The recording of an episode, step by step."""
+
+from typing import Any
+
+import numpy as np
+
+from ..numerics import FloatArray
+from .scenario import Scenario, Transition
+
+
+class EpisodeRecorder:
+    """Collects the recording of one episode.
+
+    Parameters
+    ----------
+    scenario
+        As it is before the first step, which no transition describes; another instance than the one
+        that steps may be given, if it is in the same state.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        opening = scenario.measure()
+        self._frames = {name: [np.array(opening[name])] for name in scenario.recorded}
+        constants = scenario.constants_of_episode()
+        self._constants = {name: np.array(value) for name, value in constants.items()}
+        self._rewards: list[FloatArray] = []
+
+    def add(self, transition: Transition) -> None:
+        """Take in one step."""
+        for name, frames in self._frames.items():
+            frames.append(np.array(transition.info[name]))
+        self._rewards.append(np.array(transition.reward, dtype=float))
+
+    def recording(self) -> dict[str, Any]:
+        """Return what was recorded, arrays by name."""
+        arrays = {name: np.stack(frames) for name, frames in self._frames.items()}
+        return arrays | {"reward": np.array(self._rewards)} | self._constants
