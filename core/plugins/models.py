@@ -16,8 +16,8 @@ Slot = type[BaseModel] | FieldInfo | None
 """What a table is for; None: nothing is known of it."""
 
 
-class Choice(ABC):
-    """Marks a field that holds the settings of one of several things, which a `kind` names."""
+class Kinds(ABC):
+    """Marks a field that holds settings of one of several kinds, which a table names."""
 
     @abstractmethod
     def model(self, kind: str) -> type[BaseModel]:
@@ -30,7 +30,7 @@ class Choice(ABC):
         """
 
     @abstractmethod
-    def kinds(self) -> Iterable[str]:
+    def built_in(self) -> Iterable[str]:
         """Return the kinds that are built in."""
 
 
@@ -52,19 +52,19 @@ def kind_of(model: type[BaseModel]) -> str | None:
     return None if field is None else field.default or None
 
 
-def choice_of(slot: Slot) -> Choice | None:
-    """Return the choice that a field is marked with, if it is."""
+def kinds_at(slot: Slot) -> Kinds | None:
+    """Return the kinds that a field is marked with, if it is."""
     marks = slot.metadata if isinstance(slot, FieldInfo) else []
-    return next((mark for mark in marks if isinstance(mark, Choice)), None)
+    return next((mark for mark in marks if isinstance(mark, Kinds)), None)
 
 
 def model_at(slot: Slot, table: object) -> type[BaseModel] | None:
     """Return the model that a table is for; none if its kind is unknown or missing."""
     kind = table.get("kind") if isinstance(table, Mapping) else None
-    choice = choice_of(slot)
-    if choice is not None:
+    kinds = kinds_at(slot)
+    if kinds is not None:
         try:
-            return choice.model(str(kind))
+            return kinds.model(str(kind))
         except ValueError:
             return None
     models = models_of(annotation_of(slot))

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from .models import Slot, annotation_of, choice_of, field_of, kind_of, model_at, models_of
+from .models import Slot, annotation_of, kinds_at, field_of, kind_of, model_at, models_of
 
 Keys = tuple[int | str, ...]
 """Where a value stands: keys of tables, and indices of lists."""
@@ -117,7 +117,7 @@ def mistaken(key: object, known: Collection[str], problem: str) -> str:
     return f"; {hint}" if hint else ""
 
 
-class Problem(NamedTuple):
+class Complaint(NamedTuple):
     """Something that pydantic refuses."""
 
     keys: Keys
@@ -131,9 +131,9 @@ class Problem(NamedTuple):
         return dotted(self.keys)
 
 
-def problems_of(error: ValidationError, table: Table) -> list[Problem]:
+def problems_of(error: ValidationError, table: Table) -> list[Complaint]:
     """Return what pydantic refuses of a table."""
-    return [Problem(place(e["loc"], table), e) for e in error.errors(include_url=False)]
+    return [Complaint(place(e["loc"], table), e) for e in error.errors(include_url=False)]
 
 
 def place(loc: Sequence[int | str], data: object) -> Keys:
@@ -206,7 +206,7 @@ def explain(
 
 
 def _on_unknown_key(
-    problem: Problem,
+    problem: Complaint,
     model: type[BaseModel],
     table: Table,
     elsewhere: tuple[type[BaseModel], Table],
@@ -221,7 +221,7 @@ def _on_unknown_key(
     return f"{problem.path} = {show(problem.details['input'])}: unknown key{of_kind}; {hint}"
 
 
-def _on_kind(problem: Problem) -> str:
+def _on_kind(problem: Complaint) -> str:
     """Return how a line begins on the kind of a table, or on the name that stands for one."""
     value = problem.details["input"]
     if isinstance(value, Mapping) and "kind" in value:
@@ -229,7 +229,7 @@ def _on_kind(problem: Problem) -> str:
     return f"{problem.path} = {show(value)}: " + "kind is missing; " * isinstance(value, Mapping)
 
 
-def _on_unknown_kind(problem: Problem, model: type[BaseModel], table: Table) -> str:
+def _on_unknown_kind(problem: Complaint, model: type[BaseModel], table: Table) -> str:
     slot, _ = _reach(problem.keys, model, table)
     kinds = map(kind_of, models_of(annotation_of(slot)))
     kind = problem.details["input"].get("kind")
@@ -237,7 +237,7 @@ def _on_unknown_kind(problem: Problem, model: type[BaseModel], table: Table) -> 
     return f"{_on_kind(problem)}{hint}{_pointer(problem.keys, kind, model, table)}"
 
 
-def _on_value(problem: Problem, text: str, model: type[BaseModel], table: Table) -> str:
+def _on_value(problem: Complaint, text: str, model: type[BaseModel], table: Table) -> str:
     if not problem.keys:
         return text
     value = problem.details["input"]
@@ -293,10 +293,10 @@ def _held(field: FieldInfo, table: object) -> Sequence[type[BaseModel]]:
     own = model_at(field, table)
     if own is not None:
         return [own]
-    choice = choice_of(field)
-    if choice is None:
+    kinds = kinds_at(field)
+    if kinds is None:
         return models_of(field.annotation)
-    return [choice.model(kind) for kind in choice.kinds()]
+    return [kinds.model(kind) for kind in kinds.built_in()]
 
 
 def _reach(keys: Keys, model: type[BaseModel], table: Table) -> tuple[Slot, object]:

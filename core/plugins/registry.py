@@ -26,7 +26,7 @@ from pydantic import Field, create_model
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
-from .models import Choice
+from .models import Kinds
 from .problems import closest
 from .settings import Settings, tuples
 
@@ -301,7 +301,7 @@ def _dumped(value: Settings, info: Any) -> Any:
     return value.model_dump(mode=info.mode, exclude_none=info.exclude_none)
 
 
-class Plugged(Choice):
+class Plugged(Kinds):
     """Marks a field that holds the settings of any thing of a registry.
 
     A table is validated by the model that its ``kind`` names; a text is what `shorthand` makes of
@@ -325,7 +325,7 @@ class Plugged(Choice):
         """Return the settings model of a kind, see `SettingsRegistry.model`."""
         return self.registry.model(kind)
 
-    def kinds(self) -> Iterable[str]:
+    def built_in(self) -> Iterable[str]:
         """Return the kinds that are built in."""
         return self.registry.built_in
 

@@ -21,7 +21,7 @@ from annotated_types import MinLen
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
-from ...core.plugins.models import choice_of, models_of
+from ...core.plugins.models import kinds_at, models_of
 from ...core.plugins.problems import near
 from ...core.plugins.registry import Plugged, SettingsRegistry
 from ...core.plugins.settings import Settings
@@ -151,8 +151,8 @@ def settings_of(info: FieldInfo) -> list[type[Settings]]:
 
 def registry_of(info: FieldInfo) -> SettingsRegistry | None:
     """Return the registry whose things a field holds, if it does."""
-    choice = choice_of(info)
-    return choice.registry if isinstance(choice, Plugged) else None
+    mark = kinds_at(info)
+    return mark.registry if isinstance(mark, Plugged) else None
 
 
 def kinds_of(info: FieldInfo) -> dict[str, type[Settings]]:

@@ -16,7 +16,7 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel
 
-from ...core.plugins.models import Slot, choice_of, field_of, model_at
+from ...core.plugins.models import Slot, kinds_at, field_of, model_at
 from ...core.plugins.problems import show
 
 TomlTable = dict[str, Any]
@@ -48,7 +48,7 @@ def overlay(base: Mapping[str, Any], table: Mapping[str, Any], slot: Slot = None
             result[key] = overlay(below, value, field_of(model, key))
         elif isinstance(value, str) and isinstance(below, Mapping) and "kind" in below:
             # A name stands for a table that says its kind and no more.
-            result[key] = {"kind": value} if choice_of(field_of(model, key)) else value
+            result[key] = {"kind": value} if kinds_at(field_of(model, key)) else value
         else:
             result[key] = value
     return result

@@ -7,6 +7,7 @@ import pytest
 from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.learners import LEARNERS
+from nested_agents.core.networks.settings import PeerSettings
 from nested_agents.core.plugins.registry import Plugged, Registry
 from nested_agents.core.plugins.settings import Settings
 from nested_agents.scenarios import SCENARIOS
@@ -27,9 +28,9 @@ def built_in_models() -> set[type[Settings]]:
 
     Not those of controllers of one scenario, which are named by module and class, nor those of
     faults of other environments, nor entries of a benchmark; nor those that other tests have made
-    of a function.
+    of a function; nor those of peers, which only learners of users inherit.
     """
-    found = subclasses(Settings) - {Settings, ConditionSettings}
+    found = subclasses(Settings) - {Settings, ConditionSettings, PeerSettings}
     return {
         model
         for model in found
