@@ -17,7 +17,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from .models import Slot, annotation_of, kinds_at, field_of, kind_of, model_at, models_of
+from .models import Slot, annotation_of, field_of, kind_of, kinds_at, model_at, models_of
 
 Keys = tuple[int | str, ...]
 """Where a value stands: keys of tables, and indices of lists."""

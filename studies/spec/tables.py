@@ -16,7 +16,7 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel
 
-from ...core.plugins.models import Slot, kinds_at, field_of, model_at
+from ...core.plugins.models import Slot, field_of, kinds_at, model_at
 from ...core.plugins.problems import show
 
 TomlTable = dict[str, Any]
