@@ -117,13 +117,14 @@ class Registry:
         if sources.is_reference(name):
             return sources.active().load(name)
         place = self.built_in.get(name) or self.installed().get(name)
-        if place is None and ":" in name and "." in name.partition(":")[0]:
-            place = name
-        if place is None:
+        is_module = "." in name.partition(":")[0] and ":" in name
+        if place is None and not is_module:
             unknown = f"{closest(name, self.names())}, or one of your own as file.py:NAME"
             raise ValueError(self.moved.get(name, unknown))
+        if place is None:
+            sources.active().permit(name.partition(":")[0])
         try:
-            return resolve_name(place)
+            return resolve_name(place or name)
         except Exception as error:
             if name in self.built_in:
                 raise

@@ -97,7 +97,8 @@ def run_study(
             store.forget_failed()
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
-        run_one = measured if is_reference(spec.study) else load_study(spec.study).measure
+        with spec.sources.active():
+            run_one = measured if is_reference(spec.study) else load_study(spec.study).measure
         for note in (*store.notes, *spec.warnings()):
             observer.note(note)
         if left:

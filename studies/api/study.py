@@ -261,8 +261,11 @@ class StudyResults:
         SpecError
             If there is no such study.
         """
-        load_study(name)
-        return replace(self, outline=self.outline._replace(study=name), _is_whole=False)
+        own = Sources(Path())
+        with own.active():
+            load_study(name)
+        outline = self.outline._replace(study=name)
+        return replace(self, outline=outline, _sources=own, _is_whole=False)
 
     @property
     def figures(self) -> dict[str, Figure]:
@@ -504,7 +507,8 @@ def _loaded(path: Path) -> StudyResults:
     if path.is_file():
         kept = published.load(path)
         remarks = (f"{path}: {kept.note}",) if kept.note else ()
-        return StudyResults(kept.outline, kept.results, (), remarks)
+        sources = Sources(brought_by=str(path))
+        return StudyResults(kept.outline, kept.results, (), remarks, sources)
     with Store.open(path) as store:
         store.verify()
         return _of(store)

@@ -32,10 +32,12 @@ from ...core.plugins.problems import closest, explain
 from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, mentions
+from ...core.plugins.trust import modules_in
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ...topologies.builders import listed
 from ..errors import SpecError, refused
+from ..store.database import DATABASE, SPEC_FILE
 from .conditions import Condition, Curriculum, Length, Name, Override
 from .layers import below, expand, grid, section
 from .presets import PRESETS
@@ -278,6 +280,9 @@ class Spec(Settings):
             except ValueError as error:
                 problem = str(error).removeprefix(f"{name}: ")
                 raise SpecError(f"{key} = {name!r}: {problem}") from None
+        for module, key in dict(modules_in(tables)).items():
+            with refused(f"{key}: "):
+                sources.permit(module)
         spec._sources = sources.only(set(names))
         return spec
 
@@ -296,7 +301,8 @@ class Spec(Settings):
     ) -> Spec:
         """Read a TOML file and lay ``key=value`` changes over it.
 
-        Files of users are looked for beside it, then among the copies of a study.
+        Files of users are looked for beside it, then among the copies of a study. The copy of a
+        spec that stands beside a study's database may be somebody else's, see `trust`.
 
         Raises
         ------
@@ -310,31 +316,33 @@ class Spec(Settings):
             raise SpecError(f"{path}: {error.strerror or error}") from None
         except UnicodeDecodeError:
             raise SpecError(f"{path}: is not UTF-8 text") from None
-        return cls.parse(text, changes, str(path), path.parent, study)
+        is_copy = path.name == SPEC_FILE and (path.parent / DATABASE).exists()
+        brought_by = str(path.parent) if is_copy else None
+        sources = Sources(path.parent, study=study, brought_by=brought_by)
+        return cls.parse(text, changes, str(path), sources)
 
     @classmethod
     def parse(
         cls,
         text: str,
         changes: Iterable[str] = (),
-        source: str = "spec",
-        folder: Path = Path(),
-        study: Path | None = None,
+        title: str = "spec",
+        sources: Sources | None = None,
     ) -> Spec:
-        """Read TOML text and lay ``key=value`` changes over it; see `load`.
+        """Read TOML text and lay ``key=value`` changes over it; see `load`, `of`.
 
-        Files that it names are below `folder`; for those that are gone, copies of a study stand in.
+        Messages call the text by its `title`.
         """
         try:
             table = tomllib.loads(text)
         except ValueError as error:  # also of a number of too many digits
-            raise SpecError(f"{source}: is not valid TOML: {error}") from None
+            raise SpecError(f"{title}: is not valid TOML: {error}") from None
         except RecursionError:
-            raise SpecError(f"{source}: is nested too deeply") from None
+            raise SpecError(f"{title}: is nested too deeply") from None
         for change in changes:
             with refused(f"--set {change}: "):
                 table = _changed(table, assignment(change))
-        return cls.of(table, Sources(folder, study=study))
+        return cls.of(table, sources)
 
     def conditions(self) -> tuple[Condition, ...]:
         """Return the conditions in the order of the overrides and sweeps."""
