@@ -53,7 +53,7 @@ def spell_dollars(figure: Figure, names: Iterable[str]) -> Figure:
     """Let ``$`` be a character in a figure if it is one in names; else it begins a formula."""
     if any("$" in name for name in names):
         for text in figure.findobj(Text):
-            if isinstance(text, Text) and r"\mathdefault" not in text.get_text():  # of log axes
+            if isinstance(text, Text) and "$" in text.get_text():  # ticks of logarithms come later
                 text.set_parse_math(False)
     return figure
 
