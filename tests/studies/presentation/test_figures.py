@@ -16,7 +16,7 @@ def test_a_dollar_in_a_name_is_a_character() -> None:
         spell_dollars(figure, NAMES).savefig(svg, format="svg")
     text = svg.getvalue()
     assert all(f">{name}<" in text for name in NAMES)
-    assert "mathdefault" not in text  # the ticks are powers
+    assert r">$\mathdefault" not in text  # ticks of logarithms are powers
 
 
 def test_a_formula_stays_one_where_no_name_has_a_dollar() -> None:
