@@ -33,7 +33,8 @@ from ..spec.conditions import Condition, ConditionSettings, Stage
 from ..spec.spec import Spec
 from ..store.database import EVALUATION, STAGE
 from ..store.durable import TEAM, Recording
-from .trial import EpisodeMeter, EpisodeRow, Trial, TrialResult, joined
+from .episodes import EpisodeMeter, EpisodeRow, join_measures
+from .trial import Trial, TrialResult
 
 Evaluations = Sequence[tuple[str, ConditionSettings]]
 """Names and settings under which a trained team is evaluated beside its own."""
@@ -167,7 +168,7 @@ def check(
                 failing = failing or SpecError(f"{problem}{where}")
     if failing and not (measures and may_fail):
         raise failing
-    return joined(measures, conditions[0].columns)
+    return join_measures(measures, conditions[0].columns)
 
 
 def _check_saved(settings: ConditionSettings) -> None:
@@ -407,7 +408,7 @@ class Session:
         the steps, whole episodes may be run `at_once`, compiled.
         """
         measures = measures_of(there.world.measures)
-        self._measures = joined((self._measures, measures))
+        self._measures = join_measures((self._measures, measures))
         if at_once and self._at_once(there, phase, counted_from, **loop):
             return
         for record in control_loop(there.scenario, there.team, seed=self.trial.seed, **loop):
