@@ -21,8 +21,10 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
-MOST_BYTES, MOST_SECONDS = 10**9, 5
-"""What a worker may hold, and a decision of the whole team take."""
+MOST_BYTES = 10**9
+"""What a worker may hold."""
+MOST_SECONDS = 5
+"""What a decision of the whole team may take."""
 
 
 def team_size(seconds_per_pair: float, agents: int = 1) -> AfterValidator:
@@ -46,17 +48,18 @@ def team_size(seconds_per_pair: float, agents: int = 1) -> AfterValidator:
     1 GB and 5 s
     """
 
-    def check(number: int) -> int:
+    def check_number(number: int) -> int:
         check_team(number * agents, seconds_per_pair)
         return number
 
-    return AfterValidator(check)
+    return AfterValidator(check_number)
 
 
 def check_team(agents: int, seconds_per_pair: float) -> None:
     """Raise `ValueError` if a team is too large by an estimate, see `team_size`."""
     pairs = Decimal(agents) ** 2  # of numbers too large for floats, too
-    held, seconds = 2 * 10**8 + 28 * pairs, Decimal(seconds_per_pair) * pairs
+    held = 2 * 10**8 + 28 * pairs
+    seconds = Decimal(seconds_per_pair) * pairs
     if held > MOST_BYTES or seconds > MOST_SECONDS:
         raise ValueError(
             f"a worker would hold {held / 10**9:.2g} GB, and a decision take {seconds:.2g} s, "

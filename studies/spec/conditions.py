@@ -107,7 +107,8 @@ class ConditionSettings(Settings):
 
     def warnings(self) -> tuple[str, ...]:
         """Return what of its topology says nothing to its learner, a line each."""
-        learner, topology = f"learner.kind = {self.learner.kind!r}", self.topology
+        learner = f"learner.kind = {self.learner.kind!r}"
+        topology = self.topology
         if isinstance(self.learner, LearnerSettings) and not self.learner.values_actions:
             return ()
         if not self.learner.uses_hierarchy:

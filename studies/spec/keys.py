@@ -8,16 +8,15 @@ walked as well, so a new scenario or learner has its keys here from the first da
 import ast
 import inspect
 import json
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
 from textwrap import dedent
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, TypeGuard, Union, get_args, get_origin
 
-from annotated_types import MinLen
+from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
@@ -34,8 +33,6 @@ UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 TYPES = {bool: "true or false", int: "whole number", float: "number", str: "text", Any: "any"}
 GREATEST_BOUND = 10**9
 """A bound beyond it is that of a machine's integers, and no help to anybody."""
-SIGNS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
-"""By the attribute of a field's metadata that holds the bound."""
 
 
 class Key(NamedTuple):
@@ -169,7 +166,8 @@ def _held(info: FieldInfo) -> Iterator[tuple[str, type[Settings], Mapping[str, F
 
     What all kinds inherit comes first.
     """
-    registry, kinds = registry_of(info), kinds_of(info)
+    registry = registry_of(info)
+    kinds = kinds_of(info)
     inherited: Mapping[str, FieldInfo] = {}
     if registry is not None or kinds:
         base = registry.base if registry is not None else _base(list(kinds.values()))
@@ -256,7 +254,8 @@ def _docstrings(cls: type) -> Mapping[str, str]:
         source = inspect.getsource(cls)
     except (OSError, TypeError):
         return {}
-    body = ast.parse(dedent(source)).body[0].body  # type: ignore[attr-defined]
+    (definition,) = ast.parse(dedent(source)).body
+    body = definition.body if isinstance(definition, ast.ClassDef) else []
     return {
         field.target.id: str(text.value.value)
         for field, text in pairwise(body)
@@ -299,7 +298,8 @@ def _default(info: FieldInfo) -> str:
 
 def _type(annotation: Any) -> str:
     """Return the type of a field in words: alternatives but None, annotations taken off."""
-    origin, given = get_origin(annotation), get_args(annotation)
+    origin = get_origin(annotation)
+    given = get_args(annotation)
     if isinstance(annotation, TypeAliasType):
         return "nested lists of text"
     if origin is Annotated:
@@ -315,22 +315,32 @@ def _type(annotation: Any) -> str:
 
 def _allowed(annotation: Any) -> Iterator[str]:
     """Yield what is allowed beside the type: the words of literals, and bounds, at any depth."""
-    origin, given = get_origin(annotation), get_args(annotation)
+    origin = get_origin(annotation)
+    given = get_args(annotation)
     if origin is Literal:
         yield from (json.dumps(value) for value in given if value is not False)
     elif origin is Annotated:
         yield from _allowed(given[0])
-        yield from _bounds(item for one in given[1:] for item in getattr(one, "metadata", ()))
+        fields = (one for one in given[1:] if isinstance(one, FieldInfo))
+        yield from _bounds(item for field in fields for item in field.metadata)
     elif origin in (Union, UnionType, tuple):
         for one in given:
             yield from _allowed(one)
 
 
-def _bounds(metadata: Any) -> Iterator[str]:
+def _bounds(metadata: Iterable[object]) -> Iterator[str]:
     for item in metadata:
-        for attribute, sign in SIGNS.items():
-            bound = getattr(item, attribute, math.inf)
-            if bound <= GREATEST_BOUND:
-                yield f"{sign} {bound:,}"
+        if isinstance(item, Ge) and _is_short(item.ge):
+            yield f">= {item.ge:,}"
+        if isinstance(item, Gt) and _is_short(item.gt):
+            yield f"> {item.gt:,}"
+        if isinstance(item, Le) and _is_short(item.le):
+            yield f"<= {item.le:,}"
+        if isinstance(item, Lt) and _is_short(item.lt):
+            yield f"< {item.lt:,}"
         if isinstance(item, MinLen):
             yield f"at least {item.min_length} of them"
+
+
+def _is_short(bound: object) -> TypeGuard[float]:
+    return isinstance(bound, int | float) and bound <= GREATEST_BOUND

@@ -35,20 +35,25 @@ from .tables import TomlTable, flat, label, nested, overlay, scalar, without
 
 SECTIONS = ("scenario", "topology", "learner")
 
+Layer = Mapping[str, Any]
+"""A table, or a point of a sweep, that is laid over what is below it."""
+Layers = Sequence[Layer]
+"""Tables, each over the one before."""
+
 
 class Sections(Protocol):
     """What has tables of its own: a spec, or an override."""
 
     @property
-    def scenario(self) -> Mapping[str, Any]:
+    def scenario(self) -> Layer:
         """Laid over the scenario below."""
 
     @property
-    def topology(self) -> Mapping[str, Any]:
+    def topology(self) -> Layer:
         """Laid over the topology below."""
 
     @property
-    def learner(self) -> Mapping[str, Any]:
+    def learner(self) -> Layer:
         """Laid over the learner below."""
 
     @property
@@ -66,7 +71,7 @@ def layer_of(own: Sections) -> TomlTable:
     return layer if own.agents is None else layer | {"agents": own.agents}
 
 
-def below(table: Mapping[str, Any]) -> tuple[type[Settings], TomlTable]:
+def below(table: Layer) -> tuple[type[Settings], TomlTable]:
     """Return the model of conditions, and what they have at least of a spec's table and preset.
 
     Nothing is known of the kinds of an override's, whose table is empty here.
@@ -81,7 +86,7 @@ def grid(
     spec: Sections,
     sweep: Mapping[str, Sequence[Any]],
     overrides: Sequence[Override] = (),
-    evaluations: Mapping[str, Mapping[str, Any]] | None = None,
+    evaluations: Mapping[str, Layer] | None = None,
     curriculum: Sequence[StageSettings] = (),
 ) -> tuple[Condition, ...]:
     """Return the conditions: override by override, the last key of the sweeps varying fastest.
@@ -108,7 +113,7 @@ def grid(
         If a condition is invalid, or two are the same.
     """
     conditions: list[Condition] = []
-    points: dict[str, tuple[str, Mapping[str, Any]]] = {}
+    points: dict[str, tuple[str, Layer]] = {}
     labels: set[str] = set()
     keys = list(dict.fromkeys([*(key for o in overrides for key in o.sweep), *sweep]))
     for override, point in _points(overrides, sweep):
@@ -141,7 +146,7 @@ def grid(
     return tuple(conditions)
 
 
-def _differing(point: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+def _differing(point: Layer, other: Layer) -> str:
     """Return the keys of a sweep in which two points of it differ."""
     texts, other_texts = ({k: show(v, width=None) for k, v in p.items()} for p in (point, other))
     keys = [key for key in texts if texts[key] != other_texts.get(key, texts[key])]
@@ -169,8 +174,8 @@ class Resolved(NamedTuple):
 
 def resolve(
     preset: str,
-    tables: Mapping[str, Any],
-    point: Mapping[str, Any],
+    tables: Layer,
+    point: Layer,
     where: str = "",
     override: Override | None = None,
 ) -> Resolved:
@@ -190,22 +195,18 @@ def resolve(
     return _settle([given, defaults], own, where)
 
 
-def _part(name: str, table: Mapping[str, Any]) -> TomlTable:
+def _part(name: str, table: Layer) -> TomlTable:
     """Return a section of a layer alone."""
     return {name: table[name]} if name in table else {}
 
 
-def _for_preset(name: str, tables: Mapping[str, Any]) -> Mapping[str, Any]:
+def _for_preset(name: str, tables: Layer) -> Layer:
     """Return a spec's tables without what tunes learning, if a preset is a control: it has not."""
     learner = tables.get("learner", {})
     if "kind" in learner or PRESETS[name].table["learner"]["kind"] != "frozen":
         return tables
     kept = {key: v for key, v in learner.items() if key in LearnerSettings.model_fields}
     return {**tables, "learner": kept}
-
-
-Layers = Sequence[Mapping[str, Any]]
-"""Tables, each over the one before."""
 
 
 def _settle(given: Layers, own: Layers, where: str) -> Resolved:
@@ -286,7 +287,7 @@ def _refused_of_decision(learner: LearnerSettings) -> tuple[str, ...]:
 
 
 def _left_out(
-    given: Layers, table: Mapping[str, Any], dropped: Container[str]
+    given: Layers, table: Layer, dropped: Container[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the keys of given layers that a table is without, and the kinds that are why."""
     said = {key for layer in given for key, value in flat(layer) if value != {}}
@@ -306,7 +307,7 @@ def _cause(key: str, kinds: Iterable[str]) -> str | None:
     return max(around or beside, key=len, default=None)
 
 
-def _expand(layer: Mapping[str, Any]) -> TomlTable:
+def _expand(layer: Layer) -> TomlTable:
     """Return a layer whose sections are tables."""
     return {key: section(key, v) if key in SECTIONS else v for key, v in layer.items()}
 
@@ -319,15 +320,13 @@ def _lay(layers: Layers) -> TomlTable:
     return table
 
 
-def _stage(settings: ConditionSettings, changes: Mapping[str, Any], where: str) -> ScenarioSettings:
+def _stage(settings: ConditionSettings, changes: Layer, where: str) -> ScenarioSettings:
     """Return a condition's scenario with changes laid over it."""
     table = overlay(settings.model_dump(), {"scenario": dict(changes)}, ConditionSettings)
     return _validated(table, where).scenario
 
 
-def _reevaluation(
-    settings: ConditionSettings, changes: Mapping[str, Any], where: str
-) -> ConditionSettings:
+def _reevaluation(settings: ConditionSettings, changes: Layer, where: str) -> ConditionSettings:
     """Return a condition's settings with changes laid over scenario, topology and decision."""
     parts: TomlTable = {"scenario": dict(changes)}
     for name in ("topology", "learner"):
@@ -364,7 +363,7 @@ def section(name: str, value: object) -> TomlTable:
         return parse(value).model_dump()
 
 
-def expand(table: Mapping[str, Any], where: str) -> TomlTable:
+def expand(table: Layer, where: str) -> TomlTable:
     """Return a spec's or an override's table with its sections and sweep spelled out."""
     table = dict(table)
     for name in SECTIONS:
@@ -378,7 +377,7 @@ def expand(table: Mapping[str, Any], where: str) -> TomlTable:
 
 
 def _sweep(
-    table: Mapping[str, Any], where: str, reach: tuple[type[Settings], TomlTable]
+    table: Layer, where: str, reach: tuple[type[Settings], TomlTable]
 ) -> Iterable[tuple[str, Any]]:
     for key, values in flat(table):
         head, _, tail = key.partition(".")

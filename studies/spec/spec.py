@@ -99,7 +99,8 @@ def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
         of_neighbours = bool(graph.neighbours)
         relations = {"told": graph.told, "considers": graph.considers}
     else:
-        agents, pairs = list(map(str, graph)), [(str(a), str(b)) for a, b in graph.edges]
+        agents = list(map(str, graph))
+        pairs = [(str(a), str(b)) for a, b in graph.edges]
         of_neighbours = bool(pairs) and not graph.is_directed()
     if of_neighbours:
         return {"kind": "coordination-graph", "edges": tuple(pairs), **relations}
@@ -108,7 +109,7 @@ def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
     return {"kind": "edges", "edges": tuple(pairs), "alone": alone, **relations}
 
 
-def _of_settings(settings: Settings, registry: Registry | None) -> Any:
+def _of_settings(settings: Settings, registry: Registry | None) -> TomlTable:
     """Return the table of settings; what is None leaves what lies below as it is."""
     table = settings.model_dump(exclude_none=True)
     if registry is not None and not table.get("kind"):
@@ -120,7 +121,7 @@ def _of_settings(settings: Settings, registry: Registry | None) -> Any:
     return table
 
 
-def _name(thing: Any, registry: Registry) -> str:
+def _name(thing: object, registry: Registry) -> str:
     with refused(f"{registry.kind}: "):
         return registry.reference_to(thing)
 
@@ -269,9 +270,8 @@ class Spec(Settings):
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
         spec._conditions = grid(
-            spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations,
-            spec.curriculum,
-        )  # fmt: skip
+            spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations, spec.curriculum
+        )
         tables = [table for condition in spec._conditions for table in condition.tables]
         names = dict(mentions([{"study": spec.study}, *tables]))
         for name, key in names.items():

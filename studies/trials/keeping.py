@@ -229,7 +229,8 @@ def _differences(old: Noted, new: Noted) -> Iterator[str]:
     if not set(seeds) <= set(more_seeds):
         yield f"seeds = {show(seeds)} there, {show(more_seeds)} here"
     if [*old.conditions] != [*new.conditions]:
-        there, here = show([*old.conditions]), show([*new.conditions])
+        there = show([*old.conditions])
+        here = show([*new.conditions])
         written = next(_written(old.spec, new.spec), "")
         yield f"conditions = {there} there, {here} here{written and f', by {written}'}"
     for stages, new_stages in zip(_curricula(old), _curricula(new), strict=False):
@@ -243,12 +244,14 @@ def _differences(old: Noted, new: Noted) -> Iterator[str]:
     for label in [label for label in new.conditions if label in old.conditions]:
         before, after = (dict(flat(noted.conditions[label])) for noted in (old, new))
         for key in sorted(before.keys() | after.keys()):
-            there, here = before.get(key, ABSENT), after.get(key, ABSENT)
+            there = before.get(key, ABSENT)
+            here = after.get(key, ABSENT)
             yield from _unequal(f"condition {label!r}: {key}", there, here)
 
 
 def _changed_files(old: Mapping[str, str], new: Mapping[str, str]) -> Iterator[str]:
-    there, here = Sources(None, old), Sources(None, new)
+    there = Sources(None, old)
+    here = Sources(None, new)
     for name in sorted(old):
         if name not in new:
             yield f"{name} is part of it, not of this one"
