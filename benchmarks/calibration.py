@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from nested_agents.core.adaptation.self_model import CalibrationSettings, SelfModelSettings
+from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import policy_seed, world_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.learners.batch import BatchTDSettings
@@ -41,7 +42,7 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
     )
     hierarchy = build(parse("chain"), scenario.agents, scenario.groups)
     team = Team(settings, scenario, hierarchy, policy_seed(SEED))
-    assert team.calibration is not None
+    assert team.only(FuzzyAgents).foresight.calibration is not None
     load_per_stiffness = belief["load"] / belief["stiffness"]
     right = -np.log([load_per_stiffness, load_per_stiffness, belief["contact_friction"]])
     beliefs, errors = [], []
@@ -51,7 +52,9 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
         prediction = team.predict(scenario)
         for step in range(STEPS):
             joint = team.act(prediction)
-            tried = np.array([np.zeros(3), team.calibration.constants, right])
+            tried = np.array(
+                [np.zeros(3), team.only(FuzzyAgents).foresight.calibration.constants, right]
+            )
             predicted = prediction.outcomes(joint, tried)  # type: ignore[attr-defined]
             transition = scenario.step(joint)
             team.adapt(prediction, joint, transition)
@@ -59,7 +62,9 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
             if len(bodies) == len(scenario.groups) and np.hypot(*box[:2]) > 0.002:
                 off = np.hypot(*(predicted[:, 0] - box)[:, :2].T)
                 errors.append(1000 * off * scenario.settings.action_repeat * 0.064)
-                beliefs.append(np.exp(team.calibration.constants - right))
+                beliefs.append(
+                    np.exp(team.only(FuzzyAgents).foresight.calibration.constants - right)
+                )
             prediction = team.predict(scenario)
             team.learn(transition)
             if transition.terminated or transition.truncated or step == STEPS - 1:

@@ -15,10 +15,12 @@ from time import process_time, thread_time
 from typing import Any, NamedTuple
 
 import numpy as np
+from acting import joint_of
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.agents.team import of_fuzzy_agents
 from nested_agents.studies.spec.spec import Spec
@@ -51,13 +53,13 @@ def timed(settings: dict[str, Any], number: int) -> Timed:
     session = Session(trial)
     scenario, team = session.scenario, of_fuzzy_agents(session.team)
     built = process_time() - begun
-    theta = team.learner.theta
+    theta = team.only(FuzzyAgents).learner.theta
     theta[:] = np.random.default_rng(0).normal(size=theta.shape)
     scenario.reset(world_seed(0, 0), 0)
     deciding, stepping = [], []
     for _ in range(WARM + number):
         begun = thread_time()
-        actions = team.act(team.predict(scenario))
+        actions = joint_of(team, scenario)
         decided = thread_time()
         scenario.step(actions)
         deciding.append(decided - begun)

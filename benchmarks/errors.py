@@ -23,6 +23,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling, SamplingSettings
@@ -67,7 +68,7 @@ def errors(
     samples: dict[str, list[tuple[float, float]]] = {}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         team = Team(BatchTDSettings(decision=decision), scenario, hierarchy, policy_seed(seed))
-        rules = team.learner.rules  # type: ignore[attr-defined]
+        rules = team.only(FuzzyAgents).learner.rules  # type: ignore[attr-defined]
         problem = DecisionProblem(
             rules, hierarchy, len(scenario.action_set), scenario.groups, "value", teammates, 0.95,
         )  # fmt: skip
@@ -83,7 +84,7 @@ def errors(
                 known = np.full(n, neutral)
                 known[:agent] = record.joint_action[:agent]
                 deliberation = Deliberation(
-                    agent, known, prediction, team.learner.theta, frequencies, rng
+                    agent, known, prediction, team.only(FuzzyAgents).learner.theta, frequencies, rng
                 )
                 drawn = np.array([reference.values(deliberation) for reference in references])
                 exact = drawn.mean(axis=0)

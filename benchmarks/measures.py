@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.numerics import FloatArray
 
 from .baselines import Baselines
@@ -122,7 +123,7 @@ def large(kind: str, n_agents: int, budget: float) -> Row:
     row: Row = {f"{name}_ms": 1e3 * times.median(name) for name in times.seconds}
     total = sum(row.values())
     return {
-        "rule_base": kind, "agents": n_agents, "evaluator": type(moment.team.evaluator).__name__,
+        "rule_base": kind, "agents": n_agents, "evaluator": type(moment.team.only(FuzzyAgents).evaluator).__name__,
         **row, "total_ms": total, "us_per_agent": 1e3 * total / n_agents,
         "bytes_per_agent": memory_per_agent(moment),
     }  # fmt: skip

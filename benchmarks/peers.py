@@ -12,6 +12,7 @@ from time import thread_time
 from typing import Any
 
 import numpy as np
+from acting import joint_of
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
@@ -54,7 +55,7 @@ def updates(rounds: int) -> dict[str, list[float]]:
         for name, (scenario, team, states) in teams.items():
             buffer = team.parts["all"].model.rollout_buffer
             while not buffer.full:
-                team.act(team.predict(scenario, states))
+                joint_of(team, scenario, states)
                 team.learn(transition := scenario.step(np.zeros(UPDATED, dtype=int)))
                 states = transition.states
             begun = thread_time()

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Prediction
@@ -61,7 +62,7 @@ class Moment:
 
     def learn(self) -> None:
         """Make one TD update of all agents."""
-        learner = self.team.learner
+        learner = self.team.only(FuzzyAgents).learner
         assert isinstance(learner, TDLambda)
         self._side = 1 - getattr(self, "_side", 0)
         learner.observe(self.states[self._side], float(self.rewards[self._side]), False)
@@ -94,7 +95,7 @@ def situation(
     for _ in range(SETTLING):
         taken = scenario.step(rng.integers(len(scenario.action_set), size=n_agents))
         history.append((taken.states, taken.reward))
-    theta = team.learner.theta
+    theta = team.only(FuzzyAgents).learner.theta
     for row in theta:
         row[:] = rng.normal(scale=0.01, size=row.shape)
     states = np.array([states for states, _ in history[-2:]])

@@ -21,6 +21,7 @@ from itertools import product
 
 import numpy as np
 
+from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.coordination.graphs import Elimination, MaxPlus, Scope
 from nested_agents.core.interface.prediction import Prediction
@@ -49,8 +50,10 @@ def tables_of(
         joint = np.full((len(tried), len(scopes)), team.action_set.neutral)
         joint[:, list(scope)] = tried
         states = prediction.states(i, joint)
-        theta = team.learner.theta[team.rows[i]]
-        tables.append(team.evaluator.rules.values(theta, states).reshape((a,) * len(scope)))
+        theta = team.only(FuzzyAgents).learner.theta[team.only(FuzzyAgents).rows[i]]
+        tables.append(
+            team.only(FuzzyAgents).evaluator.rules.values(theta, states).reshape((a,) * len(scope))
+        )
     return tables
 
 

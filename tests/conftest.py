@@ -15,12 +15,12 @@ import pytest
 from hypothesis import settings
 
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.prediction import Blocks
-from nested_agents.core.interface.scenario import Transition
+from nested_agents.core.interface.prediction import Blocks, Prediction, Tables
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parent)]
 
 # The first example of a test may compile a kernel.
 settings.register_profile("no deadline", deadline=None)
@@ -46,7 +46,7 @@ def permuted() -> Callable[[Hierarchy, Sequence[int]], Hierarchy]:
     return of
 
 
-class LineWorld:
+class LineWorld(Scenario):
     """Carts on a line that together push a load towards a goal.
 
     Agents are wheels, ``wheels`` to a cart. An agent's own variables are the speed of its wheel
@@ -95,6 +95,10 @@ class LineWorld:
     def measure(self) -> dict[str, float]:
         return {"distance_m": abs(self.gap)}
 
+    def present(self) -> np.ndarray:
+        """The states that the agents are in."""
+        return self._states(self.speeds[None], self.phases[None], np.array([self.gap]))[0]
+
     def after(self, joint: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Speeds ``(m, n)``, phases ``(m, carts)`` and gaps ``(m,)`` after joint actions."""
         n = len(self.agents)
@@ -111,7 +115,7 @@ class LineWorld:
         return np.stack([speeds, rolled, np.broadcast_to(gaps[:, None], speeds.shape)], axis=2)
 
 
-class LinePrediction:
+class LinePrediction(Prediction, Tables):
     """Exact predictions of a line world's next step."""
 
     def __init__(self, world: LineWorld) -> None:
@@ -123,6 +127,9 @@ class LinePrediction:
 
     def rewards(self, joint_actions: np.ndarray) -> np.ndarray:
         return self.world.reward(self.world.after(joint_actions)[2])
+
+    def tables(self) -> "LinePrediction":
+        return self
 
     def blocks(self, agent: int) -> Blocks:
         w, a = self.world.shape[1], self.n_actions

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..interface.experience import Experience, Observation
+from ..interface.plain import as_prediction
 from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..plugins.settings import PartSettings
@@ -75,7 +76,7 @@ class Foresight:
         if self.predictor is not None:
             return self.predictor.predict(seen.present)
         if self.self_model is None and self.calibration is None:
-            return seen.scenario.predict()
+            return as_prediction(seen.scenario.predict())
         bodies = seen.scenario.embodiment()
         if bodies is None:
             raise ValueError("learner.self_model, calibration: the scenario has no bodies")

@@ -22,6 +22,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..interface.plain import as_prediction, as_scenario
 from ..interface.prediction import (
     Blocks,
     EmbodiedPrediction,
@@ -39,7 +40,7 @@ MOST_ACTIONS = {"body": 4**4, "team": 4**6}
 """The most actions of a body, those of four wheels, and of a team."""
 
 
-def join_agents(scenario: Scenario, agents: Granularity) -> Scenario:
+def join_agents(scenario: object, agents: Granularity) -> Scenario:
     """Return a scenario as one of an agent for each of these; with ``actuator`` as it is.
 
     Raises
@@ -47,7 +48,8 @@ def join_agents(scenario: Scenario, agents: Granularity) -> Scenario:
     ValueError
         As `joint_blocks`.
     """
-    return scenario if agents == "actuator" else JointAgents(scenario, agents)
+    world = as_scenario(scenario)
+    return world if agents == "actuator" else JointAgents(world, agents)
 
 
 def joint_blocks(
@@ -164,7 +166,7 @@ class JointAgents(Scenario):
 
     def predict(self) -> JointPrediction | None:
         """Predict from the present state, if the scenario does."""
-        prediction = self.scenario.predict()
+        prediction = as_prediction(self.scenario.predict())
         return None if prediction is None else JointPrediction(prediction, self)
 
     def embodiment(self) -> Embodiment | None:

@@ -51,8 +51,9 @@ class Scheduled(Settings):
 
     @property
     def named(self) -> tuple[str, ...]:
-        """What it names, by name, pattern or number."""
-        return ()
+        """What it names, by name, pattern or number: its field called `part`."""
+        names: tuple[str, ...] = dict(self)[self.part]
+        return names
 
     def lasts(self, episode: int, step: int) -> bool:
         """Return whether it is on at a step of an episode."""
@@ -128,11 +129,6 @@ class MessageFailure(Scheduled):
         written = self.model_dump(exclude={"kind", "agents"}, exclude_defaults=True).items()
         rest = "".join(f", {key} {value}" for key, value in written)
         return f"{self.kind or 'failing'}: {', '.join(self.agents)}{rest}"
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """The agents that it names."""
-        return self.agents
 
     @property
     def memory(self) -> int:

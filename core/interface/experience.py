@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..numerics import FloatArray, IntArray
+from .plain import as_prediction
 from .prediction import Prediction
 from .scenario import Scenario, Transition
 
@@ -33,7 +34,7 @@ class Observation(NamedTuple):
         ValueError
             If it predicts nothing.
         """
-        prediction = self.imagined or self.scenario.predict()
+        prediction = self.imagined or as_prediction(self.scenario.predict())
         if prediction is None:
             raise ValueError(f"the scenario {type(self.scenario).__name__} predicts nothing")
         return prediction.states(agent, joint_actions)

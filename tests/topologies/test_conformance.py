@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from acting import fuzzy
 from pydantic import TypeAdapter
 
 from nested_agents.core.agents.joint import join_agents
@@ -80,15 +81,15 @@ def test_it_acts_learns_saves_and_loads(case: tuple[LineUp, Hierarchy], tmp_path
     joint_actions = steps(scenario, team)
     assert np.shape(joint_actions) == (4, len(hierarchy))
     assert {a for joint in joint_actions for a in joint} <= set(range(4))
-    assert np.isfinite(team.learner.theta).all()
-    assert (np.abs(team.learner.theta).sum(axis=1) > 0).all()  # every agent learned
-    assert team.evaluator is not None
-    assert team.evaluator.counts.joint_actions == 4 * hierarchy.joint_actions(4)
+    assert np.isfinite(fuzzy(team).learner.theta).all()
+    assert (np.abs(fuzzy(team).learner.theta).sum(axis=1) > 0).all()  # every agent learned
+    assert fuzzy(team).evaluator is not None
+    assert fuzzy(team).evaluator.counts.joint_actions == 4 * hierarchy.joint_actions(4)
     team.save(tmp_path / "team.npz")
     other = team_of(scenario, hierarchy)
     other.load(tmp_path / "team.npz")
     assert steps(scenario, other, 2) == steps(scenario, team, 2)
-    assert (other.learner.theta == team.learner.theta).all()
+    assert (fuzzy(other).learner.theta == fuzzy(team).learner.theta).all()
 
 
 def test_listing_the_agents_otherwise_changes_nothing_but_the_order(
@@ -126,10 +127,12 @@ def predicted(scenario: LineUp, rng: np.random.Generator):
 def decided_values(team: Team, theta: np.ndarray, prediction) -> np.ndarray:
     """The values of every agent's actions, everyone above it doing nothing."""
     n = len(team.hierarchy)
-    assert team.evaluator is not None
+    assert fuzzy(team).evaluator is not None
     neutral = np.full(n, team.action_set.neutral)
     known = prediction, theta, np.full((n, 4), 0.25), np.random.default_rng(0)
-    return np.array([team.evaluator.values(Deliberation(i, neutral, *known)) for i in range(n)])
+    return np.array(
+        [fuzzy(team).evaluator.values(Deliberation(i, neutral, *known)) for i in range(n)]
+    )
 
 
 @pytest.mark.parametrize("n", [2, 4])
@@ -139,7 +142,7 @@ def test_the_single_agent_acts_learns_saves_and_loads(n: int, tmp_path: Path) ->
     team = Team(LEARNER, scenario, hierarchy, policy_seed(0))
     joint_actions = steps(scenario, team)
     assert max(map(max, joint_actions)) < 4**n
-    assert np.abs(team.learner.theta).sum() > 0
+    assert np.abs(fuzzy(team).learner.theta).sum() > 0
     team.save(tmp_path / "team.npz")
     other = Team(LEARNER, scenario, hierarchy, policy_seed(1))
     other.load(tmp_path / "team.npz")
@@ -168,7 +171,9 @@ def test_agents_that_are_not_seen_maintain() -> None:
     maintain = scenario.action_set.neutral
     hierarchy = Hierarchy(scenario.agents, [("cart1", "cart2")])  # cart3, cart4 unseen by both
     team = team_of(scenario, hierarchy)
-    team.learner.theta[:] = 1.0  # with all weights zero nothing would be asked of the prediction
+    fuzzy(team).learner.theta[:] = (
+        1.0  # with all weights zero nothing would be asked of the prediction
+    )
     scenario.reset(0)
     prediction = scenario.predict()
     joint = team.act(prediction)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.adaptation.learned_predictor import LearnedPredictor
 from nested_agents.core.adaptation.predictors import (
@@ -228,7 +229,10 @@ def test_a_restored_team_goes_on_to_the_same_bits() -> None:
     begun = episodes(Rails(), first, 2)
     second.restore({name: array.copy() for name, array in first.arrays().items()})
     assert begun + episodes(Rails(), second, 2, first_episode=2) == every
-    assert np.array_equal(whole.predictor.memory["weights"], second.predictor.memory["weights"])  # type: ignore[union-attr]
+    assert np.array_equal(
+        fuzzy(whole).foresight.predictor.memory["weights"],
+        fuzzy(second).foresight.predictor.memory["weights"],
+    )  # type: ignore[union-attr]
 
 
 def test_more_bodies_go_on_with_what_fewer_have_learned() -> None:

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from acting import fuzzy, joint_of
 
 from nested_agents.core.adaptation.predictors import Mirror
 from nested_agents.core.agents.team import Team
@@ -64,16 +65,22 @@ def test_left_and_right_wheels_learn_the_same_function_in_the_mirror() -> None:
     scenario.reset(0)
     team.begin_episode()
     for _ in range(12):
-        team.learn(scenario.step(team.act(team.predict(scenario))))
+        team.learn(scenario.step(joint_of(team, scenario)))
     team.end_episode()
-    assert team.learner.theta.shape[0] == 2
+    assert fuzzy(team).learner.theta.shape[0] == 2
     rng = np.random.default_rng(0)
     variables = scenario.state_space.variables
     states = rng.uniform(
         [v.low for v in variables], [v.high for v in variables], (50, len(variables))
     )
-    rules, theta = team.evaluator.problem.rules, team.learner.theta
-    left, right = rules.values(theta[0], states), rules.values(theta[1], team.mirror.signs * states)
+    rules, theta = (
+        fuzzy(team).evaluator.problem.rules,
+        fuzzy(team).learner.theta,
+    )
+    left, right = (
+        rules.values(theta[0], states),
+        rules.values(theta[1], fuzzy(team).mirror.signs * states),
+    )
     assert np.abs(left).max() > 0
     np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-12)
 

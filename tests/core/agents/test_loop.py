@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.joint import Granularity, JointPrediction, join_agents
@@ -17,7 +18,8 @@ from nested_agents.core.agents.loop import StepRecord, control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.scenario import EmbodiedScenario, Scenario
+from nested_agents.core.interface.plain import as_prediction
+from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
@@ -155,12 +157,12 @@ def test_evaluation_leaves_what_was_learned_alone(settings, world) -> None:
     team = team_of(world, settings)
     run(world, team)
     before = {k: v.copy() for k, v in team.arrays().items() if k != "generator"}
-    updates = team.evaluator.counts.weight_updates
+    updates = fuzzy(team).evaluator.counts.weight_updates
     assert updates > 0
     run(world, team, learn=False)
     after = team.arrays()
     assert all((after[k] == v).all() for k, v in before.items())
-    assert team.evaluator.counts.weight_updates == updates
+    assert fuzzy(team).evaluator.counts.weight_updates == updates
 
 
 def test_a_team_learns_to_push(line_world) -> None:
@@ -248,9 +250,9 @@ def test_a_team_of_one_acts_and_learns(pair) -> None:
     team = Team(settings, single, Hierarchy(["single"], []), np.random.SeedSequence(1))
     records = list(control_loop(single, team, episodes=2, steps=5, seed=1))
     assert len(records) == 10
-    assert team.learner.theta.shape == (1, 2**6)
-    assert np.abs(team.learner.theta).max() > 0
-    assert team.evaluator.counts.joint_actions == 10 * 16
+    assert fuzzy(team).learner.theta.shape == (1, 2**6)
+    assert np.abs(fuzzy(team).learner.theta).max() > 0
+    assert fuzzy(team).evaluator.counts.joint_actions == 10 * 16
 
 
 class Bare:
@@ -259,6 +261,17 @@ class Bare:
     def __init__(self, prediction, *names: str) -> None:
         for name in ("states", *names):
             setattr(self, name, getattr(prediction, name))
+
+
+def capabilities(prediction) -> set[str]:
+    """What a prediction knows beside next states."""
+    tables = prediction.tables()
+    known = {
+        "rewards": prediction.rewards(np.zeros((1, 2), dtype=int)) is not None,
+        "blocks": tables is not None,
+        "reward_table": tables is not None and tables.rewarded,
+    }
+    return {name for name, is_known in known.items() if is_known}
 
 
 @pytest.mark.parametrize(
@@ -275,13 +288,13 @@ def test_predictions_can_do_what_the_scenarios_can(
     for agents, expected in (("body", of_robots), ("team", of_one)):
         scenario = join_agents(line_world(2, 1), agents)
         scenario.reset(0)
-        found = JointPrediction(Bare(scenario.scenario.predict(), *names), scenario)
-        assert {n for n in ("rewards", "blocks", "reward_table") if hasattr(found, n)} == expected
+        plain = as_prediction(Bare(scenario.scenario.predict(), *names))
+        assert capabilities(JointPrediction(plain, scenario)) == expected
 
 
 def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
     world, robots = line_world(2, 2), join_agents(line_world(2, 2), "body")
-    assert not isinstance(robots, EmbodiedScenario)
+    assert robots.embodiment() is None
     assert robots.agents == ("cart0", "cart1")
     assert len(robots.action_set) == 16
     assert robots.action_set.names[robots.action_set.neutral] == "maintain+maintain"
@@ -348,11 +361,11 @@ def test_both_evaluators_and_a_self_model_work_on_it() -> None:
         hierarchy = build("chain", scenario.agents)
         assert hierarchy.edges == ((0, 1),)
         team = Team(learner, scenario, hierarchy, policy_seed(0))
-        nominal = team.self_model.effects[0].copy()
+        nominal = fuzzy(team).foresight.self_model.effects[0].copy()
         for record in control_loop(scenario, team, episodes=2, steps=8, seed=0):
             assert record.joint_action.shape == (2,)
-        assert (team.self_model.effects[0] != nominal).any()
-        weights.append(team.learner.theta)
+        assert (fuzzy(team).foresight.self_model.effects[0] != nominal).any()
+        weights.append(fuzzy(team).learner.theta)
     assert all(np.abs(theta).sum() > 0.0 for theta in weights)
 
 

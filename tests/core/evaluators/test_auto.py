@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.best_response import BestResponse
@@ -19,7 +20,7 @@ def test_auto_goes_by_size(carts: int, teammates: str, line_world) -> None:
     decision = Decision(teammates=teammates)
     team = Team(FrozenSettings(decision=decision), world, chain, np.random.SeedSequence(1))
     many = BestResponse if teammates == "best-response" else Sampling
-    assert type(team.evaluator) is {2: ExactEnumeration, 5: Sampling, 8: many}[carts]
+    assert type(fuzzy(team).evaluator) is {2: ExactEnumeration, 5: Sampling, 8: many}[carts]
 
 
 @pytest.mark.parametrize("name", ["moments", "extremes"])

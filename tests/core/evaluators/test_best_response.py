@@ -22,6 +22,7 @@ from nested_agents.core.evaluators.evaluator import (
     concerned,
 )
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.numerics import FloatArray
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
@@ -30,6 +31,13 @@ A = 4
 NEUTRAL = 2
 VALUES_OF = ("own", "below", "team")
 EDGES = {"chain": ["ab", "bc", "cd"], "tree": ["ab", "ac", "bd"], "apart": []}
+
+
+class Paid(Prediction):
+    """Predicts rewards alone."""
+
+    def states(self, agent: int, joint_actions: np.ndarray) -> np.ndarray:
+        raise AssertionError("asked for states")
 
 
 def problem_of(world, rules, name, value_of: ValueOf, rule: Rule = "value") -> DecisionProblem:
@@ -116,7 +124,7 @@ def test_what_half_a_team_must_do_together_is_found(line_world) -> None:
         rules, hierarchy, A, world.groups, "reward", "best-response", 0.9, "team"
     )
 
-    class Apart:
+    class Apart(Paid):
         def rewards(self, joint: np.ndarray) -> np.ndarray:
             halves = (joint[:, :6] == 1).all(axis=1) & (joint[:, 6:] == 0).all(axis=1)
             return np.where(halves, 1.0, -0.1 * (joint != NEUTRAL).sum(axis=1))
@@ -133,7 +141,7 @@ def test_agents_below_answer_to_what_is_decided_above(world, rules) -> None:
     # The reward asks agent 3 to do as agent 0 does, whatever that is.
     problem = problem_of(world, rules, "chain", "team", "reward")
 
-    class Alike:
+    class Alike(Paid):
         def rewards(self, joint: np.ndarray) -> np.ndarray:
             return (joint[:, 3] == joint[:, 0]).astype(float)
 
@@ -147,11 +155,14 @@ def test_agents_below_answer_to_what_is_decided_above(world, rules) -> None:
         assert joint[3] == first
 
 
-class Remembered:
+class Remembered(Prediction):
     """A prediction that leads to the same states whatever is done."""
 
     def __init__(self, states: FloatArray) -> None:
-        self.states = lambda agent, joint_actions: states[agent]
+        self.known = states
+
+    def states(self, agent: int, joint_actions: np.ndarray) -> np.ndarray:
+        return self.known[agent]
 
 
 @pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
@@ -193,8 +204,8 @@ def test_other_teammate_models_are_refused(world, rules) -> None:
         BestResponse(DecisionProblem(**fields))
 
 
-class InStep:
-    """Rewards every pair of neighbouring agents that do the same; predicts nothing."""
+class InStep(Paid):
+    """Rewards every pair of neighbouring agents that do the same."""
 
     def rewards(self, joint: np.ndarray) -> np.ndarray:
         return (joint[:, 1:] == joint[:, :-1]).mean(axis=1)

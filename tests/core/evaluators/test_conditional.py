@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
@@ -28,7 +29,7 @@ def test_values_are_means_by_what_was_seen_with_the_same_own_action():
         for i in range(3):
             for j in range(3):
                 counts[i, joint[i], j, joint[j]] += 1.0
-    assert (team.given == counts).all()
+    assert (fuzzy(team).given == counts).all()
     given = counts[0] / counts[0].sum(axis=2, keepdims=True)
     captured = {}
 
@@ -36,14 +37,17 @@ def test_values_are_means_by_what_was_seen_with_the_same_own_action():
         captured.setdefault(deliberation.agent, (deliberation, original(deliberation)))
         return captured[deliberation.agent][1]
 
-    original, team.evaluator.values = team.evaluator.values, values
+    original = fuzzy(team).evaluator.values
+    fuzzy(team).evaluator.values = values
     prediction = scenario.predict()
-    team.act(prediction, explore=False)
+    joint_of(team, scenario, explore=False)
     deliberation, found = captured[0]
     assert (deliberation.given == given).all()
     for a in range(4):
         joint = np.array([[a, b, c] for b in range(4) for c in range(4)])
-        each = team.evaluator.rules.values(team.learner.theta[0], prediction.states(0, joint))
+        each = fuzzy(team).evaluator.rules.values(
+            fuzzy(team).learner.theta[0], prediction.states(0, joint)
+        )
         p = np.array([given[a, 1, b] * given[a, 2, c] for b in range(4) for c in range(4)])
         assert found[a] == pytest.approx(p @ each)
 
@@ -54,8 +58,8 @@ def test_it_is_saved_and_loaded(tmp_path):
     team.save(tmp_path / "team.npz")
     other = team_of()[1]
     other.load(tmp_path / "team.npz")
-    assert (other.given == team.given).all()
-    assert other.given.sum() > 3 * 4 * 3 * 4
+    assert (fuzzy(other).given == fuzzy(team).given).all()
+    assert fuzzy(other).given.sum() > 3 * 4 * 3 * 4
 
 
 def test_sampling_refuses_it():
@@ -66,13 +70,13 @@ def test_sampling_refuses_it():
 def test_neighbours_consider_each_other_and_are_told_nothing():
     scenario, team = team_of(topology="simultaneous")
     seen = []
-    original = team.evaluator.values
+    original = fuzzy(team).evaluator.values
 
     def values(deliberation):
         seen.append(deliberation.joint_action.tolist())
         return original(deliberation)
 
-    team.evaluator.values = values
+    fuzzy(team).evaluator.values = values
     scenario.reset(0)
-    team.act(scenario.predict())
+    joint_of(team, scenario)
     assert seen == [[2, 2, 2]] * 3

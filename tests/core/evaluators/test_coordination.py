@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
@@ -32,7 +33,7 @@ def test_the_team_takes_the_joint_action_of_the_greatest_sum(evaluator, topology
     rng = np.random.default_rng(0)
     for seed in range(5):
         scenario.reset(seed)
-        team.learner.theta[:] = rng.normal(size=team.learner.theta.shape)
+        fuzzy(team).learner.theta[:] = rng.normal(size=fuzzy(team).learner.theta.shape)
         prediction = scenario.predict()
         joint = np.array(list(product(range(4), repeat=4)))
         sums = np.zeros(len(joint))
@@ -41,8 +42,8 @@ def test_the_team_takes_the_joint_action_of_the_greatest_sum(evaluator, topology
             scope = [i, *team.hierarchy.below(i)]
             supposed[:, scope] = joint[:, scope]
             states = prediction.states(i, supposed)
-            sums += team.evaluator.rules.values(team.learner.theta[i], states)
-        taken = team.act(prediction, explore=False)
+            sums += fuzzy(team).evaluator.rules.values(fuzzy(team).learner.theta[i], states)
+        taken = joint_of(team, scenario, explore=False)
         place = np.flatnonzero((joint == taken).all(axis=1))[0]
         assert sums[place] == pytest.approx(sums.max(), abs=1e-9)
 
@@ -53,8 +54,7 @@ def test_agents_who_are_told_nothing_agree_on_one_of_two_optima(evaluator):
     scenario, team = team_of(evaluator, carts=6)
     list(control_loop(scenario, team, episodes=1, steps=10, seed=0))
     scenario.reset(1)  # at rest: to maintain and to make zero come to the same
-    prediction = scenario.predict()
-    assert len({tuple(team.act(prediction, explore=False)) for _ in range(20)}) == 1
+    assert len({tuple(joint_of(team, scenario, explore=False)) for _ in range(20)}) == 1
 
 
 @pytest.mark.parametrize("evaluator", KINDS)

@@ -19,7 +19,7 @@ from nested_agents.core.evaluators.enumeration import (
 )
 from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation, Rule, Teammates
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.interface.prediction import Blocks, Prediction, Tables
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
@@ -52,31 +52,34 @@ def problem_of(
     return DecisionProblem(rules, hierarchy, A, alone, rule, teammates, DISCOUNT)
 
 
-class Tabled:
+class Tabled(Prediction, Tables):
     """A prediction without any structure: random next states and rewards by joint action."""
 
     def __init__(self, states: np.ndarray, rewards: np.ndarray) -> None:
-        self.table, self.rewarded = states, rewards  # (n, A ** n, d), (A ** n,)
+        self.table, self.paid = states, rewards  # (n, A ** n, d), (A ** n,)
         self.places = A ** np.arange(len(states) - 1, -1, -1)
 
     def states(self, agent: int, joint_actions: np.ndarray) -> np.ndarray:
         return self.table[agent, joint_actions @ self.places]
 
     def rewards(self, joint_actions: np.ndarray) -> np.ndarray:
-        return self.rewarded[joint_actions @ self.places]
+        return self.paid[joint_actions @ self.places]
+
+    def tables(self) -> "Tabled":
+        return self
 
     def blocks(self, agent: int) -> Blocks:
         own = np.zeros((1, 0))
         return Blocks(own, np.ascontiguousarray(self.table[agent]), 1)
 
     def reward_table(self) -> np.ndarray:
-        return self.rewarded
+        return self.paid
 
     def permuted(self, permutation: list[int]) -> "Tabled":
         """The same world with agent ``permutation[k]`` listed as k-th."""
         n = len(permutation)
         indices = np.arange(A**n).reshape((A,) * n).transpose(permutation).ravel()
-        return Tabled(self.table[permutation][:, indices], self.rewarded[indices])
+        return Tabled(self.table[permutation][:, indices], self.paid[indices])
 
 
 class NoTables(Tabled):

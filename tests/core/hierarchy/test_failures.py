@@ -40,7 +40,7 @@ def test_all_that_is_told_arrives_unless_something_fails() -> None:
 def test_those_who_are_silent_are_not_heard_and_act_on() -> None:
     made = messages(LostMessages(agents=["a", "c"]))
     assert heard(made, 3) == {1: 1}
-    assert not made.is_absent(0)
+    assert not made.absent(np.arange(4)).size
     assert made.failures
 
 
@@ -69,11 +69,13 @@ def test_noise_alters_what_is_said_by_whom_it_befalls_alone() -> None:
 
 def test_who_is_absent_says_nothing() -> None:
     made = messages(AbsentAgents(agents="a", episode=1, end_episode=2))
-    assert (made.is_absent(0), len(heard(made, 3))) == (False, 3)
+    every = np.arange(4)
+    assert (made.absent(every).tolist(), len(heard(made, 3))) == ([], 3)
     made.begin(5, episode=1)
-    assert (made.is_absent(0), made.is_absent(1), heard(made, 1)) == (True, False, {})
+    assert (made.absent(every).tolist(), made.absent(every[1:]).tolist()) == ([0], [])
+    assert heard(made, 1) == {}
     made.begin(5, episode=2)
-    assert not made.is_absent(0)
+    assert not made.absent(every).size
 
 
 def test_who_has_another_superior_is_told_by_that_one_and_those_above_it() -> None:

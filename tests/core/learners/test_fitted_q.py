@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.experience import Experience, Observation
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import REWARD_SCALE
 from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
@@ -31,7 +33,7 @@ def feed(
     learner.begin_episode()
     for t, (left, joint_action) in enumerate(zip(lefts, acts, strict=True)):
         last = end and t == len(acts) - 1
-        learner.observe(left, float(paid[t]), last, left=left, joint_action=joint_action)
+        learner.observe_decision(left, joint_action, left, float(paid[t]), last)
     learner.end_episode()
 
 
@@ -120,10 +122,13 @@ def told_in(team: Team, decisions: int = 20) -> tuple[np.ndarray, np.ndarray]:
     told, did = [], []
     team.begin_world(0, 0)
     team.begin_episode()
+    previous = None
     for _ in range(decisions):
-        team.predict(None, np.zeros((3, 1)))
-        did.append(team.act(None))
-        told.append(team._left[:, 1:].copy())
+        seen = Observation(np.zeros((3, 1)), fuzzy(team).scenario, previous)
+        decision = team.act(seen)
+        previous = decision.joint_action
+        did.append(previous)
+        told.append(decision.inputs[0].left[:, 1:].copy())
     return np.array(told), np.array(did)
 
 
@@ -166,12 +171,12 @@ def test_who_is_told_learns_a_best_reply_and_who_is_not_does_not() -> None:
         for episode in range(10):
             states = game.reset(episode)
             both.begin_episode()
-            for _ in range(20):
-                both.predict(game, states)
-                both.act(None)
-                both.learn(game.step(both._last))
-            both.end_episode()
-        plays = [both.act(None, explore=False) for _ in range(20)]
+            seen = Observation(states, game)
+            for play in range(20):
+                decision = both.act(seen)
+                transition = game.step(decision.joint_action)
+                both.learn(Experience(seen, decision, transition, play == 19))
+        plays = [both.act(seen, explore=False).joint_action for _ in range(20)]
         reached.append(np.mean([a != b for a, b in plays]))
     assert reached[0] == 1.0
     assert reached[1] < 1.0
@@ -207,11 +212,11 @@ def test_neighbours_are_refused_as_they_tell_nothing() -> None:
 def test_a_team_goes_on_with_all_it_has_learned_unless_others_tell_it_something() -> None:
     former, later = team(chain()), team(chain())
     told_in(former)
-    former.learner.theta[:] = 1.0
-    later.continue_from(former, np.arange(3))
-    assert (later.learner.theta == 1.0).all()
+    fuzzy(former).learner.theta[:] = 1.0
+    later.continue_from(former)
+    assert (fuzzy(later).learner.theta == 1.0).all()
     with pytest.raises(ValueError, match="told by 1 fewer others than when it learned"):
-        team(chain(told="parents")).continue_from(former, np.arange(3))
+        team(chain(told="parents")).continue_from(former)
 
 
 def test_a_topology_that_says_whom_agents_consider_is_remarked_on() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import Transition
@@ -148,9 +149,9 @@ def test_policies_of_probabilities_are_evaluated_by_sampled_actions_too() -> Non
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     session = Session(trials_of(spec_of())[0])
     session.train(1)
-    state = session.team.rng.bit_generator.state
+    state = fuzzy(session.team).rng.bit_generator.state
     session.run_other_evaluations()
-    assert session.team.rng.bit_generator.state == state
+    assert fuzzy(session.team).rng.bit_generator.state == state
     phases = [row.phase for row in session.result().rows]
     assert phases == ["training", "evaluation:sampled actions", "evaluation:sampled actions"]
 

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
@@ -112,28 +113,28 @@ def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:
             LEARNERS.model("mine.py:MonteCarlo").model_validate(settings.model_dump()) == settings
         )
         team, restored = team_of(settings, world), team_of(settings, world)
-    rewarded = np.zeros_like(team.learner.theta)
+    rewarded = np.zeros_like(fuzzy(team).learner.theta)
     for record in control_loop(world, team, episodes=2, steps=4, seed=3):
         assert record.joint_action.tolist() == [0, 0]  # the least of 0, 0, 0, 1
-        features = team.learner.rules.features(record.transition.states)  # type: ignore[attr-defined]
+        features = fuzzy(team).learner.rules.features(record.transition.states)  # type: ignore[attr-defined]
         rewarded += 0.25 * record.transition.reward * features
-    assert team.learner.theta == pytest.approx(rewarded, rel=0, abs=1e-15)
-    assert team.explorer.memory.tolist() == [8, 8]
-    assert team.evaluator.counts.joint_actions == 16
-    assert team.act(world.predict(), explore=False).tolist() == [3, 3]
+    assert fuzzy(team).learner.theta == pytest.approx(rewarded, rel=0, abs=1e-15)
+    assert fuzzy(team).explorer.memory.tolist() == [8, 8]
+    assert fuzzy(team).evaluator.counts.joint_actions == 16
+    assert joint_of(team, world, explore=False).tolist() == [3, 3]
     team.save(tmp_path / "team.npz")
     restored.load(tmp_path / "team.npz")
-    assert (restored.learner.theta == team.learner.theta).all()
+    assert (fuzzy(restored).learner.theta == fuzzy(team).learner.theta).all()
 
 
 def test_values_of_other_than_all_actions_are_refused(line_world) -> None:
     world = line_world(carts=2, wheels=1)
     team = team_of(BatchTDSettings(), world)
-    team.evaluator = SimpleNamespace(values=lambda deliberation: np.zeros(2))
+    fuzzy(team).evaluator = SimpleNamespace(values=lambda deliberation: np.zeros(2))
     team.begin_episode()
     world.reset(0)
     with pytest.raises(ValueError, match=r"^the evaluator gave 2 values of 4 actions$"):
-        team.act(world.predict())
+        joint_of(team, world)
 
 
 @pytest.mark.parametrize("name", ["auto", "exact", "sampling"])
@@ -145,7 +146,7 @@ def test_a_scenario_of_few_members_is_learned(name: str, agents, line_world) -> 
     team = team_of(settings, seen)
     records = list(control_loop(seen, team, episodes=2, steps=5, seed=0))
     assert len(records) == 10
-    assert team.learner.theta.any()
+    assert fuzzy(team).learner.theta.any()
 
 
 @pytest.mark.parametrize("agents", ["actuator", "body", "team"])

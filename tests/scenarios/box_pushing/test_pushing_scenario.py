@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.learners.td import QLearning
 from nested_agents.scenarios.box_pushing.config import PushingPointsSettings
@@ -45,9 +46,9 @@ def test_states_hold_the_situation_and_who_chose_what() -> None:
 def test_presets_learn_it_by_q_learning(observed: str, edges: int, rules: int) -> None:
     (condition,) = Spec.of({"scenario": {**SCENARIO, "observed": observed}}).conditions()
     _, _, team = arrange(condition.settings, 0)
-    assert isinstance(team.learner, QLearning)
+    assert isinstance(fuzzy(team).learner, QLearning)
     assert len(team.hierarchy.edges) == edges
-    assert team.learner.theta.shape == (2, rules)
+    assert fuzzy(team).learner.theta.shape == (2, rules)
 
 
 def test_what_is_learned_on_a_square_is_evaluated_on_other_boxes() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.loop import control_loop, policy_seed
@@ -29,7 +30,7 @@ def test_teams_of_one_to_four_robots_act_and_learn(robots: int, space: str) -> N
     for record in control_loop(scenario, team, episodes=1, steps=4, seed=0):
         assert record.states.shape == (2 * robots, scenario.state_space.n_variables)
         assert np.isfinite(record.transition.states).all()
-    assert np.any(team.learner.theta != 0)
+    assert np.any(fuzzy(team).learner.theta != 0)
 
 
 def test_equal_seeds_give_equal_episodes() -> None:
@@ -91,7 +92,10 @@ def test_a_team_finds_out_that_a_wheel_has_seized() -> None:
     team = Team(settings, scenario, hierarchy, policy_seed(0))
     for _ in control_loop(scenario, team, episodes=2, steps=40, seed=0):
         pass
-    found, nominal = team.self_model.effects[0][0, :4], scenario.nominal_effects[0][0, :4]
+    found, nominal = (
+        fuzzy(team).foresight.self_model.effects[0][0, :4],
+        scenario.nominal_effects[0][0, :4],
+    )
     assert abs(found[0]) < 0.3 * nominal[0]
     assert (found[1:] > 0.5 * nominal[1:]).all()
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from acting import fuzzy
 from PIL import Image
 
 import nested_agents as na
@@ -135,8 +136,8 @@ def test_a_self_model_finds_the_locked_joint() -> None:
     team = na.Team(learner, scenario, hierarchy, na.policy_seed(0))
     for _ in na.control_loop(scenario, team, episodes=1, steps=60, seed=0):
         pass
-    assert team.self_model is not None
-    turning = [effect[2, 0] for effect in team.self_model.effects]
+    assert fuzzy(team).foresight.self_model is not None
+    turning = [effect[2, 0] for effect in fuzzy(team).foresight.self_model.effects]
     assert turning == pytest.approx([1.0, 1.0, 0.0, 1.0], abs=0.15)
 
 
@@ -211,7 +212,7 @@ def test_it_learns_from_zero_weights_without_further_keys() -> None:
         {"seeds": [0], "episodes": 10, "evaluation": 10, "scenario": {"kind": "kinematic-chain"}}
     )
     session = na.Session(trials_of(spec)[0])
-    assert not session.team.learner.theta.any()
+    assert not fuzzy(session.team).learner.theta.any()
     session.train(10)
     session.evaluate()
     evaluated = [row for row in session.result().rows if row.phase == "evaluation"]

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.loop import policy_seed, world_seed
 from nested_agents.core.agents.team import Team
@@ -22,15 +23,19 @@ def decisions(settings, number, *, explore=True, weights="role", backwards=False
     learner = BatchTDSettings(decision=DECISION, weights=weights)
     hierarchy = Hierarchy(scenario.agents, list(pairwise(order)))
     team = Team(learner, scenario, hierarchy, policy_seed(0))
-    theta = team.learner.theta
+    theta = fuzzy(team).learner.theta
     theta[:] = np.random.default_rng(1).normal(scale=0.01, size=theta.shape)
     scenario.reset(world_seed(0, 0), 0)
     team.begin_episode()
     taken = []
     for _ in range(number):
-        taken.append(team.act(team.predict(scenario), explore=explore).copy())
+        taken.append(joint_of(team, scenario, explore=explore).copy())
         scenario.step(taken[-1])
-    return np.array(taken), team.rng.random(), team.evaluator.counts.joint_actions
+    return (
+        np.array(taken),
+        fuzzy(team).rng.random(),
+        fuzzy(team).evaluator.counts.joint_actions,
+    )
 
 
 def are_equal(settings, number, monkeypatch, **options):

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.core.agents.loop import control_loop, world_seed
 from nested_agents.core.decision.exploration import BoltzmannExploration, PaperExploration
@@ -72,7 +73,7 @@ def test_a_compiled_episode_is_the_control_loops(case, exploration):
         assert summary.return_ == pytest.approx(sum(rewards))
         assert summary.measures["optimal_plays"] == pytest.approx(np.mean(optimal))
         assert summary.measures["success"] == optimal[-1]
-    assert dataclasses.asdict(team.evaluator.counts) == dataclasses.asdict(
+    assert dataclasses.asdict(fuzzy(team).evaluator.counts) == dataclasses.asdict(
         reference.evaluator.counts
     )
     arrays, expected = team.arrays(), reference.arrays()

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from acting import fuzzy
 
 from nested_agents.scenarios.box_pushing.pictures.policy import Field
 from nested_agents.studies.spec.conditions import ConditionSettings
@@ -9,10 +10,10 @@ from nested_agents.studies.trials.session import arrange
 @pytest.mark.parametrize(("slope", "to_the_box"), [(-1.0, True), (1.0, False)])
 def test_a_team_that_likes_the_box_drives_to_it(slope, to_the_box):
     _, scenario, team = arrange(ConditionSettings(), 0)
-    partitions = team.evaluator.rules.partitions
+    partitions = fuzzy(team).evaluator.rules.partitions
     gap = [v.name for v in scenario.state_space.variables].index("gap")
     begin = sum(p.size for p in partitions[:gap])
-    team.learner.theta[:, begin : begin + partitions[gap].size] = slope * np.array(
+    fuzzy(team).learner.theta[:, begin : begin + partitions[gap].size] = slope * np.array(
         partitions[gap].centres
     )
     fields = scenario.show_policy(team).fields

@@ -1,0 +1,39 @@
+"""How tests let a team decide and learn outside of the control loop."""
+
+from typing import Any
+
+import numpy as np
+
+from nested_agents.core.agents.fuzzy import FuzzyAgents
+from nested_agents.core.agents.team import Team
+from nested_agents.core.interface.experience import Decision, Experience, Observation
+from nested_agents.core.interface.plain import as_prediction, as_scenario
+from nested_agents.core.interface.scenario import Transition
+
+
+def fuzzy(team: Team) -> FuzzyAgents:
+    """The fuzzy agents that a team is made of."""
+    return team.only(FuzzyAgents)
+
+
+def look(world: Any, states: Any = None, **more: Any) -> Observation:
+    """What is seen in a world; without states, those of nobody."""
+    scenario = as_scenario(world)
+    if states is None:
+        states = np.zeros((len(scenario.agents), scenario.state_space.n_variables))
+    if "imagined" in more:
+        more["imagined"] = as_prediction(more["imagined"])
+    return Observation(states, scenario, **more)
+
+
+def joint_of(team: Team, world: Any, states: Any = None, *, explore: bool = True, **more: Any):
+    """The joint action that a team takes."""
+    return team.act(look(world, states, **more), explore=explore).joint_action
+
+
+def experience(
+    team: Team, world: Any, transition: Transition, decision: Decision | None = None, **more: Any
+) -> Experience:
+    """What a decision led to; without one, that of a team that sees nothing."""
+    seen = look(world)
+    return Experience(seen, decision or team.act(seen), transition, more.get("last", False))
