@@ -28,9 +28,9 @@ from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure
 from ..core.hierarchy.hierarchy import Considers, Hierarchy, Told
 from ..core.numerics import nx
 from ..core.plugins import registry, sources
-from ..core.plugins.problems import closest
 from ..core.plugins.registry import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
+from ..core.plugins.words import closest
 from .builders import (
     Bodies,
     Names,

@@ -6,11 +6,9 @@ there, what is allowed, and the closest known name.
 
 from __future__ import annotations
 
-import difflib
 import re
 import typing
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from decimal import Decimal
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from pydantic import BaseModel, ValidationError
@@ -18,52 +16,12 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from .models import Slot, annotation_of, field_of, kind_of, kinds_at, model_at, models_of
+from .words import closest, near, show
 
 Keys = tuple[int | str, ...]
 """Where a value stands: keys of tables, and indices of lists."""
 Table = Mapping[str, object]
 """As TOML reads it."""
-
-
-def near(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
-    """Return "did you mean ...?" if a known name is near, else nothing.
-
-    Examples
-    --------
-    >>> near("chian", ["chain", "tree"]), near("ring", ["chain", "tree"])
-    ("did you mean 'chain'?", '')
-    """
-    matches = difflib.get_close_matches(str(name), list(known), n=1, cutoff=cutoff)
-    return f"did you mean {matches[0]!r}?" if matches else ""
-
-
-def closest(name: object, known: Iterable[str]) -> str:
-    """Return "did you mean ...?" if a known name is near, and the known names in any case.
-
-    Examples
-    --------
-    >>> closest("chian", ["chain", "tree"])
-    "did you mean 'chain'? known: chain, tree"
-    """
-    known = sorted(known)
-    return f"{near(name, known)} known: {', '.join(known) or 'none'}".lstrip()
-
-
-def show(value: object, width: int | None = 60) -> str:
-    """Return a value as TOML would write it, shortened to `width` characters if that is given."""
-    if isinstance(value, bool):
-        text = str(value).lower()
-    elif isinstance(value, int) and abs(value) >= 10**100:
-        text = f"{Decimal(value):.3e}"  # Python writes some thousand digits at most
-    elif isinstance(value, str):
-        text = repr(value)
-    elif isinstance(value, Mapping):
-        text = "{" + ", ".join(f"{k} = {show(v, width)}" for k, v in value.items()) + "}"
-    elif isinstance(value, Sequence):
-        text = "[" + ", ".join(show(v, width) for v in value) + "]"
-    else:
-        text = str(value)
-    return text if width is None or len(text) <= width else text[: width - 3] + "..."
 
 
 def dotted(keys: Keys) -> str:

@@ -35,8 +35,8 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
 from .models import Kinds
-from .problems import closest
 from .settings import Settings, tuples
+from .words import closest
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints

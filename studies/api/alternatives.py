@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from ...core.numerics import pd
-from ...core.plugins.problems import show
 from ...core.plugins.sources import Sources
+from ...core.plugins.words import show
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..results.results import DONE, Results, read

@@ -28,8 +28,8 @@ from ...core.agents.team import Team
 from ...core.interface.measures import SUCCESS
 from ...core.interface.scenario import Scenario
 from ...core.numerics import pd
-from ...core.plugins.problems import closest
 from ...core.plugins.sources import Sources
+from ...core.plugins.words import closest
 from ..catalogue.study import analysed, drawn, load_study
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count

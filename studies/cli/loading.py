@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 from ...core.plugins.trust import is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
 from ..presentation.progress import count, duration, say
-from ..results import published
 from ..spec.outline import StudyOutline, other_spec, outdated
 from ..store.store import Store, look
 from ..workers.runner import cores
@@ -62,6 +61,8 @@ def trust_files(source: Path) -> None:
             tables: object = [store.spec(), *store.settings().values()]
         texts = {f"{n}, which came with {source},": t for n, t in kept.items() if n.endswith(".py")}
     else:
+        from ..results import published  # pandas takes its time
+
         tables = published.load(source).outline.table
     modules = dict(modules_in(tables))
     texts |= {f"{name}, which {source} names,": module_text(name) for name in modules}

@@ -15,6 +15,7 @@ from typing import Any
 
 import click
 
+from ...core.plugins.words import closest
 from ..errors import SpecError
 from .options import complete
 
@@ -65,8 +66,6 @@ class _Commands(click.Group):
     ) -> tuple[str, click.Command, list[str]]:
         command = self.get_command(ctx, args[0])
         if command is None:
-            from ...core.plugins.problems import closest  # pydantic takes its time
-
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
         parts = command.commands if isinstance(command, click.Group) else {}
         owner = parts.get(args[1], command) if args[1:] else command

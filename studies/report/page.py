@@ -25,7 +25,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ...core.plugins.problems import show
+from ...core.plugins.words import show
 from ...scenarios import SCENARIOS
 from ..catalogue.study import analysed, drawn, load_study
 from ..errors import SpecError

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.interface.measures import Measure
 from ...core.numerics import pd, stats
-from ...core.plugins.problems import closest
+from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
 from .analysis import NOTHING, BySeed, Difference, Summary, differences, identity_lines, verdicts

@@ -21,9 +21,9 @@ from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
 from ...core.plugins.models import kinds_at, models_of
-from ...core.plugins.problems import near
 from ...core.plugins.registry import Plugged, SettingsRegistry
 from ...core.plugins.settings import Settings
+from ...core.plugins.words import near
 from .conditions import ConditionSettings, Override, StageSettings
 from .presets import PRESETS
 from .spec import Spec

@@ -25,8 +25,9 @@ from ...core.learners import LearnerSettings, TeamSettings
 from ...core.learners.batch import MOST_RULES, BatchTDSettings
 from ...core.learners.fitted_q import FittedQSettings
 from ...core.learners.learner import Decision
-from ...core.plugins.problems import closest, explain, misplaced, problems_of, show
+from ...core.plugins.problems import explain, misplaced, problems_of
 from ...core.plugins.settings import ScenarioSettings, Settings, tuples
+from ...core.plugins.words import closest, show
 from ...topologies.config import parse
 from ..errors import SpecError, refused
 from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings

@@ -15,8 +15,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core.plugins.problems import show
 from ...core.plugins.sources import Sources, meaning
+from ...core.plugins.words import show
 from ..errors import SpecError
 from ..store.database import DATABASE, SPEC_FILE
 from ..store.store import Store

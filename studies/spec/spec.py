@@ -28,11 +28,12 @@ from ...core.evaluators import EVALUATORS
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.learners import LEARNERS, LearnerSettings
 from ...core.numerics import nx
-from ...core.plugins.problems import closest, explain
+from ...core.plugins.problems import explain
 from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, mentions
 from ...core.plugins.trust import modules_in
+from ...core.plugins.words import closest
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ...topologies.builders import listed

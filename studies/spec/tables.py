@@ -17,7 +17,7 @@ import tomli_w
 from pydantic import BaseModel
 
 from ...core.plugins.models import Slot, field_of, kinds_at, model_at
-from ...core.plugins.problems import show
+from ...core.plugins.words import show
 
 TomlTable = dict[str, Any]
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ...core.interface.measures import Measure
-from ...core.plugins.problems import closest, show
 from ...core.plugins.sources import FOLDER, Sources, kept_name
+from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec

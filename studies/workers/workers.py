@@ -15,7 +15,7 @@ from typing import Any, get_args
 from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from ...core.plugins.problems import closest
+from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..trials.trial import Trial
 from .runner import ONE_THREAD, Backend, Outcome, RunTrial, Workers, attempt, begin, cores

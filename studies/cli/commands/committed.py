@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ....core.plugins.problems import closest
+from ....core.plugins.words import closest
 from ...api.study import run as run_study
 from ...claims.claims import PAPERS, PUBLISHED, QUICK, SPECS, judge, print_claims, studies_of
 from ...errors import SpecError

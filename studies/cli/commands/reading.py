@@ -138,7 +138,7 @@ def results(directory: Path, form: Literal["table", "csv", "json"], phase: str) 
 
     DIR is where the study is kept.
     """
-    from ....core.plugins.problems import closest
+    from ....core.plugins.words import closest
     from ...presentation.tables import write_rows
     from ...results.results import read
 
