@@ -21,6 +21,7 @@ from typing import Any
 __version__: str
 
 _PLACES = {
+    "Agents": ("core.interface.agents", "Agents"),
     "ActionSet": ("core.interface.spaces", "ActionSet"),
     "Analysis": ("studies.results.analysis", "Analysis"),
     "BatchTDSettings": ("core.learners.batch", "BatchTDSettings"),
@@ -34,12 +35,14 @@ _PLACES = {
     "EvaluatorSettings": ("core.evaluators", "EvaluatorSettings"),
     "ExplorationSettings": ("core.decision.exploration", "ExplorationSettings"),
     "FrozenSettings": ("core.learners.td", "FrozenSettings"),
+    "FuzzyAgents": ("core.agents.fuzzy", "FuzzyAgents"),
     "Hierarchy": ("core.hierarchy.hierarchy", "Hierarchy"),
     "KinematicChain": ("scenarios.kinematic_chain.scenario", "KinematicChain"),
     "KinematicChainSettings": ("scenarios.kinematic_chain.config", "KinematicChainSettings"),
     "LearnerSettings": ("core.learners", "LearnerSettings"),
     "LineUpSettings": ("scenarios.line_up", "LineUpSettings"),
     "Measure": ("core.interface.measures", "Measure"),
+    "Observation": ("core.interface.experience", "Observation"),
     "Partition": ("core.rules.kernels.fuzzy", "Partition"),
     "RuleBase": ("core.rules.rule_base", "RuleBase"),
     "SUCCESS": ("core.interface.measures", "SUCCESS"),

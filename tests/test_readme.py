@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.studies.claims import claims
+from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import check
@@ -52,7 +52,7 @@ def test_the_python_runs(
 
 
 def test_the_table_of_the_readme_is_published(capsys: pytest.CaptureFixture[str]) -> None:
-    edges = claims.PUBLISHED / "edges.json"
+    edges = ROWS / "edges.json"
     assert (
         main(["table", str(edges), "--columns", "evaluation success", "--format", "markdown"]) == 0
     )

@@ -8,9 +8,9 @@ R(s) / (1 - discount). Siblings differ where their mathematics differs.
 
 from ..interface.scenario import Scenario
 from ..plugins.registry import SettingsRegistry
-from .learner import LearnerSettings, TeamSettings
+from .learner import CORE, LearnerSettings, TeamSettings
 
-PEERS = f"{__name__.rpartition('.')[0]}.networks.settings"
+PEERS = f"{CORE}.networks.settings"
 
 LEARNERS = SettingsRegistry(
     "learner",
@@ -29,6 +29,7 @@ LEARNERS = SettingsRegistry(
         "hierarchy-ppo": f"{PEERS}:HierarchyPPOSettings",
         "mappo": f"{PEERS}:MAPPOSettings",
         "dqn": f"{PEERS}:DQNSettings",
+        "mixed": f"{CORE}.agents.mixed:MixedSettings",
     },
     LearnerSettings,
     TeamSettings,

@@ -25,6 +25,7 @@ import numpy as np
 from pydantic import Field
 
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
+from ..decision.settings import DecisionSettings
 from ..evaluators.evaluator import Deliberation, Evaluator
 from ..interface.agents import Counts
 from ..interface.spaces import ActionSet, StateSpace, choice
@@ -34,7 +35,7 @@ from ..plugins.settings import Positive
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
 from .batch import BatchTD, Function, add_gram, row_values, solver
-from .learner import Decision, LearnerSettings
+from .learner import LearnerSettings
 
 NOBODY = "nobody"
 """What an agent is told by a sender that it has not."""
@@ -95,7 +96,7 @@ class FittedQSettings(LearnerSettings):
     def _check_decision(self) -> None:
         """Refuse what takes a prediction."""
         decision = self.decision
-        allowed = Decision(rule=decision.rule, unseen=decision.unseen)
+        allowed = DecisionSettings(rule=decision.rule, unseen=decision.unseen)
         refused = {
             "teammates": (decision.teammates, decision.teammates == allowed.teammates),
             "value_of": (decision.value_of, decision.value_of == allowed.value_of),

@@ -26,11 +26,8 @@ class PeerSettings(TeamSettings):
     """Discount per decision."""
 
 
-class NetworkSettings(TeamSettings):
+class NetworkSettings(PeerSettings):
     """What the settings of learners with networks share, which need stable-baselines3."""
-
-    discount: Annotated[float, Field(ge=0, lt=1)] = 0.97
-    """Discount per decision."""
 
     learning_rate: Positive = 3e-4
     """Step size of Adam."""

@@ -126,7 +126,7 @@ def explain(
     error: ValidationError,
     model: type[BaseModel],
     table: Table,
-    elsewhere: tuple[type[BaseModel], Table] | None = None,
+    outer: tuple[type[BaseModel], Table] | None = None,
 ) -> str:
     """Return one line on the first thing that pydantic found wrong with a table.
 
@@ -138,7 +138,7 @@ def explain(
         The model of the table.
     table
         As the user gave it.
-    elsewhere
+    outer
         Model and table of all that a misplaced key may belong to; none: `model` and `table`.
     """
     problems = problems_of(error, table)
@@ -148,7 +148,7 @@ def explain(
     problem = (inside or problems)[0]
     kind_of_problem = problem.details["type"]
     if kind_of_problem == "extra_forbidden":
-        return _on_unknown_key(problem, model, table, elsewhere or (model, table))
+        return _on_unknown_key(problem, model, table, outer or (model, table))
     if kind_of_problem == "missing":
         name = problem.details["loc"][-1]
         is_there = problem.keys[-1:] == (name,) or isinstance(name, int)
@@ -167,14 +167,14 @@ def _on_unknown_key(
     problem: Complaint,
     model: type[BaseModel],
     table: Table,
-    elsewhere: tuple[type[BaseModel], Table],
+    outer: tuple[type[BaseModel], Table],
 ) -> str:
     key = problem.keys[-1]
     owner = model_at(*_reach(problem.keys[:-1], model, table))
     kind = kind_of(owner) if owner is not None else None
     known = set() if owner is None else set(owner.model_fields)
     misspelt = near(key, known, cutoff=0.85)
-    hint = misspelt or misplaced(problem.path, *elsewhere) or closest(key, known)
+    hint = misspelt or misplaced(problem.path, *outer) or closest(key, known)
     of_kind = f" for kind {kind!r}" if kind else ""
     return f"{problem.path} = {show(problem.details['input'])}: unknown key{of_kind}; {hint}"
 
@@ -235,15 +235,24 @@ def misplaced(path: str, model: type[BaseModel], table: Table) -> str:
 
 
 def _places(
-    key: str, model: type[BaseModel], table: object, name: str = ""
+    key: str,
+    model: type[BaseModel],
+    table: object,
+    name: str = "",
+    above: tuple[type[BaseModel], ...] = (),
 ) -> Iterator[tuple[str, FieldInfo]]:
-    """Yield the dotted names that a key has in the tables below a model, and its fields."""
+    """Yield the dotted names that a key has in the tables below a model, and its fields.
+
+    A model that a table may hold within its own is looked through once.
+    """
     for field, info in model.model_fields.items():
         own = table.get(field) if isinstance(table, Mapping) else None
         for held in _held(info, own):
+            if held in above:
+                continue
             if key in held.model_fields:
                 yield f"{name}{field}.{key}", held.model_fields[key]
-            yield from _places(key, held, own, f"{name}{field}.")
+            yield from _places(key, held, own, f"{name}{field}.", (*above, held))
 
 
 def _held(field: FieldInfo, table: object) -> Sequence[type[BaseModel]]:

@@ -29,7 +29,7 @@ import numpy as np
 from ...core.interface.measures import Measure
 from ...core.numerics import FloatArray, IntArray, optimize, pd
 from ...core.plugins.sources import is_reference
-from ..catalogue.study import load_study, measured
+from ..catalogue.study import load_study, measure_by_name
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
@@ -98,7 +98,8 @@ def run_study(
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
         with spec.sources.active():
-            run_one = measured if is_reference(spec.study) else load_study(spec.study).measure
+            is_own = is_reference(spec.study)
+            run_one = measure_by_name if is_own else load_study(spec.study).measure
         for note in (*store.notes, *spec.warnings()):
             observer.note(note)
         if left:
@@ -128,7 +129,7 @@ def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
     """
     measures = check(spec, may_fail=may_fail)
     with spec.sources.active():
-        getattr(load_study(spec.study), "check", lambda spec: None)(spec)
+        load_study(spec.study).check(spec)
     return measures
 
 

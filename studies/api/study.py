@@ -30,7 +30,7 @@ from ...core.interface.scenario import Scenario
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
 from ...core.plugins.words import closest
-from ..catalogue.study import analysed, drawn, load_study
+from ..catalogue.study import analyse_as, draw_figures, load_study
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..presentation.tables import SummaryTable, tabulate
@@ -215,7 +215,7 @@ class StudyResults:
     def analysis(self) -> Any:
         """What the study makes of its results, see `nested_agents.studies.catalogue.study`."""
         with self._sources.active():
-            return analysed(self.outline.study, self.results)
+            return analyse_as(self.outline.study, self.results)
 
     def compare(
         self,
@@ -271,7 +271,7 @@ class StudyResults:
     def figures(self) -> dict[str, Figure]:
         """The figures of the study by name."""
         with self._sources.active():
-            return drawn(load_study(self.outline.study), self.analysis)
+            return draw_figures(load_study(self.outline.study), self.analysis)
 
     def figure(self, name: str | None = None) -> Figure:
         """Return a figure of the study as matplotlib has it; the first unless named.

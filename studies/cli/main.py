@@ -11,6 +11,7 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import click
@@ -23,29 +24,45 @@ PROGRAM = "nested-agents"
 IN_ASCII = "nested-agents-ascii"
 """Name of the error handler of the streams: a terminal that lacks dashes shows ``-`` for them."""
 
+PUBLISHED = "...results.commands"
+"""Module of the commands on what has been published."""
+RESULTS = Path(__file__).parents[2] / "results"
+"""Where that is in a checkout; an installed package does not have it."""
 COMMANDS: dict[str, tuple[str, str]] = {
-    "demo": ("running", "Train two e-Pucks to push a box: table, figures and replay."),
-    "run": ("running", "Run the study of a spec, or continue it."),
-    "tune": ("running", "Look for better settings of a spec, on seeds of their own."),
-    "plan": ("running", "Tell what a study will take, and what it can find."),
-    "table": ("reading", "Print the results of a study: conditions against estimates."),
-    "compare": ("reading", "Compare conditions of one study or several, seed by seed."),
-    "results": ("reading", "Print what every episode of a study measured."),
-    "watch": ("watch", "Watch a study while it runs: trials, curves, failures."),
-    "status": ("reading", "Tell how far a study is, what failed, and how long is left."),
-    "retry": ("running", "Run the failed trials of a study again."),
-    "export": ("reading", "Write what a study holds as files for other programs."),
-    "report": ("reading", "Write a study as one self-contained HTML file."),
-    "explain": ("reading", "Explain a trained team in words and figures."),
-    "presets": ("describing", "List the named starting points of a spec, or print one."),
-    "keys": ("describing", "List the keys of a spec: type, default, what is allowed, meaning."),
-    "topology": ("describing", "List the topologies, or show one of them."),
-    "check": ("describing", "Check that scenarios keep their promises."),
-    "cost": ("describing", "Print what hierarchies cost, by formula and measured."),
-    "benchmark": ("committed", "Enter a learner in the benchmark push-n, and compare entries."),
-    "claims": ("committed", "Print the claims of the paper and the verdict on each."),
+    "demo": (".commands.running", "Train two e-Pucks to push a box: table, figures and replay."),
+    "run": (".commands.running", "Run the study of a spec, or continue it."),
+    "tune": (".commands.running", "Look for better settings of a spec, on seeds of their own."),
+    "plan": (".commands.running", "Tell what a study will take, and what it can find."),
+    "table": (".commands.reading", "Print the results of a study: conditions against estimates."),
+    "compare": (".commands.reading", "Compare conditions of one study or several, seed by seed."),
+    "results": (".commands.reading", "Print what every episode of a study measured."),
+    "watch": (".commands.watch", "Watch a study while it runs: trials, curves, failures."),
+    "status": (".commands.reading", "Tell how far a study is, what failed, and how long is left."),
+    "retry": (".commands.running", "Run the failed trials of a study again."),
+    "export": (".commands.reading", "Write what a study holds as files for other programs."),
+    "report": (".commands.reading", "Write a study as one self-contained HTML file."),
+    "explain": (".commands.reading", "Explain a trained team in words and figures."),
+    "presets": (".commands.describing", "List the named starting points of a spec, or print one."),
+    "keys": (
+        ".commands.describing",
+        "List the keys of a spec: type, default, what is allowed, meaning.",
+    ),
+    "topology": (".commands.describing", "List the topologies, or show one of them."),
+    "check": (".commands.describing", "Check that scenarios keep their promises."),
+    "cost": (".commands.describing", "Print what hierarchies cost, by formula and measured."),
+    "benchmark": (PUBLISHED, "Enter a learner in the benchmark push-n, and compare entries."),
+    "claims": (PUBLISHED, "Print the claims of the paper and the verdict on each."),
 }
 """The module of each command, imported when it is asked for, and what the help says of it."""
+
+
+def load_command(name: str) -> click.Command | None:
+    """Return one of `COMMANDS`; None if the repository has it, and this is an installed package."""
+    place = COMMANDS[name][0]
+    if place == PUBLISHED and not RESULTS.is_dir():
+        return None
+    command: click.Command = getattr(import_module(place, __package__), name)
+    return command
 
 
 class _Commands(click.Group):
@@ -55,16 +72,17 @@ class _Commands(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        module = import_module(f".commands.{COMMANDS[cmd_name][0]}", __package__)
-        command: click.Command = getattr(module, cmd_name)
-        return command
+        return load_command(cmd_name) if cmd_name in COMMANDS else None
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str, click.Command, list[str]]:
         command = self.get_command(ctx, args[0])
+        if command is None and args[0] in COMMANDS:
+            raise SpecError(
+                f"{args[0]}: is a command on published results, which are in the repository, in "
+                "results/, not in the installed package"
+            )
         if command is None:
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
         parts = command.commands if isinstance(command, click.Group) else {}

@@ -26,12 +26,12 @@ from ...core.agents.cost import Problem, below_counts
 from ...core.agents.joint import join_agents
 from ...core.agents.loop import control_loop, policy_seed
 from ...core.agents.team import Team
+from ...core.decision.settings import DecisionSettings
 from ...core.evaluators.best_response import CUTS
 from ...core.evaluators.coordination import MaxPlusSettings
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.agents import Counts
 from ...core.interface.scenario import Scenario
-from ...core.learners.learner import Decision
 from ...core.learners.td import TDLambdaSettings
 from ...core.rules.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
@@ -47,7 +47,7 @@ RULES = MEMBERSHIPS**2
 """|S| of an agent in what is counted and timed."""
 LEARNER = TDLambdaSettings(
     rule_base=RuleBaseSettings(membership="sigmoid", memberships=MEMBERSHIPS, order=2),
-    decision=Decision(rule="value", evaluator="exact"),
+    decision=DecisionSettings(rule="value", evaluator="exact"),
 )
 """The learner that is counted and timed: the paper's, over the two variables of line-up."""
 
@@ -228,7 +228,7 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
         return learner, scenario, Hierarchy(scenario.agents, [])
     settings = parse(WAYS.get(text, (text,))[0])
     usual = "variable-elimination" if settings.kind == "coordination-graph" else "exact"
-    decision = Decision(rule="value", evaluator=text if text in WAYS else usual)
+    decision = DecisionSettings(rule="value", evaluator=text if text in WAYS else usual)
     learner = LEARNER.model_copy(update={"decision": decision})
     return learner, line_up, build(settings, line_up.agents, pairs(n))
 

@@ -27,7 +27,7 @@ from matplotlib.figure import Figure
 
 from ...core.plugins.words import show
 from ...scenarios import SCENARIOS
-from ..catalogue.study import analysed, drawn, load_study
+from ..catalogue.study import analyse_as, draw_figures, load_study
 from ..errors import SpecError
 from ..presentation.figures import styled
 from ..presentation.progress import count
@@ -196,8 +196,8 @@ def page(directory: Path) -> str:
         packed = replays(store, trials)
         sources = sources_of(store)
     with sources.active():
-        analysis = analysed(outline.study, results)
-        figures = drawn(load_study(outline.study), analysis)
+        analysis = analyse_as(outline.study, results)
+        figures = draw_figures(load_study(outline.study), analysis)
     notes = getattr(analysis, "notes", ())
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included

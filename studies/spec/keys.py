@@ -100,7 +100,7 @@ def tables() -> tuple[Table, ...]:
     """
     own = (("", Spec), ("overrides", Override), ("curriculum", StageSettings))
     heads = [_table(name, ("", ""), model, {}) for name, model in own]
-    return (*heads, *_below(ConditionSettings, "", "", set()))
+    return (*heads, *_below(ConditionSettings, "", "", set(), ()))
 
 
 def keys_below(prefix: str) -> tuple[Table, ...]:
@@ -124,11 +124,23 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
 
 
 def _below(
-    model: type[Settings], name: str, within: str, seen: set[tuple[str, type[Settings]]]
+    model: type[Settings],
+    name: str,
+    within: str,
+    seen: set[tuple[str, type[Settings]]],
+    above: tuple[SettingsRegistry, ...],
 ) -> Iterator[Table]:
-    """Yield the tables that the fields of a model hold, at any depth, each once."""
+    """Yield the tables that the fields of a model hold, at any depth, each once.
+
+    What a registry offers is not listed again within what it offers itself: the parts of a team
+    have learners, as the team has one.
+    """
     for field, info in model.model_fields.items():
         place = f"{name}.{field}" if name else field
+        registry = registry_of(info)
+        if registry in above:
+            continue
+        inside = above if registry is None else (*above, registry)
         for kind, held, inherited in _held(info):
             if (place, held) in seen:
                 continue
@@ -138,7 +150,7 @@ def _below(
                 table = table._replace(keys=(_kind(info, kinds), *table.keys))
             if table.keys or kind:
                 yield table
-            yield from _below(held, place, kind or within, seen)
+            yield from _below(held, place, kind or within, seen, inside)
 
 
 def settings_of(info: FieldInfo) -> list[type[Settings]]:
@@ -174,7 +186,7 @@ def _held(info: FieldInfo) -> Iterator[tuple[str, type[Settings], Mapping[str, F
         inherited = base.model_fields
         yield "", base, {}
     for kind, model in kinds.items():
-        yield kind, model, inherited
+        yield kind, model, inherited if issubclass(model, base) else {}
     if registry is None:
         yield from (("", m, {}) for m in settings_of(info) if "kind" not in m.model_fields)
 

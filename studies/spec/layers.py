@@ -19,12 +19,12 @@ from typing import Any, NamedTuple, Protocol
 from pydantic import ValidationError
 
 from ...core.agents.joint import Granularity
+from ...core.decision.settings import DecisionSettings
 from ...core.evaluators.best_response import BestResponseSettings
 from ...core.evaluators.coordination import MaxPlusSettings, VariableEliminationSettings
 from ...core.learners import LearnerSettings, TeamSettings
 from ...core.learners.batch import MOST_RULES, BatchTDSettings
 from ...core.learners.fitted_q import FittedQSettings
-from ...core.learners.learner import Decision
 from ...core.plugins.problems import explain, misplaced, problems_of
 from ...core.plugins.settings import ScenarioSettings, Settings, tuples
 from ...core.plugins.words import closest, show
@@ -263,7 +263,7 @@ def _refused(learner: TeamSettings) -> Iterator[str]:
     """Yield the keys of a learner whose values its kinds refuse when a team is built."""
     if not isinstance(learner, LearnerSettings):
         return
-    usual = dict(Decision())
+    usual = dict(DecisionSettings())
     for key, value in learner.decision:
         if key in _refused_of_decision(learner) and value != usual[key]:
             yield f"learner.decision.{key}"
@@ -291,9 +291,9 @@ def _left_out(
     given: Layers, table: Layer, dropped: Container[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the keys of given layers that a table is without, and the kinds that are why."""
-    said = {key for layer in given for key, value in flat(layer) if value != {}}
+    written = {key for layer in given for key, value in flat(layer) if value != {}}
     there = dict(flat(table))
-    keys = sorted(key for key in said if key in dropped or key not in there)
+    keys = sorted(key for key in written if key in dropped or key not in there)
     usual = dict(flat(_lay(given))) if keys else {}
     changed = [k for k, v in there.items() if k.endswith(".kind") and usual.get(k, v) != v]
     kinds = [kind for key in keys if (kind := _cause(key, changed)) is not None]

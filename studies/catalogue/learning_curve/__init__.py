@@ -74,7 +74,8 @@ def curves_of(measure: Measure, training: Mapping[str, Array]) -> dict[str, Esti
 
 def analyse(results: Results) -> Analysis:
     """Estimate the table and what the curves need; seeds are the unit of sampling."""
-    conditions, table = results.of_phase("training"), []
+    conditions = results.of_phase("training")
+    table = []
     measures = results.measures or EPISODES[1:]  # foreign ones may have the return alone
     for condition in conditions:
         estimates: dict[str, Estimate] = {}

@@ -30,7 +30,7 @@ from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ...trials.session import Session, arrange
 from ...trials.trial import Trial, TrialResult
-from ..study import check_rule_bases
+from ..study import check_rule_bases, distinct
 
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
@@ -171,16 +171,16 @@ def courses_of(results: Results) -> list[Course]:
         enabled = str(columns.get(SWEPT, ""))
         fault = (label_but(columns, [SWEPT]) or "the failure") if enabled else condition
         for phase in (KEPT, "training"):
-            success, steps = (
-                results.values(condition, name).astype(float) for name in ("success", "steps")
-            )
-            if phase == KEPT:
-                success[:, onset:] = results.values(condition, "success", KEPT)
-                steps[:, onset:] = results.values(condition, "steps", KEPT)
-            adapts, seeds = ADAPTS.get((enabled, phase), phase), results.seeds(condition)
-            courses.append(Course(fault, adapts, onset, onsets, success, steps, seeds))
+            values = {}
+            for measured in ("success", "steps"):
+                values[measured] = results.values(condition, measured).astype(float)
+                if phase == KEPT:
+                    values[measured][:, onset:] = results.values(condition, measured, KEPT)
+            adapts = ADAPTS.get((enabled, phase), phase)
+            seeds = results.seeds(condition)
+            courses.append(Course(fault, adapts, onset, onsets, seeds=seeds, **values))
     order = {adapts: i for i, adapts in enumerate(ADAPTS.values())}
-    faults = list(dict.fromkeys(course.fault for course in courses))
+    faults = distinct(course.fault for course in courses)
     return sorted(courses, key=lambda c: (faults.index(c.fault), order.get(c.adapts, 0)))
 
 
@@ -218,8 +218,8 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures as f  # matplotlib takes its time
 
     courses = analysis.cases
-    faults = list(dict.fromkeys(course.fault for course in courses))
-    cases = list(dict.fromkeys(course.adapts for course in courses))
+    faults = distinct(course.fault for course in courses)
+    cases = distinct(course.adapts for course in courses)
     figure, panels = f.grid(
         len(faults), COLUMNS, (2.6, 2.1), (1.0, 1.2), least=5.6, sharex=True, sharey=True
     )
@@ -239,9 +239,8 @@ def draw(analysis: Analysis) -> Figures:
     for axes in list(panels.flat)[max(0, len(faults) - columns) : len(faults)]:
         f.as_episodes(axes)
     handles = [f.handle(case, **f.look(i)) for i, case in enumerate(cases)]
-    seeds = sorted({len(course.success) for course in courses})
-    counted = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
-    title = f"what adapts\nmeans over {counted} seeds and {SMOOTHED} episodes, 95 % bands"
+    seeds = f.count_seeds(len(course.success) for course in courses)
+    title = f"what adapts\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95 % bands"
     f.add_legend(figure, handles, title, ncols=len(cases))
     return {"wheel-failure": figure}
 

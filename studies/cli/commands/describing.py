@@ -113,11 +113,31 @@ def check(source: str, steps: int, changes: tuple[str, ...]) -> int:
                 print_wrapped(warning, "warning  ", 8)
             frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
             print("", frame.to_string(index=False, na_rep="", float_format=SHORT), "", sep="\n")
-    if not faults and not source.partition(":")[0].endswith(".py"):
+    is_spec = not source.partition(":")[0].endswith(".py")
+    if not faults and is_spec:
+        faults += _report_order(source, changes, steps)
+    if not faults and is_spec:
         for label, errors in _learned_errors(source, changes, steps):
             print_wrapped(f"{label}: what {LESSONS} episodes teach to predict", "learned  ", 8)
             print("", errors.to_string(float_format=SHORT), "", sep="\n")
     return 1 if faults else 0
+
+
+def _report_order(source: str, changes: tuple[str, ...], steps: int) -> bool:
+    """Say that trials depend on what ran before them; return whether they do."""
+    from ...spec.spec import Spec
+    from ...trials.order import fault_of_order, has_programs
+    from ...trials.trial import trials_of
+
+    trials = trials_of(Spec.load(Path(source), changes))
+    if not has_programs(trials[0]):
+        return False
+    fault = fault_of_order(trials, steps)
+    if fault:
+        print(f"FAULT   order of trials: {fault}")
+    else:
+        print_wrapped("order of trials: the same rows in two orders", "passed  ", 8)
+    return bool(fault)
 
 
 def _learned_errors(
@@ -146,15 +166,15 @@ def _learned_errors(
 
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
+    from ....core.interface.plain import as_scenario
     from ....core.learners import check_prediction
-    from ....core.plugins.sources import active
     from ...spec.spec import Spec
 
     if ".py:" in source or source.endswith(".py"):
         if changes:
             raise SpecError("--set: lays values over a spec, not over a Python file")
         with refused():
-            factory = active().load(source)
+            factory = _factory_of(source)
         try:
             factory()
         except (Exception, SystemExit) as error:
@@ -166,13 +186,28 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     for condition in Spec.load(Path(source), changes).conditions():
         settings = condition.settings.scenario
         with refused():
-            check_prediction(condition.settings.learner, settings.build())
+            check_prediction(condition.settings.learner, as_scenario(settings.build()))
         if settings not in seen:
             seen.add(settings)
             # Played are the first episode and those in which failures begin.
             failures = getattr(settings, "failures", ())
             episodes = sorted({0, *(failure.episode for failure in failures)})
             yield condition.label, settings.build, episodes
+
+
+def _factory_of(source: str) -> Callable[[], object]:
+    """Return what makes a scenario of one's own, by its own settings as they are by default."""
+    from ....core.plugins.sources import active
+    from ....scenarios import SCENARIOS
+
+    thing: Callable[[], object] = active().load(source)
+    if not hasattr(thing, "Settings"):
+        return thing
+    try:
+        build: Callable[[], object] = SCENARIOS.parsed(source).build
+    except ValueError as error:
+        raise ValueError(f"{source}: its Settings have no defaults for all keys, {error}") from None
+    return build
 
 
 MOST_AGENTS = 10_000

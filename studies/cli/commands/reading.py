@@ -197,7 +197,7 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
 
 def _texts(store: Store, form: Files) -> dict[str, str]:
     """Return the content of each file by its name, see `results.published`."""
-    from ...catalogue.study import published_part
+    from ...catalogue.study import select_published
     from ...presentation.tables import in_csv
     from ...results import published
     from ...results.results import read
@@ -205,7 +205,7 @@ def _texts(store: Store, form: Files) -> dict[str, str]:
     results, outline = read(store), StudyOutline.kept(store)
     if form == "json":
         with sources_of(store).active():
-            kept = published_part(outline.study, results)
+            kept = select_published(outline.study, results)
         return {"results.json": published.dumps(outline, kept)}
     if form == "marl-eval":
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}

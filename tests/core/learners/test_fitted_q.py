@@ -5,6 +5,7 @@ import pytest
 from acting import fuzzy
 
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
@@ -12,7 +13,6 @@ from nested_agents.core.interface.experience import Experience, Observation
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import REWARD_SCALE
 from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
 from nested_agents.studies.spec.spec import Spec
@@ -155,7 +155,7 @@ def test_an_agent_sees_what_its_ancestors_decided_in_the_order_of_decision() -> 
 @pytest.mark.parametrize("unseen", ["maintain", "last"])
 def test_a_lost_message_is_read_as_the_decision_says(unseen: str) -> None:
     lost = LostMessages(agents="agent1")
-    decision = Decision(unseen=unseen)
+    decision = DecisionSettings(unseen=unseen)
     told, did = told_in(team(chain(told="parents"), lost, decision=decision))
     before = np.append(0, did[:-1, 0])  # at first it is taken to have maintained
     np.testing.assert_array_equal(told[:, 1, 0], before if unseen == "last" else 0 * before)
@@ -185,10 +185,13 @@ def test_who_is_told_learns_a_best_reply_and_who_is_not_does_not() -> None:
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"decision": Decision(value_of="team")}, "learner.decision.value_of = 'team': fitted-q"),
-        ({"decision": Decision(evaluator="exact")}, "learner.decision.evaluator = 'exact'"),
-        ({"decision": Decision(rule="reward")}, "allowed: rule = value or random"),
-        ({"decision": Decision(unseen="plan")}, "unseen = maintain or last"),
+        (
+            {"decision": DecisionSettings(value_of="team")},
+            "learner.decision.value_of = 'team': fitted-q",
+        ),
+        ({"decision": DecisionSettings(evaluator="exact")}, "learner.decision.evaluator = 'exact'"),
+        ({"decision": DecisionSettings(rule="reward")}, "allowed: rule = value or random"),
+        ({"decision": DecisionSettings(unseen="plan")}, "unseen = maintain or last"),
         ({"self_model": {"enabled": True}}, "learner.self_model"),
     ],
 )

@@ -8,7 +8,7 @@ from made_up_results import NOTHING, hierarchies
 
 from nested_agents.studies.catalogue import hierarchies as module
 from nested_agents.studies.catalogue.hierarchies import analyse, check, draw, measure
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
@@ -126,7 +126,7 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
         assert len(figure.axes) == 2 * columns
     paths = save({"hierarchies": figure}, tmp_path)
     assert all(path.stat().st_size > 0 for path in paths)
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,10 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, Arrays, scaling
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import arrange, check, run_trial
@@ -82,7 +83,7 @@ def test_the_figure_has_a_line_of_messages_by_topology() -> None:
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(scaling(SIZES).frames())), tmp_path)
     assert [path.name for path in paths] == ["scaling.png", "scaling.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(("topology", "count"), [("chain", 6), ("star", 3), ("independent", 0)])
@@ -105,8 +106,9 @@ def test_a_trial_is_measured_without_being_changed() -> None:
 
 
 def test_the_spec_reaches_from_2_to_64_robots() -> None:
-    folder = Path(module.__file__).parent
-    specs = [Spec.load(folder / f"{name}.toml") for name in ("costs", "scaling", "crowds")]
+    own = Path(module.__file__).parent / "scaling.toml"
+    paths = (SPECS / "scaling" / "costs.toml", own, SPECS / "scaling" / "crowds.toml")
+    specs = list(map(Spec.load, paths))
     for reached, sizes in ((specs[:1], {2, 4, 8, 16}), (specs[1:], {2, 4, 8, 16, 32, 64})):
         conditions = [condition for spec in reached for condition in spec.conditions()]
         assert sizes <= {c.settings.scenario.robots for c in conditions}

@@ -5,7 +5,7 @@ import pytest
 from made_up_results import hierarchies, scaling
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.studies.catalogue.study import analysed
+from nested_agents.studies.catalogue.study import analyse_as
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import draw_profiles
 from nested_agents.studies.results.contrasts import (
@@ -114,10 +114,10 @@ def test_conditions_that_are_identical_in_every_episode_are_said_to_be() -> None
     notes = contrasts(results.frames(), by="topology").notes
     own = notes[notes.index(said) + 1 :]
     assert " ".join(map(str.strip, own)) == f"{chain} = {star}"
-    assert analysed("learning-curve", results.frames()).notes == (said, *own)
+    assert analyse_as("learning-curve", results.frames()).notes == (said, *own)
     results.evaluation[star]["final_distance_m"][3, 2] += 1e-9
     assert said not in contrasts(results.frames()).notes
-    assert analysed("learning-curve", results.frames()).notes == ()
+    assert analyse_as("learning-curve", results.frames()).notes == ()
 
 
 def test_what_was_published_in_part_is_not_called_identical() -> None:

@@ -30,7 +30,7 @@ def build(table: dict[str, object]) -> Spec:
     return spec
 
 
-@pytest.mark.parametrize("kind", LEARNERS.built_in)
+@pytest.mark.parametrize("kind", [kind for kind in LEARNERS.built_in if kind != "mixed"])
 def test_every_learner_is_chosen_by_its_kind_alone(kind: str) -> None:
     table = {"learner": {"kind": kind}}
     spec = build(table) if kind in BUILT else Spec.of(table)
@@ -39,6 +39,17 @@ def test_every_learner_is_chosen_by_its_kind_alone(kind: str) -> None:
     remarks = [line for line in spec.warnings() if "of the preset, left out" in line]
     assert len(remarks) == (kind != "batch-td")
     assert all(line.endswith(f"left out for learner.kind = {kind!r}") for line in remarks)
+
+
+def test_a_mixed_team_needs_its_parts() -> None:
+    with pytest.raises(SpecError, match=r"^learner\.parts: missing$"):
+        Spec.of({"learner": {"kind": "mixed"}})
+    parts = [{"agents": "*", "learner": {"kind": "frozen"}}]
+    (remark,) = Spec.of({"learner": {"kind": "mixed", "parts": parts}}).warnings()
+    assert remark.endswith("left out for learner.kind = 'mixed'")
+    parts[0]["learner"] = {"kind": "frozen", "rigde": 3.0}
+    with pytest.raises(SpecError, match=r"^learner\.parts\[0\]\.learner\.rigde = 3\.0: unknown"):
+        Spec.of({"learner": {"kind": "mixed", "parts": parts}})
 
 
 @pytest.mark.parametrize("preset", PRESETS)

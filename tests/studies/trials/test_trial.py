@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from acting import fuzzy
 
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
@@ -184,8 +183,8 @@ def test_which_condition_does_not_fit_is_named():
 def test_further_evaluations_leave_the_rest_of_a_trial_as_it_is(result):
     elsewhere = {"circle": {"box": "circle"}, "square": {}}
     other = run_trial(only(evaluations=elsewhere))
-    assert fuzzy(other).rows[: len(result.rows)] == result.rows
-    further = fuzzy(other).rows[len(result.rows) :]
+    assert other.rows[: len(result.rows)] == result.rows
+    further = other.rows[len(result.rows) :]
     assert [row.phase for row in further] == ["evaluation:circle", "evaluation:square"]
     assert further[1]._replace(phase="evaluation") == result.rows[-1]
     alone = run_trial(only(evaluations={"square": {}}))

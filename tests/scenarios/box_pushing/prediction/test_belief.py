@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from acting import fuzzy
+from acting import fuzzy, look
 from pydantic import ValidationError
 
 from benchmarks.scripted.controller import ScriptedController
@@ -10,8 +10,9 @@ from nested_agents.core.adaptation.self_model import CalibrationSettings
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
+from nested_agents.core.interface.experience import Decision, Experience
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import (
@@ -37,7 +38,7 @@ def scenario(**table):
 
 def calibrating(world, agents="actuator"):
     settings = BatchTDSettings(
-        calibration=CalibrationSettings(enabled=True), decision=Decision(rule="random")
+        calibration=CalibrationSettings(enabled=True), decision=DecisionSettings(rule="random")
     )
     seen = join_agents(world, agents)
     return seen, Team(settings, seen, build("chain", seen.agents), policy_seed(0))
@@ -109,9 +110,11 @@ def test_wrong_constants_are_found_out_by_pushing(believed):
         world.reset(seed)
         for _ in range(14):
             joint = controller.act(world.measure())
-            prediction = team.predict(world)
+            seen = look(world)
+            prediction = fuzzy(team).foresight.predict(seen)
             transition = world.step(joint)
-            team.adapt(prediction, joint, transition)
+            done = Experience(seen, Decision(joint, ()), transition, last=False)
+            fuzzy(team).foresight.learn(done, prediction)
             errors.append(fuzzy(team).foresight.calibration.constants - RIGHT[believed])
             if transition.terminated:
                 break
@@ -134,7 +137,7 @@ def test_the_twist_of_the_box_is_not_measured_when_robots_touch():
 
 def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
     (world, team), (_, other) = (calibrating(scenario(start="easy"), "body") for _ in "ab")
-    assert world.constants == CONSTANTS
+    assert world.embodiment().constants == CONSTANTS
     for _ in control_loop(world, team, episodes=1, steps=30, seed=0):
         pass
     assert fuzzy(team).foresight.calibration.constants.any()
