@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.core.adaptation.self_model import CalibrationSettings, SelfModelSettings
+from nested_agents.core.adaptation.calibration import CalibrationSettings
+from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import policy_seed, world_seed
 from nested_agents.core.agents.team import Team

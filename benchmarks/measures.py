@@ -122,10 +122,9 @@ def large(kind: str, n_agents: int, budget: float) -> Row:
     )
     row: Row = {f"{name}_ms": 1e3 * times.median(name) for name in times.seconds}
     total = sum(row.values())
+    evaluator = type(moment.team.only(FuzzyAgents).evaluator).__name__
     return {
-        "rule_base": kind,
-        "agents": n_agents,
-        "evaluator": type(moment.team.only(FuzzyAgents).evaluator).__name__,
+        "rule_base": kind, "agents": n_agents, "evaluator": evaluator,
         **row, "total_ms": total, "us_per_agent": 1e3 * total / n_agents,
         "bytes_per_agent": memory_per_agent(moment),
     }  # fmt: skip

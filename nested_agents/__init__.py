@@ -16,9 +16,13 @@ Two e-Pucks, their four wheels in a chain, learning by the default settings:
 """
 
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 __version__: str
+
+if not Path(__file__).with_name("core").exists():  # a checkout: the four folders stand beside
+    __path__.append(str(Path(__file__).parents[1]))
 
 _PLACES = {
     "Agents": ("core.interface.agents", "Agents"),

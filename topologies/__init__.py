@@ -5,5 +5,11 @@ from .builders import from_networkx
 from .config import TOPOLOGIES, Topology, TopologySettings, build, parse
 
 __all__ = [
-    "TOPOLOGIES", "Hierarchy", "Topology", "TopologySettings", "build", "from_networkx", "parse",
-]  # fmt: skip
+    "TOPOLOGIES",
+    "Hierarchy",
+    "Topology",
+    "TopologySettings",
+    "build",
+    "from_networkx",
+    "parse",
+]

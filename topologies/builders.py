@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations, compress, zip_longest
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field, NonNegativeInt
@@ -49,9 +49,9 @@ def check_names(
     known = set(agents)
     for name, times in Counter(names).items():
         if name not in known:
-            raise ValueError(f"unknown agent {shown(name)} in {what}, known: {listed(agents)}")
+            raise ValueError(f"unknown agent {quote(name)} in {what}, known: {join_names(agents)}")
         if times > 1:
-            raise ValueError(f"agent {shown(name)} occurs more than once in {what}")
+            raise ValueError(f"agent {quote(name)} occurs more than once in {what}")
     missing = known.difference(names)
     if all_needed and missing:
         first = next(agent for agent in agents if agent in missing)
@@ -69,15 +69,15 @@ def check_legible(names: Iterable[object]) -> None:
     for name in names:
         is_name = isinstance(name, str | int) and not isinstance(name, bool)
         if not is_name or not str(name) or not str(name).isprintable():
-            raise ValueError(f"{shown(name)} is no name of an agent, allowed: printable text")
+            raise ValueError(f"{quote(name)} is no name of an agent, allowed: printable text")
 
 
-def shown(value: object, most: int = 60) -> str:
+def quote(value: object, most: int = 60) -> str:
     r"""Return a value for a message, in `most` characters at most, none of them special.
 
     Examples
     --------
-    >>> shown("a\nb"), shown("n" * 100, most=10)
+    >>> quote("a\nb"), quote("n" * 100, most=10)
     ("'a\\nb'", "'nnnnnn...")
     """
     text = ascii(value) if not isinstance(value, str) or not value.isprintable() else repr(value)
@@ -93,12 +93,12 @@ def with_edges(graph: nx.DiGraph, edges: Iterable[Sequence[str]]) -> nx.DiGraph:
     return graph
 
 
-def listed(names: Iterable[str], most: int = 12) -> str:
+def join_names(names: Iterable[str], most: int = 12) -> str:
     """Return names for a message, the first `most` of them.
 
     Examples
     --------
-    >>> listed("abcd", most=2)
+    >>> join_names("abcd", most=2)
     'a, b, ... (4)'
     """
     names = list(names)
@@ -276,12 +276,12 @@ def coordination_graph(
     if edges is None:
         if shape == "scenario":
             raise ValueError("shape = 'scenario': the scenario has no interactions of its agents")
-        graph = nx.relabel_nodes(graphs.shaped(shape, len(agents)), dict(enumerate(agents)))
+        graph = nx.relabel_nodes(graphs.build_shape(shape, len(agents)), dict(enumerate(agents)))
     else:
         Hierarchy(agents, [], edges)  # raises and names what is wrong
         graph = nx.empty_graph(agents)
         graph.add_edges_from(edges)
-    return graph if others is None else graphs.others(graph, others)
+    return graph if others is None else graphs.other_edges(graph, others)
 
 
 def from_edges(
@@ -335,12 +335,13 @@ def random_hierarchy(
     """
     rng = np.random.default_rng(seed)
     ranked = [agents[i] for i in rng.permutation(len(agents))]
-    graph, pairs = independent(agents), list(combinations(ranked, 2))
+    graph = independent(agents)
+    pairs = list(combinations(ranked, 2))
     graph.add_edges_from(compress(pairs, rng.random(len(pairs)) < density))
     return graph
 
 
-def names_of(members: Iterable[Any]) -> list[str]:
+def names_of(members: Iterable[str | Members]) -> list[str]:
     """Return the agents of nested teams, from left to right.
 
     Examples
@@ -385,7 +386,7 @@ def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbours: bool = 
     return named
 
 
-def _team(members: Sequence[Any], arrange: Callable[[Names], nx.DiGraph]) -> nx.DiGraph:
+def _team(members: Sequence[str | Members], arrange: Callable[[Names], nx.DiGraph]) -> nx.DiGraph:
     """Return the graph of a team whose members' leaders are arranged so."""
     if not members:
         raise ValueError("a team has no members")

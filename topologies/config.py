@@ -2,7 +2,7 @@
 
 A string is ``"kind"`` or ``"kind:argument"``, see `parse`. A further topology is one function in
 `builders` and one line in `TOPOLOGIES`; its keyword-only parameters are its settings. What may
-follow ``kind:`` is in `ARGUMENTS`.
+follow ``kind:`` is in `strings.ARGUMENTS`.
 
 Users bring hierarchies as files of graphs and teams, in Python files, and in installed packages. A
 user's topology is a function ``(agents, bodies) -> graph``. It is given the names of the agents and
@@ -12,41 +12,34 @@ subordinate); an agent in no pair stands alone.
 
 from __future__ import annotations
 
-import json
-import tomllib
-import traceback
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from inspect import iscoroutine
-from itertools import islice
-from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Literal, Self
 
 from pydantic import model_validator
 
-from ..core.coordination.graphs import Shape, oriented
+from ..core.coordination.graphs import orient
 from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure
 from ..core.hierarchy.hierarchy import Considers, Hierarchy, Told
 from ..core.numerics import nx
-from ..core.plugins import registry, sources
+from ..core.plugins import sources
 from ..core.plugins.registry import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
 from ..core.plugins.words import closest
-from .builders import (
-    Bodies,
-    Names,
-    check_legible,
-    check_names,
-    from_networkx,
-    independent,
-    names_of,
-    shown,
-    with_edges,
-)
+from .builders import Bodies, Names, check_names, from_networkx, quote
+from .files import read_file
+from .strings import ARGUMENTS, Keys
+from .user_functions import call_builder
 
 BUILDERS = "nested_agents.topologies.builders"
 BUILT = (
-    "chain", "tree", "star", "teams", "independent", "simultaneous", "coordination-graph",
-)  # fmt: skip
+    "chain",
+    "tree",
+    "star",
+    "teams",
+    "independent",
+    "simultaneous",
+    "coordination-graph",
+)
 """Topologies whose builder is called so."""
 
 
@@ -85,16 +78,16 @@ class TopologySettings(Settings):
             raise ValueError("fill_in = true: needs oriented, in which order agents decide")
         return self
 
-    def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
+    def __repr_args__(self) -> Iterable[tuple[str | None, object]]:
         written = self.model_dump()
         return [(name, value) for name, value in super().__repr_args__() if name in written]
 
     @property
     def title(self) -> str:
         """What it is called in messages: its file, its kind, or its class."""
-        return getattr(self, "path", "") or self.kind or type(self).__name__
+        return str(dict(self).get("path") or self.kind or type(self).__name__)
 
-    def build(self, agents: Names, bodies: Bodies) -> Any:
+    def build(self, agents: Names, bodies: Bodies) -> nx.Graph:
         """Return the graph over named agents, given by body too."""
         raise ValueError("has no kind, and makes no hierarchy")
 
@@ -116,7 +109,7 @@ TOPOLOGIES = SettingsRegistry(
 """Topologies by name."""
 
 
-def parse(text: str | Mapping[str, Any]) -> TopologySettings:
+def parse(text: str | Mapping[str, object]) -> TopologySettings:
     """Read a topology from a string, or from a table as it stands in a spec.
 
     Besides ``"kind"`` and ``"kind:argument"``, a file of a graph or of such a table, a
@@ -147,8 +140,10 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
             return TOPOLOGIES.parsed("file", path=text)
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
             return TOPOLOGIES.parsed(text)
+    except SettingsError as error:
+        raise ValueError(f"topology {text!r}: {error.problem}") from None
     except ValueError as error:
-        raise ValueError(f"topology {text!r}: {getattr(error, 'problem', error)}") from None
+        raise ValueError(f"topology {text!r}: {error}") from None
     if "." in kind or "/" in kind:
         folder = sources.active().folder
         is_there = folder is not None and (folder / text).exists()
@@ -158,7 +153,7 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
     raise ValueError(f"topology {text!r}: {TOPOLOGIES.moved.get(kind, unknown)}")
 
 
-def _of_table(table: Mapping[str, Any]) -> TopologySettings:
+def _of_table(table: Mapping[str, object]) -> TopologySettings:
     """Return the settings of a table."""
     implied = next((k for key, k in IMPLIED.items() if key in table), None)
     kind = table.get("kind", implied)
@@ -177,7 +172,7 @@ Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
 
 
 def build(
-    settings: TopologySettings | str | Mapping[str, Any],
+    settings: TopologySettings | str | Mapping[str, object],
     agents: Sequence[str],
     bodies: Sequence[Sequence[int]] | None = None,
     interactions: Sequence[tuple[int, int]] | None = None,
@@ -218,7 +213,7 @@ def build(
             raise ValueError("no agents")
         if bodies is not None:
             named = _named(agents, bodies)
-        if interactions is not None and getattr(settings, "shape", "") == "scenario":
+        if interactions is not None and dict(settings).get("shape") == "scenario":
             pairs = tuple((agents[a], agents[b]) for a, b in interactions)
             settings = settings.model_copy(update={"edges": pairs})
         if settings.kind in TOPOLOGIES.built_in:
@@ -265,11 +260,11 @@ def _directed(graph: nx.Graph, settings: TopologySettings, agents: Names) -> nx.
             )
         return graph
     if graph.is_directed():
-        raise ValueError(f"oriented = {shown(order)}: the edges are directed already, leave it out")
+        raise ValueError(f"oriented = {quote(order)}: the edges are directed already, leave it out")
     names = {"listed": tuple(agents), "reversed": tuple(reversed(agents))}
     listed = names[order] if isinstance(order, str) else order
     check_names(listed, agents, "oriented")
-    return oriented(graph, listed, fill_in=settings.fill_in)
+    return orient(graph, listed, fill_in=settings.fill_in)
 
 
 def read(path: str) -> nx.DiGraph | TopologySettings:
@@ -295,69 +290,19 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
     return settings
 
 
-def _named(agents: Names, bodies: Sequence[Any]) -> Bodies:
+def _named(agents: Names, bodies: Sequence[Sequence[int]]) -> Bodies:
     """Return the names of agents given by index, by body; refuse what is no index."""
     indices = range(len(agents))
     try:
         named = [[agents[indices.index(i)] for i in body] for body in bodies]
     except (TypeError, ValueError):
         allowed = f"agent indices by body, 0 to {len(agents) - 1}"
-        raise ValueError(f"bodies = {shown(bodies)}: must be {allowed}") from None
-    check_names(names_of(named), agents, "bodies")
+        raise ValueError(f"bodies = {quote(bodies)}: must be {allowed}") from None
+    check_names([name for body in named for name in body], agents, "bodies")
     return named
 
 
-def _order(text: str) -> dict[str, Any]:
-    """Read a word, or all names separated by commas."""
-    if text in ("listed", "reversed", "interleaved"):
-        return {"order": text}
-    names = tuple(name.strip() for name in text.split(","))
-    if not all(names):
-        raise ValueError(f"order must be written a,b,c, received {text!r}")
-    return {"order": names}
-
-
-def _neighbours(text: str) -> dict[str, Any]:
-    """Read a shape, or pairs of names as ``a-b,b-c``."""
-    if text in ("scenario", *get_args(Shape)):
-        return {"shape": text}
-    pairs = _split(text, "-")
-    for pair in pairs:
-        if len(pair) != 2 or not all(pair):
-            raise ValueError(
-                f"must be {', '.join(get_args(Shape))}, or pairs a-b, received {'-'.join(pair)!r}"
-            )
-    return {"edges": pairs}
-
-
-def _edges(text: str) -> dict[str, Any]:
-    """Read ``"a>b,b>c,d"``: edges, and agents that stand alone."""
-    parts = _split(text, ">")
-    for part in parts:
-        if len(part) > 2 or not all(part):
-            raise ValueError(f"an edge must be written a>b, received {'>'.join(part)!r}")
-    alone = tuple(part[0] for part in parts if len(part) == 1)
-    return {"edges": tuple(part for part in parts if len(part) == 2), "alone": alone}
-
-
-def _split(text: str, sign: str) -> tuple[tuple[str, ...], ...]:
-    return tuple(tuple(name.strip() for name in part.split(sign)) for part in text.split(","))
-
-
-ARGUMENTS: dict[str, tuple[str, str | Callable[[str], dict[str, Any]]]] = {
-    "chain": ("reversed|interleaved|NAME,NAME,...", _order),
-    "tree": ("BRANCHING", "branching"),
-    "star": ("LEADER", "leader"),
-    "teams": ("star", "link"),
-    "coordination-graph": ("line|ring|tree|grid|scenario|A-B,B-C,...", _neighbours),
-    "edges": ("A>B,B>C,D", _edges),
-    "random": ("SEED", "seed"),
-    "file": ("PATH.graphml|PATH.json|PATH.toml", "path"),
-}
-"""By kind what may follow ``kind:``, in words, and the setting that it is or how it is read."""
-
-
-def _arguments(kind: str, text: str) -> dict[str, Any]:
+def _arguments(kind: str, text: str) -> Keys:
     """Return the settings that stand in ``"kind:text"``."""
     if kind not in ARGUMENTS:
         raise ValueError(f"takes no argument, received {text!r}")
@@ -366,124 +311,3 @@ def _arguments(kind: str, text: str) -> dict[str, Any]:
         return read_as(text)
     is_number = TOPOLOGIES.model(kind).model_fields[read_as].annotation is int
     return {read_as: int(text) if is_number and text.removeprefix("-").isdecimal() else text}
-
-
-def read_file(path: str) -> nx.DiGraph | dict[str, Any]:
-    """Read a graph, or a topology as it stands in a spec, from GraphML, JSON or TOML by suffix.
-
-    JSON and TOML hold a table, perhaps under ``topology``: of edges, ``{"edges": [["a", "b"], ...],
-    "alone": [...]}``, of nested teams, ``{"members": [...]}``, or with the key ``kind``. In GraphML
-    an agent is named by its node's id.
-
-    Returns
-    -------
-    networkx.DiGraph or dict
-        The graph, or the table.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or holds neither.
-    """
-    suffix = Path(path).suffix
-    if suffix not in sources.GRAPHS:
-        raise ValueError(f"{path}: suffix must be .graphml, .json or .toml")
-    text = sources.active().text(path)
-    try:
-        if suffix == ".graphml":
-            graph = nx.parse_graphml(text, node_type=_name)
-            check_legible(graph)
-            return graph
-        return _table_of(tomllib.loads(text) if suffix == ".toml" else json.loads(text))
-    except RecursionError:
-        raise ValueError(f"{path} holds no graph: it is nested too deeply") from None
-    except (
-        ValueError, KeyError, TypeError, AttributeError, SyntaxError, nx.NetworkXException
-    ) as error:  # fmt: skip
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise ValueError(f"{path} holds no graph: {reason}") from None
-
-
-def call_builder(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies) -> nx.Graph:
-    """Return the graph that a user's function of this name makes.
-
-    Raises
-    ------
-    ValueError
-        If it raises, returns neither a graph nor pairs, or not the same ones twice.
-    """
-    graph, again = (_called(build, name, agents, bodies) for _ in range(2))
-    if set(graph.edges) != set(again.edges):
-        raise ValueError(
-            f"{name} returned another hierarchy when called again; random numbers must be drawn "
-            "from a seed of its own"
-        )
-    return graph
-
-
-def _called(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies) -> nx.Graph:
-    most = len(agents) ** 2
-    try:
-        result = build(tuple(agents), tuple(tuple(body) for body in bodies))
-        if isinstance(result, nx.Graph):
-            list(map(str, result))  # an object of the user's may refuse to
-            return result
-        edges = _pairs(result, most)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        ours = {__file__, registry.__file__}
-        frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename not in ours]
-        # Of the user's file, whatever library it has called.
-        lines = [f.lineno for f in frames if f.filename == frames[0].filename]
-        where = f" in line {lines[-1]}" if lines else ""
-        raise ValueError(
-            f"{name} raised {type(error).__name__}{where}: {sources.message(error)}"
-        ) from None
-    if edges is None:
-        raise ValueError(
-            f"{name} returned {type(result).__name__}, allowed: a networkx DiGraph, a Graph "
-            "of neighbours, or a list of nothing but pairs (superior, subordinate)"
-        )
-    if len(edges) > most:
-        raise ValueError(f"{name} gave more than {most} pairs of {len(agents)} agents")
-    return with_edges(independent(agents), edges)
-
-
-def _pairs(result: Any, most: int) -> list[tuple[str, str]] | None:
-    """Return pairs of names, one more than `most` at most; None if it holds something else."""
-    if not isinstance(result, Iterable):
-        if iscoroutine(result):
-            result.close()  # or Python says that nobody has awaited it
-        return None
-    pairs = list(islice(result, most + 1))
-    if not all(isinstance(pair, Collection) and len(pair) == 2 for pair in pairs):
-        return None
-    return [(str(superior), str(subordinate)) for superior, subordinate in pairs]
-
-
-def _table_of(content: Any) -> dict[str, Any]:
-    """Return the topology's table that a file holds."""
-    if isinstance(content, dict) and isinstance(content.get("topology"), dict):
-        content = content["topology"]
-    if not isinstance(content, dict) or not {"kind", "members", "edges"} & content.keys():
-        raise ValueError("it must be a table with one of the keys edges, members and kind")
-    if content.get("kind") == "file":
-        raise ValueError("kind = 'file': a file cannot name another one")
-    check_legible(_names([content.get(key) for key in ("members", "edges", "alone")]))
-    return content
-
-
-def _names(content: Any) -> Iterator[str]:
-    """Yield the texts in lists, at any depth."""
-    if isinstance(content, str):
-        yield content
-    for part in content if isinstance(content, list) else ():
-        yield from _names(part)
-
-
-def _name(text: str | None) -> str:
-    """Return what GraphML calls an agent; networkx would call it None if there is nothing."""
-    if text is None:
-        raise ValueError("a node has no id, or an edge no source or target")
-    return text

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -21,13 +20,12 @@ from ..core.numerics import FloatArray, nx
 
 COLUMNS = 6
 """Levels side by side before the picture is folded."""
-WIDTH, HEIGHT = 1.25, 0.3
+WIDTH = 1.25
+HEIGHT = 0.3
 """Size of an agent [in]."""
-ACROSS, DOWN = 1.7, 0.44
+ACROSS = 1.7
+DOWN = 0.44
 """Distance of columns and of rows [in]."""
-ARROW: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 8, "shrinkA": 0, "shrinkB": 0}
-BOX: dict[str, Any] = {"boxstyle": "round,pad=0.05", "edgecolor": "#666666", "linewidth": 0.8}
-"""How arrows and agents look."""
 COLOURS = ("#cfe2f3", "#fde5cd", "#d9ead3", "#ead1dc", "#fff2cc", "#d0e0e3", "#e6d5c3", "#d9d2e9")
 """Fill of the agents by body, again from the start when they run out."""
 
@@ -63,9 +61,11 @@ def draw(
     if Path(path).suffix not in (".svg", ".png", ".pdf"):
         raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
     places = positions(hierarchy)
-    low, high = places.min(axis=0), places.max(axis=0)
+    low = places.min(axis=0)
+    high = places.max(axis=0)
     width, height = high - low + (WIDTH + 0.6, HEIGHT + 1.1)
-    width, centre = max(width, 4.5, 0.09 * len(title)), (low[0] + high[0]) / 2
+    width = max(width, 4.5, 0.09 * len(title))
+    centre = (low[0] + high[0]) / 2
     figure = Figure(figsize=(width, height))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
@@ -86,10 +86,11 @@ def draw(
     notes += ["grey arrows: implied by the others"] * bool(implied)
     styles = {_style(hierarchy, edge)[1] for edge in hierarchy.edges} - {""}
     notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
-    middle: dict[str, Any] = {"ha": "center", "va": "center"}
-    axes.text(centre, top + 0.27, title, fontsize=10, **middle)
-    bottom, noted = top + height - 0.17, "; ".join(notes)
-    axes.text(centre, bottom, noted, fontsize=7.5, color="#555555", **middle)
+    axes.text(centre, top + 0.27, title, fontsize=10, ha="center", va="center")
+    bottom = top + height - 0.17
+    axes.text(
+        centre, bottom, "; ".join(notes), fontsize=7.5, color="#555555", ha="center", va="center"
+    )
     # Without date and random identifiers, equal hierarchies give equal files.
     metadata = {"Date": None} if Path(path).suffix == ".svg" else None
     with matplotlib.rc_context({"svg.hashsalt": "nested-agents", "svg.fonttype": "none"}):
@@ -110,7 +111,8 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
         return radius * np.stack([np.sin(turns), -np.cos(turns)], axis=1)
     graph = nx.DiGraph(hierarchy.edges)
     graph.add_nodes_from(range(n))
-    places, bands = np.zeros((n, 2)), np.zeros(n, dtype=int)
+    places = np.zeros((n, 2))
+    bands = np.zeros(n, dtype=int)
     for number, level in enumerate(nx.topological_generations(graph)):
         beside = {i: np.mean(places[list(graph.pred[i]), 1]) if number else 0.0 for i in level}
         ranked = sorted(level, key=lambda i: (beside[i], -len(hierarchy.below(i)), i))
@@ -132,10 +134,20 @@ def _arrows(
     for edge in hierarchy.edges:
         colour, thickness, order = ("#c4c4c4", 0.6, 1) if edge in implied else ("#444444", 1.0, 2)
         start, end, bend = _route(*places[list(edge)])
-        look = {"linewidth": thickness, "color": colour, "zorder": order, **ARROW}
-        look["linestyle"] = _style(hierarchy, edge)[0]
-        bent = f"arc3,rad={bend}"
-        axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), connectionstyle=bent, **look))
+        arrow = FancyArrowPatch(
+            tuple(start),
+            tuple(end),
+            connectionstyle=f"arc3,rad={bend}",
+            arrowstyle="-|>",
+            mutation_scale=8,
+            shrinkA=0,
+            shrinkB=0,
+            linewidth=thickness,
+            linestyle=_style(hierarchy, edge)[0],
+            color=colour,
+            zorder=order,
+        )
+        axes.add_patch(arrow)
 
 
 def _style(hierarchy: Hierarchy, edge: tuple[int, int]) -> tuple[str, str]:
@@ -165,11 +177,21 @@ def _agents(
     axes: Axes, hierarchy: Hierarchy, places: FloatArray, fills: list[str], failing: Sequence[int]
 ) -> None:
     for rank, i in enumerate(hierarchy.order, 1):
-        (x, y), name = places[i], hierarchy.agents[i]
+        x, y = places[i]
+        name = hierarchy.agents[i]
         corner = x - WIDTH / 2 + 0.05, y - HEIGHT / 2 + 0.05
-        frame = BOX | {"edgecolor": "#B00020", "linestyle": "--"} if i in failing else BOX
-        look = {"facecolor": fills[i], "zorder": 3, **frame}
-        axes.add_patch(FancyBboxPatch(corner, WIDTH - 0.1, HEIGHT - 0.1, **look))
+        box = FancyBboxPatch(
+            corner,
+            WIDTH - 0.1,
+            HEIGHT - 0.1,
+            boxstyle="round,pad=0.05",
+            facecolor=fills[i],
+            edgecolor="#B00020" if i in failing else "#666666",
+            linestyle="--" if i in failing else "-",
+            linewidth=0.8,
+            zorder=3,
+        )
+        axes.add_patch(box)
         size = min(8.5, 8.5 * 15 / len(name))
         left = x - WIDTH / 2 + 0.07
         axes.text(left, y, str(rank), fontsize=6.5, va="center", color="#777777", zorder=4)

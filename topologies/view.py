@@ -16,7 +16,8 @@ from ..core.hierarchy.failures import MessageFailure
 from ..core.hierarchy.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, parse
 from .builders import check_legible, names_of
-from .config import ARGUMENTS, read
+from .config import read
+from .strings import ARGUMENTS
 
 Form = Literal["table", "json"]
 
@@ -64,9 +65,10 @@ class HierarchyView:
     @property
     def title(self) -> str:
         """What it is, in one line."""
-        n, depth = len(self.hierarchy), self.hierarchy.depth
+        n = len(self.hierarchy)
+        depth = self.hierarchy.depth
         agents = f"{n} agent{'s' if n > 1 else ''}"
-        count = readable(sum(self.tries))
+        count = format_count(sum(self.tries))
         return f"{self.text}: {agents}, depth {depth}, {count} joint actions a step"
 
 
@@ -83,7 +85,7 @@ def view(
         If the topology or the numbers are refused.
     """
     settings = parse(text)
-    named = named_by(settings) if per == "actuator" else ()
+    named = names_in(settings) if per == "actuator" else ()
     names, bodies = team_of(agents, robots, named)
     names, blocks = joint_blocks(names, bodies, actions, per)
     if per != "actuator":
@@ -92,12 +94,12 @@ def view(
     return HierarchyView(text, hierarchy, bodies, actions ** len(blocks[0]))
 
 
-def named_by(settings: TopologySettings) -> tuple[str, ...]:
+def names_in(settings: TopologySettings) -> tuple[str, ...]:
     """Return the agents that the settings themselves name, in order; none for most kinds."""
     if settings.kind == "file":
         content = read(settings.title)
         if isinstance(content, TopologySettings):
-            return named_by(content)
+            return names_in(content)
         names = [str(node) for node in content]
     else:  # lists in settings are lists of names, but for those that all topologies have
         shared = set(TopologySettings.model_fields)
@@ -144,7 +146,7 @@ def team_of(
     return names, tuple(tuple(range(r * wheels, (r + 1) * wheels)) for r in range(robots))
 
 
-def kinds() -> str:
+def list_kinds() -> str:
     """Return all topologies, built-in and installed, for printing."""
     lines = []
     for kind in TOPOLOGIES.built_in:
@@ -158,22 +160,23 @@ def kinds() -> str:
     return "\n".join(lines)
 
 
-def printed(shown: HierarchyView, form: Form) -> str:
+def format_view(view: HierarchyView, form: Form) -> str:
     """Return a view for printing."""
-    hierarchy = shown.hierarchy
-    names, n = hierarchy.agents, len(hierarchy)
+    hierarchy = view.hierarchy
+    names = hierarchy.agents
+    n = len(hierarchy)
     below = [[names[j] for j in hierarchy.below(i)] for i in range(n)]
     if form == "json":
         content = {
-            "topology": shown.text,
+            "topology": view.text,
             "agents": names,
             "edges": [(names[a], names[b]) for a, b in hierarchy.edges],
             "neighbours": [(names[a], names[b]) for a, b in hierarchy.neighbours],
             "order": [names[i] for i in hierarchy.order],
             "below": dict(zip(names, below, strict=True)),
-            "remarks": shown.remarks,
+            "remarks": view.remarks,
             "depth": hierarchy.depth,
-            "joint_actions_per_step": sum(shown.tries),
+            "joint_actions_per_step": sum(view.tries),
         }
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items())
         return "{" + ",\n ".join(lines) + "}"
@@ -183,16 +186,16 @@ def printed(shown: HierarchyView, form: Form) -> str:
     rows = [("", "agent", "below", "tries", "neighbours" if beside else "subordinates")]
     for rank, i in enumerate(hierarchy.order):
         subordinates = ", ".join(under[i]) or "-"
-        tried = readable(shown.tries[i])
+        tried = format_count(view.tries[i])
         rows.append((str(rank + 1), names[i], str(len(below[i])), tried, subordinates))
     legend = [
         "In order of decision. below: agents whose actions it tries; tries: joint",
         "actions tried a step.",
     ]
-    return "\n".join([shown.title, *shown.remarks, "", *aligned(rows, "><>><"), "", *legend])
+    return "\n".join([view.title, *view.remarks, "", *align(rows, "><>><"), "", *legend])
 
 
-def aligned(rows: Sequence[Sequence[str]], sides: str, heads: int = 0) -> list[str]:
+def align(rows: Sequence[Sequence[str]], sides: str, heads: int = 0) -> list[str]:
     """Return rows as lines, columns aligned to `sides` (< or >), within a terminal's width.
 
     What does not fit is cut; but with `heads`, columns beyond these first ones follow below, as a
@@ -205,9 +208,10 @@ def aligned(rows: Sequence[Sequence[str]], sides: str, heads: int = 0) -> list[s
     ends = [end - 2 for end in accumulate(width + 2 for width in widths)]
     if heads and ends[-1] > most:
         n = max(heads + 1, sum(end <= most for end in ends))
-        first, rest = [r[:n] for r in rows], [[*r[:heads], *r[n:]] for r in rows]
-        below = ["", *aligned(rest, sides[:heads] + sides[n:], heads)] * (n < len(widths))
-        return [*aligned(first, sides[:n]), *below]
+        first = [r[:n] for r in rows]
+        rest = [[*r[:heads], *r[n:]] for r in rows]
+        below = ["", *align(rest, sides[:heads] + sides[n:], heads)] * (n < len(widths))
+        return [*align(first, sides[:n]), *below]
     lines = []
     for row in rows:
         cells = (f"{c:{s}{w}}" for c, s, w in zip(row, sides, widths, strict=True))
@@ -224,12 +228,12 @@ def _broken(row: Sequence[str], column: int, most: int) -> Iterator[tuple[str, .
     yield from zip_longest(*cells, fillvalue="")
 
 
-def readable(number: int, few: int = 10**9) -> str:
+def format_count(number: int, few: int = 10**9) -> str:
     """Return an integer with all digits if it is below `few`, else in powers of ten.
 
     Examples
     --------
-    >>> readable(1364), readable(4**40)
+    >>> format_count(1364), format_count(4**40)
     ('1,364', '1.209e24')
     """
     if number < few:

@@ -10,8 +10,9 @@ from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..plugins.settings import PartSettings
 from .adaptive import Adaptive, DynamicsModel
+from .calibration import Calibration, CalibrationSettings
 from .predictors import GivenPredictor
-from .self_model import Calibration, CalibrationSettings, SelfModel, SelfModelSettings
+from .self_model import SelfModel, SelfModelSettings
 
 
 class Foresight:

@@ -26,7 +26,8 @@ class LearnedPrediction(Prediction):
     """
 
     def __init__(self, predictor: Any, present: FloatArray) -> None:
-        self._predictor, self.present = predictor, present
+        self._predictor = predictor
+        self.present = present
         self._reached = predictor.reached(present)
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
         self._first: IntArray | None = None
@@ -34,7 +35,8 @@ class LearnedPrediction(Prediction):
         same = (self._reached[:, :, None] == self._reached[:, None]).all(axis=3)
         self._level = same.argmax(axis=2) if predictor.own_rules else np.tile(np.arange(a), (n, 1))
         if predictor.digits.size:
-            groups, digits = np.array(predictor.groups), predictor.digits
+            groups = np.array(predictor.groups)
+            digits = predictor.digits
             places = a ** np.arange(digits.shape[1])[::-1]
             self._first = first_alike(self._level[groups[:, None], digits[None]] @ places)
 
@@ -79,10 +81,12 @@ class TabulatedPrediction(LearnedPrediction, Tables):
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions."""
-        p, (shared, row) = self._predictor, self._table
+        p = self._predictor
+        shared, row = self._table
         g = p.group_of[agent]
         own_rows = self._level[agent][p.digits[:, p.groups[g].index(agent)]]
         own = self._reached[agent]
         if not own.shape[1]:
-            own, own_rows = own[:1], own_rows[:0]
+            own = own[:1]
+            own_rows = own_rows[:0]
         return Blocks(own, shared[g], int(p.divisors[g]), own_rows, row)

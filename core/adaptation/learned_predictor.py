@@ -60,8 +60,10 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
     """
 
     def __init__(self, settings: LearnedPredictorSettings, scenario: Scenario) -> None:
-        self.settings, self.space = settings, scenario.state_space
-        self.groups, self.n_actions = scenario.groups, len(scenario.action_set)
+        self.settings = settings
+        self.space = scenario.state_space
+        self.groups = scenario.groups
+        self.n_actions = len(scenario.action_set)
         space = self.space
         if not space.shared:
             raise ValueError("learner.predictor: all state variables are an agent's own")
@@ -86,15 +88,18 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         self.grains = GRAIN * (high - low)[: space.n_own]
         self._pending: list[tuple[FloatArray, IntArray, FloatArray]] = []
         self._tabulate()
-        (b, w), v = self.bodies.members.shape, len(self.bodies.common)
-        k, rules = w * (space.n_own or self.n_actions + 1), self.bodies.rules.n_rules
+        b, w = self.bodies.members.shape
+        v = len(self.bodies.common)
+        k = w * (space.n_own or self.n_actions + 1)
+        rules = self.bodies.rules.n_rules
         if k * rules * min(b, 2) > MOST_FEATURES:
             raise ValueError(
                 f"learner.predictor: {k * rules * min(b, 2)} features to regress on, allowed "
                 f"{MOST_FEATURES}; take fewer products or memberships"
             )
         r = self.own_rules.n_rules if self.own_rules else 0
-        of_own, f = (self.kinds.max() + 1, self.n_actions, r), k * rules
+        of_own = (self.kinds.max() + 1, self.n_actions, r)
+        f = k * rules
         self.memory: dict[str, FloatArray] = {
             "own_gram": np.zeros((*of_own, r)),
             "own_moment": np.zeros((*of_own, space.n_own)),
@@ -110,7 +115,8 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
 
     def _tabulate(self) -> None:
         """Write out the actions of a group, and of all agents if they are few."""
-        a, n = self.n_actions, len(self.kinds)
+        a = self.n_actions
+        n = len(self.kinds)
         sizes = {len(group) for group in self.groups}
         self.group_of = np.repeat(np.arange(len(self.groups)), [len(g) for g in self.groups])
         self.digits = self.joint = np.zeros((0, 0), dtype=np.int64)
@@ -148,16 +154,19 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         if self.own_rules is not None:
             self._regress_own(before, joint, after)
         if self.mirror is not None:
-            signs, partners = self.mirror.signs, self.mirror.partners
+            signs = self.mirror.signs
+            partners = self.mirror.partners
             before = np.concatenate([before, signs * before[:, partners]])
             after = np.concatenate([after, signs * after[:, partners]])
-        seen, every = self.memory["seen"], np.concatenate([before, after])
+        seen = self.memory["seen"]
+        every = np.concatenate([before, after])
         seen[0] = np.minimum(seen[0], every.min(axis=(0, 1)))
         seen[1] = np.maximum(seen[1], every.max(axis=(0, 1)))
         self._regress(before, joint, after)
 
     def _regress_own(self, before: FloatArray, joint: IntArray, after: FloatArray) -> None:
-        m, own = self.memory, self.space.n_own
+        m = self.memory
+        own = self.space.n_own
         assert self.own_rules is not None
         phi = self.own_rules.features(before[..., :own].reshape(-1, own))
         change = self._apart(after, before)[..., :own].reshape(-1, own)
@@ -168,7 +177,8 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         m["own_weights"] = np.linalg.solve(gram, m["own_moment"])
 
     def _regress(self, before: FloatArray, joint: IntArray, after: FloatArray) -> None:
-        bodies, m = self.bodies, self.memory
+        bodies = self.bodies
+        m = self.memory
         b, v = bodies.agents.shape
         change = self._apart(after, before)[:, bodies.agents, bodies.columns]
         present = before[:, bodies.agents, bodies.columns]
@@ -177,7 +187,8 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         features = self.drivers(after[..., : self.space.n_own], joint)[..., None] * phi
         features = features.reshape(len(before), b, -1)
         targets = np.concatenate([change, after[:, bodies.agents, bodies.columns]], axis=2)
-        each, together = features.reshape(len(before) * b, -1), features.sum(axis=1)
+        each = features.reshape(len(before) * b, -1)
+        together = features.sum(axis=1)
         common = np.tile(bodies.common, 2)
         summed = np.where(common, targets[:, 0], targets.sum(axis=1))
         of_all = together.T @ together
@@ -200,7 +211,9 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         """
         each, of_all, rest = self.memory["gram"]
         moment, summed = self.memory["moment"]
-        f, own, others = len(each), np.zeros_like(moment), np.zeros_like(moment)
+        f = len(each)
+        own = np.zeros_like(moment)
+        others = np.zeros_like(moment)
         explained: FloatArray = np.zeros(len(common))
         if len(self.bodies.members) == 1:
             own, explained = self._ridge(each, moment)
@@ -209,7 +222,8 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         gram = np.block([[each, across], [across, rest + each]])
         both = np.concatenate([moment, summed - moment])[:, ~common]
         weights, explained[~common] = self._ridge(gram, both)
-        own[:, ~common], others[:, ~common] = weights[:f], weights[f:]
+        own[:, ~common] = weights[:f]
+        others[:, ~common] = weights[f:]
         weights, explained[common] = self._ridge(of_all, summed[:, common])
         own[:, common] = others[:, common] = weights
         return own, others, explained
@@ -244,7 +258,8 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
 
     def after(self, states: FloatArray, drivers: FloatArray) -> FloatArray:
         """Return the shared variables ``(G, m, s)`` that drivers ``(m, b, k)`` lead to."""
-        bodies, m = self.bodies, self.memory
+        bodies = self.bodies
+        m = self.memory
         columns = bodies.columns[0]
         present = states[bodies.agents, bodies.columns]
         ranges = np.ascontiguousarray(m["seen"][:, columns])

@@ -25,8 +25,8 @@ from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray, IntArray, njit
 from ..plugins.settings import PartSettings, Positive, unwritten
+from ..rules.kernels.compact_states import active_compact
 from ..rules.kernels.fuzzy import Packed, Partition
-from ..rules.kernels.states import active_compact
 from ..rules.rule_base import RuleBase
 from .adaptive import DynamicsModel
 
@@ -115,7 +115,8 @@ class Mirror:
     """
 
     def __init__(self, signs: FloatArray, partners: IntArray) -> None:
-        self.signs, self.partners = signs, partners
+        self.signs = signs
+        self.partners = partners
 
     @classmethod
     def of(cls, scenario: Scenario) -> Mirror:
@@ -185,7 +186,9 @@ class DrivenBodies:
     """
 
     def __init__(self, scenario: Scenario, *, products: str, memberships: int | None) -> None:
-        space, groups, roles = scenario.state_space, scenario.groups, scenario.roles
+        space = scenario.state_space
+        groups = scenario.groups
+        roles = scenario.roles
         common = {j for j, v in enumerate(space.variables) if v.name in space.common}
         columns = range(space.n_own, space.n_variables)
         alike = len({tuple(roles[i] for i in group) for group in groups}) == 1
@@ -238,12 +241,15 @@ def driven_states(  # type: ignore[no-untyped-def]
     packed
         Layout of the rule base.
     """
-    (m, b, k), v = drivers.shape, present.shape[1]
-    begun, moved = np.empty((m * b, v)), np.empty((b, 2 * v))
+    m, b, k = drivers.shape
+    v = present.shape[1]
+    begun = np.empty((m * b, v))
+    moved = np.empty((b, 2 * v))
     for at in range(m * b):
         for x in range(v):
             begun[at, x] = present[at % b, x]
-    middle, states = begun.copy(), begun.copy()
+    middle = begun.copy()
+    states = begun.copy()
     for ahead in range(horizon * passes):
         if ahead % passes == 0:
             for at in range(m * b):
@@ -259,7 +265,8 @@ def driven_states(  # type: ignore[no-untyped-def]
                     if driver == 0.0:
                         continue
                     for a in range(rules.shape[1]):
-                        share, effect = driver * strengths[at, a], weights[j, rules[at, a]]
+                        share = driver * strengths[at, a]
+                        effect = weights[j, rules[at, a]]
                         for x in range(2 * v):
                             moved[i, x] += share * effect[x]
             for x in range(v):

@@ -1,4 +1,4 @@
-"""What bodies learn of themselves and of what they push, from how they were seen to move.
+"""What bodies learn of themselves, from how they were seen to move.
 
 A *self-model* says what each wheel of a body does to its motion. The twist of a body in its own
 frame is taken as linear in its commanded wheel speeds::
@@ -15,21 +15,6 @@ filter takes what is left over for a change and goes after it, surer of it than 
 keeps count of how large its innovations have been, in units of what it expected: its own
 covariance, which decides how fast it learns, stays as it is; the deviations that it reports are
 multiplied by that ratio (Birge 1932).
-
-*Calibration* estimates the constants of a team's predictor while bodies push.
-
-Positive constants are known up to factors, whose logarithms x are estimated by a Kalman filter;
-0 is what was believed at first. What a decision led to is a vector of speeds z = h(x) + noise, h
-being the prediction. It has kinks where contacts stick or slip, so it is linearised statistically,
-over the whole of what is thought possible (cubature rule: Arasaratnam & Haykin 2009). With
-x = m + L u, L L' = P, and z+, z- predicted at u = +-sqrt(n) e_j::
-
-    G_j = (z+_j - z-_j) / (2 sqrt(n)),   N = variance of (z+_j + z-_j) / 2 + noise^2
-    P <- L (I + G' W / N G)^-1 L',       m <- m + L (I + G' W / N G)^-1 G' W / N (z - mean z)
-
-N holds what is not linear, too. The weight W of a body falls below 1 when it did what the filter
-does not believe possible: a jam, a wheel that fails, a body that gets in the way. Of such a
-decision little is learned. What drifts is added to P, so that it never falls to nothing.
 """
 
 from __future__ import annotations
@@ -41,7 +26,7 @@ import numpy as np
 from ..interface.prediction import EmbodiedPrediction
 from ..interface.scenario import Scenario, Transition
 from ..numerics import FloatArray, IntArray
-from ..plugins.settings import NonNegative, Positive, Settings
+from ..plugins.settings import Positive, Settings
 from .adaptive import Adaptive
 
 MEMORY = 100
@@ -96,7 +81,8 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
         # A turning rate is measured in units of the nominal body's own turning per wheel speed.
         turning = [max(1.0, float(np.abs(effect[2]).max())) for effect in nominal]
         self._units = [np.array([1.0, 1.0, unit]) for unit in turning]
-        of_effect, of_constant = settings.prior_effect**2, settings.prior_constant**2
+        of_effect = settings.prior_effect**2
+        of_constant = settings.prior_constant**2
         wheels = [effect.shape[1] - 1 for effect in nominal]
         self._priors = [np.diag([of_effect] * w + [of_constant]) for w in wheels]
         self._covariances = [np.stack([prior] * 3) for prior in self._priors]
@@ -140,15 +126,20 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
         """
         if transition.twists is None:
             return
-        speeds, slips = prediction.commands(joint_action), prediction.slips(joint_action)
+        speeds = prediction.commands(joint_action)
+        slips = prediction.slips(joint_action)
         free = transition.twists[-len(slips) :] - slips
         for body, group in enumerate(prediction.groups):
             self.observe(body, speeds[list(group)], free[body])
 
     def observe(self, body: int, speeds: FloatArray, twist: FloatArray) -> None:
         """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
-        settings, regressor, ratio = self._settings, np.append(speeds, 1.0), self._ratios[body]
-        noise, effect, covariance = settings.noise**2, self.effects[body], self._covariances[body]
+        settings = self._settings
+        regressor = np.append(speeds, 1.0)
+        ratio = self._ratios[body]
+        noise = settings.noise**2
+        effect = self.effects[body]
+        covariance = self._covariances[body]
         for row, unit in enumerate(self._units[body]):
             innovation = float(twist[row] - effect[row] @ regressor) / unit
             carried = covariance[row] @ regressor
@@ -174,128 +165,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
 
     def continue_from(self, former: SelfModel) -> None:
         """Go on from what another one has learned, if its bodies are built alike; else anew."""
-        mine, theirs = self._nominal, former._nominal
+        mine = self._nominal
+        theirs = former._nominal
         if len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs)):
-            self.restore(former.arrays())
-
-
-class CalibrationSettings(Settings):
-    """Whether and how fast a team revises the constants of its predictor."""
-
-    enabled: bool = False
-    """Whether constants are revised; otherwise they stay as the scenario believes them to be."""
-    prior: Positive = 0.7
-    """Standard deviation of the logarithm of a constant at first: 0.7 is a factor of 2."""
-    noise: Positive = 0.008
-    """Standard deviation of a measured speed around the predicted one [m/s]."""
-    surprise: Positive = 4.0
-    """Mean squared innovation of a body, in units of the expected square, above which it counts
-    less."""
-    drift: NonNegative = 0.003
-    """What is added to the standard deviation (as squares) by every decision that pushes."""
-
-
-class Calibration(Adaptive[EmbodiedPrediction]):
-    """Estimates the logarithms of ``n`` constants, in units of what was believed at first.
-
-    Parameters
-    ----------
-    settings
-        Uncertainties of prior and measurement.
-    n
-        Number of constants.
-    levers
-        ``(B,)`` speed per turning rate of each body that is measured [m].
-
-    Examples
-    --------
-    A box that moves at half the speed per constant: measured is what a constant 1.5 times as large
-    as believed would give.
-
-    >>> calibration = Calibration(CalibrationSettings(enabled=True), 1, np.array([0.1]))
-    >>> for _ in range(20):
-    ...     predicted = np.zeros((2, 1, 3))
-    ...     predicted[:, 0, 0] = 0.05 * np.exp(calibration.points[:, 0])
-    ...     calibration.observe(np.array([[0.075, 0.0, 0.0]]), predicted)
-    >>> round(float(np.exp(calibration.constants[0])), 1)
-    1.5
-    """
-
-    def __init__(self, settings: CalibrationSettings, n: int, levers: FloatArray) -> None:
-        self.settings = settings
-        self.constants: FloatArray = np.zeros(n)
-        self._covariance: FloatArray = settings.prior**2 * np.eye(n)
-        self._root = np.linalg.cholesky(self._covariance)
-        self._units = np.stack([np.ones_like(levers), np.ones_like(levers), levers], axis=1)
-
-    @classmethod
-    def of(cls, settings: CalibrationSettings, scenario: Scenario) -> Calibration | None:
-        """Return that of a scenario's predictor, none if it is not enabled.
-
-        Raises
-        ------
-        ValueError
-            If the predictor has no constants.
-        """
-        if not settings.enabled:
-            return None
-        bodies = scenario.embodiment()
-        if bodies is None or not bodies.constants:
-            raise ValueError(
-                "learner.calibration.enabled: the scenario's predictor has no constants to "
-                "calibrate"
-            )
-        return cls(settings, len(bodies.constants), bodies.levers)
-
-    def adapt(
-        self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
-    ) -> None:
-        """Hold the constants against how what bodies push moved by a joint action, if it did."""
-        twists, n_bodies = transition.twists, len(prediction.groups)
-        if twists is not None and twists[:-n_bodies].any():
-            self.observe(twists, prediction.outcomes(joint_action, self.points))
-
-    @property
-    def points(self) -> FloatArray:
-        """Constants ``(2 n, n)`` whose outcomes are to be predicted: m + L u, then m - L u."""
-        spread = np.sqrt(len(self.constants)) * self._root.T
-        return self.constants + np.concatenate([spread, -spread])
-
-    def observe(self, measured: FloatArray, predicted: FloatArray) -> None:
-        """Take in the twists ``(B, 3)`` of all bodies against those ``(2 n, B, 3)`` predicted."""
-        n, settings = len(self.constants), self.settings
-        plus, minus = self._units * predicted[:n], self._units * predicted[n:]
-        slope = (plus - minus) / (2.0 * np.sqrt(n))
-        if not slope.any():
-            return
-        middle = 0.5 * (plus + minus)
-        mean = middle.mean(axis=0)
-        noise = settings.noise**2 + ((middle - mean) ** 2).mean(axis=0)
-        innovation = self._units * measured - mean
-        surprise = (innovation**2 / (noise + (slope**2).sum(axis=0))).mean(axis=1)
-        weight = np.minimum(1.0, settings.surprise / np.maximum(surprise, 1e-300)) ** 2
-        slope = slope.reshape(n, -1)
-        weighted = slope * (weight[:, None] / noise).ravel()
-        posterior = np.linalg.inv(np.eye(n) + weighted @ slope.T)
-        root = self._root
-        self.constants += root @ (posterior @ (weighted @ innovation.ravel()))
-        covariance = root @ posterior @ root.T
-        # Nothing becomes less certain than it was at first.
-        known = np.diagonal(covariance) + settings.drift**2 < settings.prior**2
-        self._covariance = 0.5 * (covariance + covariance.T) + np.diag(known * settings.drift**2)
-        self._root = np.linalg.cholesky(self._covariance)
-
-    def arrays(self) -> dict[str, FloatArray]:
-        """Return constants and covariance."""
-        return {"constants": self.constants, "covariance": self._covariance}
-
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
-        self.constants[:] = arrays["constants"]
-        self._covariance = arrays["covariance"].copy()
-        self._root = np.linalg.cholesky(self._covariance)
-
-    def continue_from(self, former: Calibration) -> None:
-        """Go on from what another one has learned, if it measures bodies alike; else anew."""
-        if np.array_equal(self._units, former._units):
             self.restore(former.arrays())

@@ -103,9 +103,9 @@ class Elimination:
                 f"width {self.width} of the coordination graph takes tables of {n_actions} ** "
                 f"{1 + self.width} entries, allowed: {MOST_ENTRIES:,}; use max-plus"
             )
-        self._steps = tuple(self._planned(scopes))
+        self._steps = tuple(self._plan(scopes))
 
-    def _planned(self, scopes: Sequence[Scope]) -> list[_Step]:
+    def _plan(self, scopes: Sequence[Scope]) -> list[_Step]:
         known: dict[int, Scope] = dict(enumerate(scopes))
         steps = []
         for agent in self.order:
@@ -172,10 +172,16 @@ class MaxPlus:
     """
 
     def __init__(
-        self, scopes: Sequence[Scope], n: int, n_actions: int,
-        rounds: int = 100, damping: float = 0.5,
-    ) -> None:  # fmt: skip
-        self.n, self.n_actions, self.rounds = n, n_actions, rounds
+        self,
+        scopes: Sequence[Scope],
+        n: int,
+        n_actions: int,
+        rounds: int = 100,
+        damping: float = 0.5,
+    ) -> None:
+        self.n = n
+        self.n_actions = n_actions
+        self.rounds = rounds
         # Tables over the same agents are added up: apart, they would receive their own messages.
         apart = list(dict.fromkeys(scopes))
         self._place = [apart.index(scope) for scope in scopes]
@@ -199,21 +205,24 @@ class MaxPlus:
         tables
             One for each scope, in their order; not modified.
         """
-        members, a = self._members, self.n_actions
+        members = self._members
+        a = self.n_actions
         count, k = members.shape
         full = np.zeros((count, *[a] * k))
         for place, table in zip(self._place, tables, strict=True):
             # The same along the axes of agents that are not there.
             full[place] += table[(..., *[None] * (k - table.ndim))]
         to_agents = np.zeros((count, k, a))  # messages of tables
-        best, greatest = np.zeros(self.n, dtype=np.int64), -np.inf
+        best = np.zeros(self.n, dtype=np.int64)
+        greatest = -np.inf
         for _ in range(self.rounds):
             sums = np.zeros((self.n + 1, a))
             np.add.at(sums, members, to_agents)
             joint = np.append(sums[:-1].argmax(axis=1), 0)
             worth = float(full[(np.arange(count), *joint[members].T)].sum())
             if worth > greatest:
-                best, greatest = joint[:-1].copy(), worth
+                best = joint[:-1].copy()
+                greatest = worth
             to_tables = sums[members] - to_agents  # what agents heard of other tables
             to_tables[members == self.n] = 0.0
             new = self._messages(full, to_tables)
@@ -221,7 +230,7 @@ class MaxPlus:
             to_agents = self.damping * to_agents + (1.0 - self.damping) * new
             if change < 1e-9:
                 break
-        return self._improved(full, best)
+        return self._improve(full, best)
 
     def _messages(self, full: FloatArray, to_tables: FloatArray) -> FloatArray:
         """Return what tables tell their agents ``(tables, k, A)``, with the mean taken away."""
@@ -235,7 +244,7 @@ class MaxPlus:
             new[:, p] = total.max(axis=others) - to_tables[:, p]
         return new - new.mean(axis=2, keepdims=True)
 
-    def _improved(self, full: FloatArray, best: IntArray) -> IntArray:
+    def _improve(self, full: FloatArray, best: IntArray) -> IntArray:
         """Return a joint action that no agent can improve alone."""
         joint = np.append(best, 0)
         gained = True
@@ -248,7 +257,8 @@ class MaxPlus:
                     index[place] = slice(None)
                     values += full[(table, *index)]
                 if values.max() > values[joint[i]] + 1e-12 * max(1.0, abs(values.max())):
-                    joint[i], gained = int(values.argmax()), True
+                    joint[i] = int(values.argmax())
+                    gained = True
         return joint[:-1]
 
 
@@ -257,12 +267,12 @@ Shape = Literal["line", "ring", "tree", "grid"]
 as nearly a square as the number of agents allows."""
 
 
-def shaped(shape: Shape, n: int) -> nx.Graph:
+def build_shape(shape: Shape, n: int) -> nx.Graph:
     """Return a graph of n agents.
 
     Examples
     --------
-    >>> [sorted(shaped(shape, 4).edges) for shape in ("tree", "grid")]
+    >>> [sorted(build_shape(shape, 4).edges) for shape in ("tree", "grid")]
     [[(0, 1), (0, 2), (1, 3)], [(0, 1), (0, 2), (1, 3), (2, 3)]]
     """
     if shape == "grid":
@@ -274,13 +284,13 @@ def shaped(shape: Shape, n: int) -> nx.Graph:
     return nx.cycle_graph(n) if shape == "ring" and n > 2 else nx.path_graph(n)
 
 
-def others(graph: nx.Graph, seed: int) -> nx.Graph:
+def other_edges(graph: nx.Graph, seed: int) -> nx.Graph:
     """Return a graph of as many edges, if there are so many, none of them one of `graph`.
 
     Examples
     --------
-    >>> ring = shaped("ring", 8)
-    >>> wrong = others(ring, 0)
+    >>> ring = build_shape("ring", 8)
+    >>> wrong = other_edges(ring, 0)
     >>> wrong.size(), any(ring.has_edge(*edge) for edge in wrong.edges)
     (8, False)
     """
@@ -291,7 +301,7 @@ def others(graph: nx.Graph, seed: int) -> nx.Graph:
     return changed
 
 
-def oriented(graph: nx.Graph, order: Sequence[str], *, fill_in: bool) -> nx.DiGraph:
+def orient(graph: nx.Graph, order: Sequence[str], *, fill_in: bool) -> nx.DiGraph:
     """Return a graph whose edges lead from whom comes first in `order` to whom comes later.
 
     With `fill_in`, those who are above an agent are joined, too, from the last agent to the first:
@@ -300,7 +310,7 @@ def oriented(graph: nx.Graph, order: Sequence[str], *, fill_in: bool) -> nx.DiGr
     Examples
     --------
     >>> ring = nx.cycle_graph("abcd")
-    >>> sorted(oriented(ring, "abcd", fill_in=True).edges)
+    >>> sorted(orient(ring, "abcd", fill_in=True).edges)
     [('a', 'b'), ('a', 'c'), ('a', 'd'), ('b', 'c'), ('c', 'd')]
     """
     place = {agent: k for k, agent in enumerate(order)}

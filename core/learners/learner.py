@@ -10,8 +10,9 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
+from ..adaptation.calibration import CalibrationSettings
 from ..adaptation.predictors import GivenPredictor, Predictor
-from ..adaptation.self_model import CalibrationSettings, SelfModelSettings
+from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import (
     EXPLORATIONS,
     BurstExploration,

@@ -31,7 +31,7 @@ from pydantic import Field
 
 from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Fraction, NonNegative, Positive
-from ..rules.kernels.states import add_features, td_update
+from ..rules.kernels.updates import add_features, td_update
 from ..rules.rule_base import RuleBase
 from .learner import Learner, LearnerSettings
 

@@ -10,7 +10,7 @@ from .arrays import (
     quadrature,
     wrap,
 )
-from .compiler import INNER, LOCK, Kernel, njit, serve, stamp
+from .compiler import INNER, LOCK, Kernel, interpreted, njit, serve, stamp
 from .libraries import Deferred, nx, optimize, pd, special, stats
 from .random import set_words, stream_of, words_of
 
@@ -25,6 +25,7 @@ __all__ = [
     "IntArray",
     "Kernel",
     "greatest",
+    "interpreted",
     "njit",
     "nx",
     "optimize",

@@ -30,11 +30,11 @@ import re
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from types import CodeType, FunctionType
-from typing import Any, TypeVar, cast
+from typing import IO, Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -61,10 +61,11 @@ class Kernel:
         Of `numba.njit`.
     """
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable[..., object], options: Mapping[str, object]) -> None:
         update_wrapper(self, function)
         # Division by zero gives what it gives in NumPy: that compiles sooner than an exception.
-        self.py_func, self._options = function, {"error_model": "numpy"} | options
+        self.py_func = function
+        self._options = {"error_model": "numpy", **options}
         self._ready: Callable[..., Any] | None = None
 
     # What nobody calls is not compiled: a third to a half of a small kernel is its wrappers.
@@ -72,14 +73,19 @@ class Kernel:
     @cached_property
     def compiled(self) -> Any:
         """What numba makes of the function for Python to call."""
-        return self._made("", no_cfunc_wrapper=True)
+        return self._compile("", no_cfunc_wrapper=True)
 
     @cached_property
     def inner(self) -> Any:
         """What numba makes of the function for other kernels to call, by far the less code."""
-        return self._made(INNER, no_cfunc_wrapper=True, no_cpython_wrapper=True)
+        return self._compile(INNER, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
-    def _made(self, suffix: str, **options: bool) -> Any:
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes this for in kernels that name it as an attribute of its module."""
+        return self.compiled._numba_type_
+
+    def _compile(self, suffix: str, **options: bool) -> Any:
         import numba
 
         function = self.py_func
@@ -88,19 +94,23 @@ class Kernel:
             for name in set(_names(function.__code__))
             if isinstance(thing := function.__globals__.get(name), Kernel)
         }
-        seen = FunctionType(
-            function.__code__, function.__globals__ | kernels, function.__name__,
-            function.__defaults__, function.__closure__,
-        )  # fmt: skip
-        seen.__module__, seen.__qualname__ = function.__module__, function.__qualname__ + suffix
-        compiled = numba.njit(**self._options, **options)(seen)
+        copy = FunctionType(
+            function.__code__,
+            function.__globals__ | kernels,
+            function.__name__,
+            function.__defaults__,
+            function.__closure__,
+        )
+        copy.__module__ = function.__module__
+        copy.__qualname__ = function.__qualname__ + suffix
+        compiled = numba.njit(**self._options, **options)(copy)
         file = _cache_file(compiled)
         if file is not None:  # interpreted kernels, NUMBA_DISABLE_JIT=1, have none
             source = Path(function.__code__.co_filename)
             file._source_stamp = (file._source_stamp, stamp(source))
         return compiled
 
-    def __call__(self, *args: Any) -> Any:
+    def __call__(self, *args: object) -> Any:
         """Call the compiled function."""
         if self._ready is not None:
             return self._ready(*args)
@@ -114,36 +124,38 @@ class Kernel:
             self._ready = compiled
         return result
 
-    def _compile_apart(self, compiled: Any, args: tuple[Any, ...]) -> None:
+    def _compile_apart(self, compiled: Any, args: tuple[object, ...]) -> None:
         """See to it that the cache has the function for arguments of these types, if it can be."""
         types = tuple(map(compiled.typeof_pyval, args))
         key = compiled._cache._index_key(types, compiled.targetctx.codegen())
         if key not in compiled._cache._cache_file._load_index():
             with contextlib.suppress(OSError, pickle.PicklingError, AttributeError, TypeError):
-                child: Any = _child(os.getpid())
+                requests, answers = _child(os.getpid())
                 place = self.py_func.__module__, self.py_func.__name__
-                pickle.dump((sys.path, *place, pickle.dumps(types)), child.stdin)
-                child.stdin.flush()
-                child.stdout.read(1)
-
-    def __getattr__(self, name: str) -> Any:
-        """Return what the compiled function has: its statistics, its type in other kernels."""
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return getattr(self.compiled, name)
+                pickle.dump((sys.path, *place, pickle.dumps(types)), requests)
+                requests.flush()
+                answers.read(1)
 
 
 @cache
-def _child(parent: int) -> subprocess.Popen[bytes]:
-    """Return the process that compiles for a process; it ends when that one does."""
+def _child(parent: int) -> tuple[IO[bytes], IO[bytes]]:
+    """Return where a process asks the one that compiles for it, and where that one answers.
+
+    It ends when the process does.
+    """
     program = f"from {__name__} import serve; serve()"
     child = subprocess.Popen(
-        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        [sys.executable, "-c", program],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         start_new_session=True,
-    )  # fmt: skip
+    )
     atexit.register(child.__exit__, None, None, None)
-    return child
+    assert child.stdin is not None  # it is a pipe
+    assert child.stdout is not None
+    return child.stdin, child.stdout
 
 
 def serve() -> None:
@@ -158,20 +170,25 @@ def serve() -> None:
             return
         gc.disable()  # that takes a tenth of a compilation
         with contextlib.suppress(Exception):
-            kernel = getattr(importlib.import_module(module), name)
+            kernel = vars(importlib.import_module(module))[name]
             kernel.compiled.compile(pickle.loads(types))
         gc.enable()
         sys.stdout.buffer.write(b".")
         sys.stdout.buffer.flush()
 
 
-def njit(**options: Any) -> Callable[[F], F]:
+def njit(**options: object) -> Callable[[F], F]:
     """Return a decorator like `numba.njit` that compiles at the first call, see `Kernel`."""
 
     def decorate(function: F) -> F:
         return cast(F, Kernel(function, options))
 
     return decorate
+
+
+def interpreted(kernel: F) -> F:
+    """Return the function that a kernel compiles: where it is called once it is not worth that."""
+    return cast(F, kernel.py_func) if isinstance(kernel, Kernel) else kernel
 
 
 def _names(code: CodeType) -> Iterator[str]:
@@ -183,7 +200,7 @@ def _names(code: CodeType) -> Iterator[str]:
 
 def _cache_file(compiled: Any) -> Any:
     """Return numba's index of cached versions; interpreted and uncached functions have none."""
-    return getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    return None if isinstance(compiled, FunctionType) else vars(compiled._cache).get("_cache_file")
 
 
 @contextlib.contextmanager
@@ -201,7 +218,8 @@ def _alone(file: Any) -> Iterator[None]:
 
 def stamp(path: Path) -> str:
     """Return a digest of a file and of all files that it imports, directly or not."""
-    paths, left = {path}, [path]
+    paths = {path}
+    left = [path]
     while left:
         new = _imported(left.pop()) - paths
         paths |= new

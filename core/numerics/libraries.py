@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from scipy import optimize, special, stats
 else:
-    nx, pd = Deferred("networkx"), Deferred("pandas")
+    nx = Deferred("networkx")
+    pd = Deferred("pandas")
     optimize, special, stats = map(Deferred, ("scipy.optimize", "scipy.special", "scipy.stats"))
 
 __all__ = ["nx", "optimize", "pd", "special", "stats"]

@@ -259,7 +259,7 @@ def is_reference(text: object) -> bool:
 
 def is_file(text: object) -> bool:
     """Tell whether a text names a file that holds a hierarchy."""
-    return isinstance(text, str) and text.endswith(GRAPHS)
+    return isinstance(text, str) and text.lower().endswith(GRAPHS)
 
 
 def mentions(value: object, key: str = "") -> Iterator[tuple[str, str]]:

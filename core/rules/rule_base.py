@@ -24,11 +24,12 @@ from pydantic import Field
 
 from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
-from ..numerics import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray, interpreted
 from ..plugins.settings import Positive, Settings
+from .kernels.compact_states import active_compact, each_compact, total_compact
 from .kernels.dense import Tried, enumerate_dense, enumerate_looked_up, values_dense
+from .kernels.dense_states import each_dense
 from .kernels.fuzzy import Partition, layout, unpack
-from .kernels.states import active_compact, each_compact, each_dense, total_compact
 
 
 class RuleBaseSettings(Settings):
@@ -116,14 +117,15 @@ class RuleBase:
         self.partitions = tuple(partitions)
         self.terms = tuple(terms)
         self.n_own = n_own
-        self.common, self.actions = frozenset(common), frozenset(actions)
+        self.common = frozenset(common)
+        self.actions = frozenset(actions)
         self.sizes = tuple(prod(self.partitions[j].size for j in term) for term in self.terms)
         self.n_rules = sum(self.sizes)
         if self.n_rules > MOST_RULES:
             raise ValueError(f"rule base: {self.n_rules} rules, allowed {MOST_RULES} at most")
         self.layout = layout(self.partitions, self.terms, n_own)
         # Not worth compiling it for.
-        lay = getattr(unpack, "py_func", unpack)(self.layout)
+        lay = interpreted(unpack)(self.layout)
         self.n_parts = int(lay.row_sizes @ lay.part_sizes)
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
@@ -187,7 +189,8 @@ class RuleBase:
         ValueError
             If the states have another shape.
         """
-        strengths, parts = self._strengths(states), []
+        strengths = self._strengths(states)
+        parts = []
         for term in self.terms:
             product = np.ones((len(states), 1))
             for j in term:
@@ -229,8 +232,9 @@ class RuleBase:
         """Return the summed value ``(m,)`` of some agents, each thing shared valued once.
 
         Own variables are those of all agents, shared ones those of the bodies, as of
-        `core.rules.kernels.states.total_compact`. Shapes are trusted: an evaluator calls this many
-        times at every decision. Where all rules are active, each agent is valued by itself.
+        `core.rules.kernels.compact_states.total_compact`. Shapes are trusted: an evaluator calls
+        this many times at every decision. Where all rules are active, each agent is valued by
+        itself.
         """
         weights, agents, _, firsts = pooled
         if self.compact:

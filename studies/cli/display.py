@@ -58,7 +58,7 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
     int
         1 if any trial failed, else 0.
     """
-    from ...topologies.builders import listed
+    from ...topologies.builders import join_names
     from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
     from ..presentation.progress import count, say
 
@@ -69,7 +69,7 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
     drawn = figures.save(study.figures, folder, formats or figures.USUAL)
     print("", *(f"figure  {path}" for path in drawn), sep="\n")
     if study.unlearned:
-        names = listed(study.unlearned, 3)
+        names = join_names(study.unlearned, 3)
         print_wrapped(
             f"{names}: no better than frozen weights in evaluation. What to try, and in which "
             "order: docs/not_learned.md; nested-agents tune tries it for you.",

@@ -16,7 +16,8 @@ from ...core.plugins.trust import is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
 from ..presentation.progress import count, duration, say
 from ..spec.outline import StudyOutline, other_spec, outdated
-from ..store.store import Store, look
+from ..store.store import Store
+from ..store.writer import look
 from ..workers.runner import cores
 
 if TYPE_CHECKING:

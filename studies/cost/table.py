@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from ...core.agents.cost import Problem, is_chain
 from ...core.numerics import pd
-from ...topologies.view import aligned, readable
+from ...topologies.view import align, format_count
 from ..presentation.tables import in_csv, in_latex
 from .cost import (
     LABELLED,
@@ -77,7 +77,7 @@ def scientific(value: int | Fraction | None) -> str:
         return "-"
     if isinstance(value, Fraction) and value.denominator > 1 and value < 1000:
         return f"{float(value):.4g}"
-    return readable(round(value), 10**7)
+    return format_count(round(value), 10**7)
 
 
 def _record(row: CostRow) -> dict[str, Any]:
@@ -126,14 +126,14 @@ def _network_cells(row: CostRow) -> list[str]:
 
 def _table(rows: Sequence[CostRow]) -> str:
     tables = _cells(rows)
-    lines = [*aligned(tables["topology"], "><>>>>>", 2), ""]
+    lines = [*align(tables["topology"], "><>>>>>", 2), ""]
     lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
     if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
         lines.append("The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4.")
     if "formula" in tables:
         same = [row.formula == row.measured.counted for row in rows if row.measured is not None]
         lines += ["", f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):"]
-        lines += ["", *aligned(tables["formula"], "><>>>>>>", 2), ""]
+        lines += ["", *align(tables["formula"], "><>>>>>>", 2), ""]
         lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
         most = max((len(row.measured.repeats) for row in rows if row.measured), default=1)
         if most > 1:
@@ -142,7 +142,7 @@ def _table(rows: Sequence[CostRow]) -> str:
         lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
     if "network" in tables:
         lines += ["", "Messages of a decision, and how long it waits for them [s]:", ""]
-        lines += [*aligned(tables["network"], "><>>>>>>", 2), ""]
+        lines += [*align(tables["network"], "><>>>>>>", 2), ""]
         lines += ["in turn: how many follow one another, others going at once, of 1 or 10 ms each;"]
         lines += ["*: on a channel that carries one message at a time."]
     return "\n".join(lines)

@@ -36,7 +36,7 @@ from ...core.plugins.trust import modules_in
 from ...core.plugins.words import closest
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
-from ...topologies.builders import listed
+from ...topologies.builders import join_names
 from ..errors import SpecError, refused
 from ..store.database import DATABASE, SPEC_FILE
 from .conditions import Condition, Curriculum, Length, Name, Override
@@ -363,13 +363,13 @@ class Spec(Settings):
         left_out = dict.fromkeys(key for c in self.conditions() for key in c.left_out)
         if left_out:
             kinds = dict.fromkeys(kind for c in self.conditions() for kind in c.other_kinds)
-            keys = listed(left_out, MOST_KEYS)
-            lines.append(f"{keys}: of the preset, left out for {listed(kinds, MOST_KEYS)}")
+            keys = join_names(left_out, MOST_KEYS)
+            lines.append(f"{keys}: of the preset, left out for {join_names(kinds, MOST_KEYS)}")
         controls = [c for c in self.conditions() if c.settings.learner.kind == "frozen"]
         tuned = self.learner.keys() - LearnerSettings.model_fields.keys() - {"kind"}
         if tuned and controls:
             keys = ", ".join(f"learner.{key}" for key in sorted(tuned))
-            labels = listed((condition.label for condition in controls), 3)
+            labels = join_names((condition.label for condition in controls), 3)
             lines.append(f"{keys}: left out for {labels}, which learn nothing")
         for condition in self.conditions():
             lines += condition.settings.warnings()

@@ -15,8 +15,10 @@ from ..errors import SpecError
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import aliases, dumps, flat, named
-from ..store.database import DATABASE, SPEC_FILE, DamageError, NoStudyError, Noted
-from ..store.store import Store, locked
+from ..store.connection import DamageError
+from ..store.database import DATABASE, SPEC_FILE, NoStudyError, Noted
+from ..store.store import Store
+from ..store.writer import locked
 from .episodes import column_of
 from .trial import Trial, trials_of
 

@@ -21,7 +21,8 @@ from platform import python_version
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from ..store.store import Running, Store
+from ..store.store import Store
+from ..store.writer import Running
 
 if TYPE_CHECKING:
     from ..spec.spec import Spec

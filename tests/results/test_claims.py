@@ -44,6 +44,7 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.studies import STUDIES
 from nested_agents.studies.trials.session import check
 
+POINTS = Path(__file__).resolve().parents[2] / "examples" / "worlds" / "pushing_points.py"
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "claims.md"
 
 
@@ -402,7 +403,7 @@ REST = {
     '[evaluations]\n"told only".topology.considers = "none"',
     "related": 'evaluations.star.box = "star"\n[[overrides]]\nname = "nested"\n'
     '[[overrides]]\nname = "pushing points, team"\n'
-    'scenario = { kind = "pushing-points", observed = "joint" }',
+    f'scenario = {{ kind = "{POINTS}:PushingPoints", observed = "joint" }}',
     "scaling": '[[overrides]]\nname = "exact"\nsweep.scenario.robots = [1, 2]',
     "wheel-failure": "scenario.failures = "
     '[{kind = "seized", wheels = "robot1.left", episode = 5}]\n'

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from nested_agents.studies.cli.main import main
-from nested_agents.topologies import build
-from nested_agents.topologies.config import parse
-from nested_agents.topologies.view import named_by
+from nested_agents.topologies import build, parse
+from nested_agents.topologies.view import names_in
 
 GRAPHML = '<graphml xmlns="http://graphml.graphdrawing.org/xmlns"><graph edgedefault="directed">'
 HOSTILE = {
@@ -143,7 +142,7 @@ def test_damaged_files_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 def told(name: str) -> str | None:
     """Return why a file is refused; None if it is not."""
     try:
-        named_by(parse(name))
+        names_in(parse(name))
     except ValueError as error:
         return str(error).removeprefix(f"topology '{name}': ")
     return None

@@ -10,23 +10,35 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...numerics import FloatArray, IntArray, njit
-from .contraction import LANES, contract, many_strengths
-from .fuzzy import Layout, Packed, unpack
-from .states import looked_up
+from ...numerics import BoolArray, FloatArray, IntArray, njit
+from .compact_states import looked_up
+from .contraction import contract
+from .fuzzy import BlockTables, Layout, Packed, unpack
+from .strengths import LANES, many_strengths
 
 _FAST = {"reassoc", "contract"}
 
 
 @njit(cache=True, fastmath=_FAST)
-def _fold_weights(weights, start, size, m, strengths, out, lanes) -> None:  # type: ignore[no-untyped-def]
+def _fold_weights(
+    weights: FloatArray,
+    start: int,
+    size: int,
+    m: int,
+    strengths: FloatArray,
+    out: FloatArray,
+    lanes: int,
+) -> None:
     """Contract the last axis of weights that are the same in all lanes."""
     for i in range(size // m):
         at = start + i * m
         # The plain loop makes a decision take .99 to 1.07 times as long (paired, 5^7, n = 4).
         if m == 5:
-            a, b, c = weights[at], weights[at + 1], weights[at + 2]
-            d, e = weights[at + 3], weights[at + 4]
+            a = weights[at]
+            b = weights[at + 1]
+            c = weights[at + 2]
+            d = weights[at + 3]
+            e = weights[at + 4]
             for k in range(np.uint64(lanes)):
                 out[i, k] = (
                     (a * strengths[0, k] + b * strengths[1, k])
@@ -42,7 +54,9 @@ def _fold_weights(weights, start, size, m, strengths, out, lanes) -> None:  # ty
 
 
 @njit(cache=True, fastmath=_FAST)
-def _fold_rows(rows, size, m, strengths, out, lanes) -> None:  # type: ignore[no-untyped-def]
+def _fold_rows(
+    rows: FloatArray, size: int, m: int, strengths: FloatArray, out: FloatArray, lanes: int
+) -> None:
     """Contract the last axis of `size` rows of lanes."""
     for i in range(size // m):
         at = i * m
@@ -54,7 +68,15 @@ def _fold_rows(rows, size, m, strengths, out, lanes) -> None:  # type: ignore[no
 
 
 @njit(cache=True)
-def fold(partial, strengths, lay: Layout, one, two, out, wanted) -> None:  # type: ignore[no-untyped-def]
+def fold(
+    partial: FloatArray,
+    strengths: FloatArray,
+    lay: Layout,
+    one: FloatArray,
+    two: FloatArray,
+    out: FloatArray,
+    wanted: int,
+) -> None:
     """Contract what `contract` left for one own block with shared blocks side by side.
 
     Parameters
@@ -76,7 +98,8 @@ def fold(partial, strengths, lay: Layout, one, two, out, wanted) -> None:  # typ
     out[:] = 0.0
     start = 0
     for t in range(len(lay.lengths)):
-        size, first = lay.shared_sizes[t], lay.own_lengths[t]
+        size = lay.shared_sizes[t]
+        first = lay.own_lengths[t]
         v = lay.lengths[t] - 1
         if first > v:
             out += partial[start]
@@ -102,13 +125,17 @@ CHUNK = 64
 def values_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(m,)`` of states ``(m, d)``, all membership functions active."""
     lay = unpack(packed)
-    out, none = np.empty(len(states)), np.empty(0, np.int64)
+    out = np.empty(len(states))
+    none = np.empty(0, np.int64)
     for begin in range(0, len(states), CHUNK):
         chunk = states[begin : begin + CHUNK]
-        own, shared = chunk[:, : lay.n_own].copy(), chunk[:, lay.n_own :].copy()
-        every, first = np.empty(len(chunk), np.int64), np.empty(len(chunk), np.int64)
+        own = chunk[:, : lay.n_own].copy()
+        shared = chunk[:, lay.n_own :].copy()
+        every = np.empty(len(chunk), np.int64)
+        first = np.empty(len(chunk), np.int64)
         for s in range(len(chunk)):  # states of one own block share its contraction
-            every[s], first[s] = s, 0
+            every[s] = s
+            first[s] = 0
             while first[s] < s and (own[first[s]] != own[s]).any():
                 first[s] += 1
         values = folded(theta, (own, first, shared, none, 1), every, lay)
@@ -118,7 +145,7 @@ def values_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> Float
 
 
 @njit(cache=True)
-def pairs(tables, indices):  # type: ignore[no-untyped-def]
+def pairs(tables: BlockTables, indices: IntArray) -> tuple[IntArray, IntArray, IntArray, BoolArray]:
     """Sort joint-action indices by the blocks that they lead to.
 
     Parameters
@@ -139,8 +166,10 @@ def pairs(tables, indices):  # type: ignore[no-untyped-def]
     """
     own, own_rows, shared, shared_rows, divisor = tables
     n_local = len(own_rows) if len(own_rows) else len(own)
-    slots, used = np.full(len(own), -1), np.empty(len(own), np.int64)
-    slot_of, row_of = np.empty(len(indices), np.int32), np.empty(len(indices), np.int32)
+    slots = np.full(len(own), -1)
+    used = np.empty(len(own), np.int64)
+    slot_of = np.empty(len(indices), np.int32)
+    row_of = np.empty(len(indices), np.int32)
     count = 0
     for c in range(len(indices)):
         local = indices[c] // divisor % n_local
@@ -158,7 +187,7 @@ def pairs(tables, indices):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def folded(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # type: ignore[no-untyped-def]
+def folded(theta: FloatArray, tables: BlockTables, indices: IntArray, lay: Layout) -> FloatArray:
     """Return f of joint-action indices from block tables, all membership functions active.
 
     Contracts theta with each own block that occurs, once; each distinct pair of own and shared
@@ -173,8 +202,11 @@ def folded(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # type
         if wanted[:, row].any():
             met[n_met] = row
             n_met += 1
-    n_shared, most, at = shared.shape[1], lay.counts.max(), shared[met[:n_met]]
-    strengths, peaks = np.zeros((n_shared, most, n_met)), np.zeros((len(lay.counts), most))
+    n_shared = shared.shape[1]
+    most = lay.counts.max()
+    at = shared[met[:n_met]]
+    strengths = np.zeros((n_shared, most, n_met))
+    peaks = np.zeros((len(lay.counts), most))
     for j in range(n_shared):
         many_strengths(lay.n_own + j, at[:, j], lay, strengths[j])
         for s in range(most):
@@ -183,7 +215,9 @@ def folded(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # type
     contract(theta, own[used], peaks, lay, partial)
     room = np.zeros((n_shared, most, LANES), theta.dtype)
     one = np.empty((lay.shared_sizes.max(), LANES), theta.dtype)
-    two, sums, rows = np.empty_like(one), np.empty(LANES, theta.dtype), np.empty(LANES, np.int64)
+    two = np.empty_like(one)
+    sums = np.empty(LANES, theta.dtype)
+    rows = np.empty(LANES, np.int64)
     values = np.empty((count, n_rows))
     for b in range(count):
         lane = 0
@@ -216,9 +250,10 @@ Tried: TypeAlias = tuple[IntArray, IntArray, IntArray]
 
 
 @njit(cache=True)
-def _indices(tried, joint_action):  # type: ignore[no-untyped-def]
+def _indices(tried: Tried, joint_action: IntArray) -> IntArray:
     indices_of, places, _ = tried
-    given, (rows, m) = 0, indices_of.shape
+    given = 0
+    rows, m = indices_of.shape
     for i in range(len(joint_action)):
         given += places[i] * joint_action[i]
     indices = np.empty(rows * m, np.int64)
@@ -229,9 +264,10 @@ def _indices(tried, joint_action):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _aggregate(values, tried, probabilities):  # type: ignore[no-untyped-def]
+def _aggregate(values: FloatArray, tried: Tried, probabilities: FloatArray) -> FloatArray:
     """Return per own action the mean by probability ``(n, A)``, or the maximum if none is given."""
-    (n_own, m), below = tried[0].shape, tried[2]
+    n_own, m = tried[0].shape
+    below = tried[2]
     out = np.empty(n_own)
     if not len(probabilities):
         for a in range(n_own):
@@ -239,7 +275,8 @@ def _aggregate(values, tried, probabilities):  # type: ignore[no-untyped-def]
             for c in range(a * m + 1, (a + 1) * m):
                 out[a] = max(out[a], values[c])
         return out
-    joint, size = np.empty(m), 1
+    joint = np.empty(m)
+    size = 1
     joint[0] = 1.0
     for agent in below:
         n_actions = probabilities.shape[1]
@@ -260,7 +297,7 @@ def _aggregate(values, tried, probabilities):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _learned(theta) -> bool:  # type: ignore[no-untyped-def]
+def _learned(theta: FloatArray) -> bool:
     """Return whether any weight is not zero."""
     for weight in theta:  # noqa: SIM110
         if weight != 0.0:
@@ -269,7 +306,14 @@ def _learned(theta) -> bool:  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def enumerate_looked_up(theta, tables, tried, joint_action, probabilities, packed: Packed):  # type: ignore[no-untyped-def]
+def enumerate_looked_up(
+    theta: FloatArray,
+    tables: BlockTables,
+    tried: Tried,
+    joint_action: IntArray,
+    probabilities: FloatArray,
+    packed: Packed,
+) -> FloatArray:
     """Value the own actions ``(A,)`` by looking up every active rule, triangular partitions.
 
     Parameters
@@ -295,7 +339,14 @@ def enumerate_looked_up(theta, tables, tried, joint_action, probabilities, packe
 
 
 @njit(cache=True)
-def enumerate_dense(theta, tables, tried, joint_action, probabilities, packed: Packed):  # type: ignore[no-untyped-def]
+def enumerate_dense(
+    theta: FloatArray,
+    tables: BlockTables,
+    tried: Tried,
+    joint_action: IntArray,
+    probabilities: FloatArray,
+    packed: Packed,
+) -> FloatArray:
     """Do what `enumerate_looked_up` does, for sigmoid partitions."""
     if not _learned(theta):
         return np.zeros(len(tried[0]))

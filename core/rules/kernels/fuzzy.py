@@ -103,7 +103,9 @@ class Partition:
         With `count` the centres are spread evenly, on a line from end to end; without, they are
         the variable's own, or five spread evenly if it has none.
         """
-        low, high, centres = variable.low, variable.high, variable.centres
+        low = variable.low
+        high = variable.high
+        centres = variable.centres
         period = high - low if variable.periodic else 0.0
         if count is not None or not centres:
             even = np.linspace(low, high, count or 5, endpoint=not variable.periodic)
@@ -190,10 +192,15 @@ class Layout(NamedTuple):
 Packed: TypeAlias = tuple[IntArray, FloatArray]
 """A layout in two arrays, see `unpack`; a plain tuple, for one with names takes longer to pass."""
 
+BlockTables: TypeAlias = tuple[FloatArray, IntArray, FloatArray, IntArray, int]
+"""Own blocks and their rows, shared blocks and theirs, and the divisor, as in `Blocks`."""
+
 
 def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_own: int) -> Packed:
     """Pack partitions and terms for the kernels."""
-    d, t, knots = len(partitions), len(terms), [p.knots for p in partitions]
+    d = len(partitions)
+    t = len(terms)
+    knots = [p.knots for p in partitions]
     widest = (max(map(len, knots)) + 7) // 8 * 8  # whole vectors
     counts = np.array([p.size for p in partitions])
     own = [[j for j in term if j < n_own] for term in terms]
@@ -240,10 +247,15 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_
 def unpack(packed: Packed) -> Layout:
     """Return views into the arrays of a packed layout."""
     whole, real = packed
-    d, t, k = whole[1], whole[2], whole[3]
+    d = whole[1]
+    t = whole[2]
+    k = whole[3]
     # By d, by t, and what comes after them.
-    by_d, by_t, rest = 6, 6 + 2 * d, 6 + 2 * d + 8 * t
-    row, tail = d * k, 4 * d * k
+    by_d = 6
+    by_t = 6 + 2 * d
+    rest = 6 + 2 * d + 8 * t
+    row = d * k
+    tail = 4 * d * k
     return Layout(
         sigmoid=whole[0] > 0,
         counts=whole[by_d : by_d + d],

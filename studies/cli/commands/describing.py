@@ -315,9 +315,9 @@ def topology() -> None:
 @topology.command("list")
 def list_all() -> int:
     """List the topologies, built-in and installed."""
-    from ....topologies.view import kinds
+    from ....topologies.view import list_kinds
 
-    print(kinds())
+    print(list_kinds())
     return 0
 
 
@@ -353,7 +353,7 @@ def show(topology: str, form: Any, plot: Path | None, **team: Any) -> int:
     SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json,
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
-    from ....topologies.view import printed, view
+    from ....topologies.view import format_view, view
 
     with refused():
         views = _of_spec(topology)
@@ -369,7 +369,7 @@ def show(topology: str, form: Any, plot: Path | None, **team: Any) -> int:
                 path = plot.with_name(f"{plot.stem}{several}{plot.suffix}")
                 bodies, failing = shown.bodies, shown.failing
                 draw(shown.hierarchy, path, bodies=bodies, title=shown.title, failing=failing)
-            print(printed(shown, form), end="\n\n" if number < len(views) else "\n")
+            print(format_view(shown, form), end="\n\n" if number < len(views) else "\n")
     return 0
 
 

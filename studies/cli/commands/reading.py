@@ -199,7 +199,7 @@ def _texts(store: Store, form: Files) -> dict[str, str]:
     """Return the content of each file by its name, see `results.published`."""
     from ...catalogue.study import select_published
     from ...presentation.tables import in_csv
-    from ...results import published
+    from ...results import marl_eval, published
     from ...results.results import read
 
     results, outline = read(store), StudyOutline.kept(store)
@@ -209,7 +209,7 @@ def _texts(store: Store, form: Files) -> dict[str, str]:
         return {"results.json": published.dumps(outline, kept)}
     if form == "marl-eval":
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
-        return {"marl-eval.json": published.dumps_marl_eval(results, kinds, outline.study)}
+        return {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study)}
     frames = {"episodes.csv": results.episodes, "trials.csv": results.trials}
     return {name: in_csv(frame) for name, frame in frames.items()}
 

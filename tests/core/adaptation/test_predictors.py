@@ -70,14 +70,10 @@ def test_left_and_right_wheels_learn_the_same_function_in_the_mirror() -> None:
     states = rng.uniform(
         [v.low for v in variables], [v.high for v in variables], (50, len(variables))
     )
-    rules, theta = (
-        fuzzy(team).evaluator.problem.rules,
-        fuzzy(team).learner.theta,
-    )
-    left, right = (
-        rules.values(theta[0], states),
-        rules.values(theta[1], fuzzy(team).mirror.signs * states),
-    )
+    rules = fuzzy(team).evaluator.problem.rules
+    theta = fuzzy(team).learner.theta
+    left = rules.values(theta[0], states)
+    right = rules.values(theta[1], fuzzy(team).mirror.signs * states)
     assert np.abs(left).max() > 0
     np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-12)
 

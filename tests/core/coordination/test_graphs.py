@@ -13,11 +13,11 @@ from nested_agents.core.agents.cost import Problem
 from nested_agents.core.coordination.graphs import (
     Elimination,
     MaxPlus,
+    build_shape,
     interaction,
     order_of,
-    oriented,
-    others,
-    shaped,
+    orient,
+    other_edges,
 )
 
 
@@ -125,28 +125,28 @@ def test_scopes_join_their_agents():
      ("grid", 16, 24), ("grid", 7, 6)],
 )  # fmt: skip
 def test_shapes_have_their_edges_and_are_in_one_piece(shape: str, n: int, edges: int) -> None:
-    graph = shaped(shape, n)
+    graph = build_shape(shape, n)
     assert (sorted(graph), graph.size(), nx.is_connected(graph)) == ([*range(n)], edges, True)
 
 
 def test_other_edges_are_as_many_or_all_that_there_are() -> None:
-    ring = shaped("ring", 8)
-    assert set(others(ring, 1).edges) != set(others(ring, 2).edges)
+    ring = build_shape("ring", 8)
+    assert set(other_edges(ring, 1).edges) != set(other_edges(ring, 2).edges)
     for seed in range(5):
-        wrong = others(ring, seed)
+        wrong = other_edges(ring, seed)
         assert wrong.size() == 8
         assert not set(wrong.edges) & set(ring.edges)
-    assert sorted(others(shaped("ring", 4), 0).edges) == [(0, 2), (1, 3)]
+    assert sorted(other_edges(build_shape("ring", 4), 0).edges) == [(0, 2), (1, 3)]
 
 
 @pytest.mark.parametrize(
     ("shape", "n", "filled"), [("ring", 8, 13), ("line", 8, 7), ("tree", 8, 7)]
 )
 def test_fill_in_joins_all_who_are_above_one_agent(shape: str, n: int, filled: int) -> None:
-    graph = shaped(shape, n)
-    plain = oriented(graph, range(n), fill_in=False)
+    graph = build_shape(shape, n)
+    plain = orient(graph, range(n), fill_in=False)
     assert {tuple(sorted(edge)) for edge in plain.edges} == {*map(tuple, map(sorted, graph.edges))}
-    moral = oriented(graph, range(n), fill_in=True)
+    moral = orient(graph, range(n), fill_in=True)
     assert moral.size() == filled
     assert all(a < b for a, b in moral.edges)
     for agent in moral:
@@ -154,4 +154,4 @@ def test_fill_in_joins_all_who_are_above_one_agent(shape: str, n: int, filled: i
 
 
 def test_the_order_says_who_is_above_whom() -> None:
-    assert sorted(oriented(nx.path_graph(3), [1, 2, 0], fill_in=False).edges) == [(1, 0), (1, 2)]
+    assert sorted(orient(nx.path_graph(3), [1, 2, 0], fill_in=False).edges) == [(1, 0), (1, 2)]

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.rules.kernels.contraction import strengths_of
 from nested_agents.core.rules.kernels.fuzzy import Partition, layout, unpack
+from nested_agents.core.rules.kernels.strengths import strengths_of
 
 SHAPES = ("triangular", "sigmoid")
 

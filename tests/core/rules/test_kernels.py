@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.prediction import Blocks
-from nested_agents.core.rules.kernels.contraction import exponential, many_strengths
+from nested_agents.core.rules.kernels.dense_states import each_dense
 from nested_agents.core.rules.kernels.fuzzy import Partition, layout, unpack
-from nested_agents.core.rules.kernels.states import add_features, each_dense
-from nested_agents.core.rules.kernels.states import td_update as kernels_td_update
+from nested_agents.core.rules.kernels.strengths import exponential, many_strengths
+from nested_agents.core.rules.kernels.updates import add_features
+from nested_agents.core.rules.kernels.updates import td_update as kernels_td_update
 from nested_agents.core.rules.rule_base import RuleBase
 
 N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2

@@ -74,7 +74,7 @@ def test_actions_that_come_to_the_same_are_known_to_best_responses() -> None:
 
 def test_compiled_variables_are_what_their_functions_say() -> None:
     scenario = moving(6, state_space=COMPILED)
-    view = scenario.predict().seen(np.random.default_rng(3).integers(4, size=(30, 6)))
+    view = scenario.predict().view_after(np.random.default_rng(3).integers(4, size=(30, 6)))
     states = scenario._states.of_joints(view, 0, 6)[:, :, 1:]
     for column, name in enumerate(COMPILED):
         variable = CHAIN_VARIABLES.find(name)

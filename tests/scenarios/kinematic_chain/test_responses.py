@@ -75,7 +75,7 @@ def test_other_variables_are_asked_one_by_one():
     settings = KinematicChainSettings(joints=3, state_space=("bearing", "distance"))
     scenario = settings.build()
     scenario.reset(0)
-    hierarchy = Hierarchy(scenario.agents, [])
-    team = Team(BatchTDSettings(decision=DECISION), scenario, hierarchy, policy_seed(0))
-    rules = fuzzy(team).rules
-    assert scenario.predict().best_responses(rules) is None
+    team = Team(
+        BatchTDSettings(decision=DECISION), scenario, Hierarchy(scenario.agents, []), policy_seed(0)
+    )
+    assert scenario.predict().best_responses(fuzzy(team).learner.rules) is None

@@ -76,6 +76,7 @@ def test_it_keeps_the_promises_of_a_scenario(name, observed):
     joint = np.array([2, 1, 0])[: len(game.agents)]
     entered = game.step(joint).states
     prediction = game.predict()
+    assert prediction.rewards(joint[None]).shape == (1,)
     for i in range(len(game.agents)):
         assert (prediction.states(i, joint[None])[0] == entered[i]).all()
 

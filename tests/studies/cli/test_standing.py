@@ -7,7 +7,8 @@ from nested_agents.studies.cli.loading import _estimate, progress
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec import outline
 from nested_agents.studies.store import database
-from nested_agents.studies.store.store import LOCK, MARK, Running, Store, look
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.store.writer import LOCK, MARK, Running, look
 from nested_agents.studies.workers.runner import save
 
 

@@ -9,7 +9,7 @@ import pytest
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.studies.cli.main import main
 from nested_agents.topologies import TOPOLOGIES, build
-from nested_agents.topologies.view import readable, team_of
+from nested_agents.topologies.view import format_count, team_of
 
 
 @pytest.fixture
@@ -169,5 +169,5 @@ def test_what_the_user_can_mend_is_one_line(said, arguments: tuple[str, ...], me
 
 def test_teams_and_numbers() -> None:
     assert team_of(6, 2)[1] == ((0, 1, 2), (3, 4, 5))
-    assert readable(999_999_999) == "999,999,999"
-    assert readable(10**5000) == "1.000e5000"
+    assert format_count(999_999_999) == "999,999,999"
+    assert format_count(10**5000) == "1.000e5000"

@@ -28,7 +28,8 @@ import gc, json
 from nested_agents.core.numerics import Kernel
 every = [thing for thing in gc.get_objects() if type(thing) is Kernel]
 kernels = [kernel for kernel in every if "compiled" in vars(kernel)]
-print(json.dumps([[str(kernel.py_func), str(s)] for kernel in kernels for s in kernel.signatures]))
+pairs = [(kernel.py_func, s) for kernel in kernels for s in kernel.compiled.signatures]
+print(json.dumps([[str(function), str(s)] for function, s in pairs]))
 """
 
 

@@ -16,11 +16,10 @@ def test_a_team_that_likes_the_box_drives_to_it(slope, to_the_box):
     fuzzy(team).learner.theta[:, begin : begin + partitions[gap].size] = slope * np.array(
         partitions[gap].centres
     )
-
-    def choose(prediction):
-        return joint_of(team, scenario, explore=False, imagined=prediction)
-
-    fields = scenario.show_policy(choose, scenario.predict).fields
+    fields = scenario.show_policy(
+        lambda prediction: joint_of(team, scenario, explore=False, imagined=prediction),
+        scenario.predict,
+    ).fields
     assert len(fields) == 2
     for field in fields:
         far = np.hypot(*field.points[:, :2].T) > 0.25

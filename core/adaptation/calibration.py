@@ -1,0 +1,154 @@
+"""What a team learns of what it pushes, from how that was seen to move.
+
+*Calibration* estimates the constants of a team's predictor while bodies push.
+
+Positive constants are known up to factors, whose logarithms x are estimated by a Kalman filter;
+0 is what was believed at first. What a decision led to is a vector of speeds z = h(x) + noise, h
+being the prediction. It has kinks where contacts stick or slip, so it is linearised statistically,
+over the whole of what is thought possible (cubature rule: Arasaratnam & Haykin 2009). With
+x = m + L u, L L' = P, and z+, z- predicted at u = +-sqrt(n) e_j::
+
+    G_j = (z+_j - z-_j) / (2 sqrt(n)),   N = variance of (z+_j + z-_j) / 2 + noise^2
+    P <- L (I + G' W / N G)^-1 L',       m <- m + L (I + G' W / N G)^-1 G' W / N (z - mean z)
+
+N holds what is not linear, too. The weight W of a body falls below 1 when it did what the filter
+does not believe possible: a jam, a wheel that fails, a body that gets in the way. Of such a
+decision little is learned. What drifts is added to P, so that it never falls to nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..interface.prediction import EmbodiedPrediction
+from ..interface.scenario import Scenario, Transition
+from ..numerics import FloatArray, IntArray
+from ..plugins.settings import NonNegative, Positive, Settings
+from .adaptive import Adaptive
+
+
+class CalibrationSettings(Settings):
+    """Whether and how fast a team revises the constants of its predictor."""
+
+    enabled: bool = False
+    """Whether constants are revised; otherwise they stay as the scenario believes them to be."""
+    prior: Positive = 0.7
+    """Standard deviation of the logarithm of a constant at first: 0.7 is a factor of 2."""
+    noise: Positive = 0.008
+    """Standard deviation of a measured speed around the predicted one [m/s]."""
+    surprise: Positive = 4.0
+    """Mean squared innovation of a body, in units of the expected square, above which it counts
+    less."""
+    drift: NonNegative = 0.003
+    """What is added to the standard deviation (as squares) by every decision that pushes."""
+
+
+class Calibration(Adaptive[EmbodiedPrediction]):
+    """Estimates the logarithms of ``n`` constants, in units of what was believed at first.
+
+    Parameters
+    ----------
+    settings
+        Uncertainties of prior and measurement.
+    n
+        Number of constants.
+    levers
+        ``(B,)`` speed per turning rate of each body that is measured [m].
+
+    Examples
+    --------
+    A box that moves at half the speed per constant: measured is what a constant 1.5 times as large
+    as believed would give.
+
+    >>> calibration = Calibration(CalibrationSettings(enabled=True), 1, np.array([0.1]))
+    >>> for _ in range(20):
+    ...     predicted = np.zeros((2, 1, 3))
+    ...     predicted[:, 0, 0] = 0.05 * np.exp(calibration.points[:, 0])
+    ...     calibration.observe(np.array([[0.075, 0.0, 0.0]]), predicted)
+    >>> round(float(np.exp(calibration.constants[0])), 1)
+    1.5
+    """
+
+    def __init__(self, settings: CalibrationSettings, n: int, levers: FloatArray) -> None:
+        self.settings = settings
+        self.constants: FloatArray = np.zeros(n)
+        self._covariance: FloatArray = settings.prior**2 * np.eye(n)
+        self._root = np.linalg.cholesky(self._covariance)
+        self._units = np.stack([np.ones_like(levers), np.ones_like(levers), levers], axis=1)
+
+    @classmethod
+    def of(cls, settings: CalibrationSettings, scenario: Scenario) -> Calibration | None:
+        """Return that of a scenario's predictor, none if it is not enabled.
+
+        Raises
+        ------
+        ValueError
+            If the predictor has no constants.
+        """
+        if not settings.enabled:
+            return None
+        bodies = scenario.embodiment()
+        if bodies is None or not bodies.constants:
+            raise ValueError(
+                "learner.calibration.enabled: the scenario's predictor has no constants to "
+                "calibrate"
+            )
+        return cls(settings, len(bodies.constants), bodies.levers)
+
+    def adapt(
+        self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
+    ) -> None:
+        """Hold the constants against how what bodies push moved by a joint action, if it did."""
+        twists = transition.twists
+        n_bodies = len(prediction.groups)
+        if twists is not None and twists[:-n_bodies].any():
+            self.observe(twists, prediction.outcomes(joint_action, self.points))
+
+    @property
+    def points(self) -> FloatArray:
+        """Constants ``(2 n, n)`` whose outcomes are to be predicted: m + L u, then m - L u."""
+        spread = np.sqrt(len(self.constants)) * self._root.T
+        return self.constants + np.concatenate([spread, -spread])
+
+    def observe(self, measured: FloatArray, predicted: FloatArray) -> None:
+        """Take in the twists ``(B, 3)`` of all bodies against those ``(2 n, B, 3)`` predicted."""
+        n = len(self.constants)
+        settings = self.settings
+        plus = self._units * predicted[:n]
+        minus = self._units * predicted[n:]
+        slope = (plus - minus) / (2.0 * np.sqrt(n))
+        if not slope.any():
+            return
+        middle = 0.5 * (plus + minus)
+        mean = middle.mean(axis=0)
+        noise = settings.noise**2 + ((middle - mean) ** 2).mean(axis=0)
+        innovation = self._units * measured - mean
+        surprise = (innovation**2 / (noise + (slope**2).sum(axis=0))).mean(axis=1)
+        weight = np.minimum(1.0, settings.surprise / np.maximum(surprise, 1e-300)) ** 2
+        slope = slope.reshape(n, -1)
+        weighted = slope * (weight[:, None] / noise).ravel()
+        posterior = np.linalg.inv(np.eye(n) + weighted @ slope.T)
+        root = self._root
+        self.constants += root @ (posterior @ (weighted @ innovation.ravel()))
+        covariance = root @ posterior @ root.T
+        # Nothing becomes less certain than it was at first.
+        known = np.diagonal(covariance) + settings.drift**2 < settings.prior**2
+        self._covariance = 0.5 * (covariance + covariance.T) + np.diag(known * settings.drift**2)
+        self._root = np.linalg.cholesky(self._covariance)
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return constants and covariance."""
+        return {"constants": self.constants, "covariance": self._covariance}
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from `arrays`."""
+        self.constants[:] = arrays["constants"]
+        self._covariance = arrays["covariance"].copy()
+        self._root = np.linalg.cholesky(self._covariance)
+
+    def continue_from(self, former: Calibration) -> None:
+        """Go on from what another one has learned, if it measures bodies alike; else anew."""
+        if np.array_equal(self._units, former._units):
+            self.restore(former.arrays())
