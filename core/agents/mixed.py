@@ -38,7 +38,7 @@ class MixedSettings(TeamSettings):
 
     kind: Literal["mixed"] = "mixed"
     uses_hierarchy = True
-    parts: tuple[PartOfTeam, ...] = ()
+    parts: Annotated[tuple[PartOfTeam, ...], Field(min_length=1)]
     """The parts; an agent is of the first one that names it."""
 
     @property
