@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ...core.plugins.sources import Sources, meaning
 from ..errors import SpecError, show
 from ..store.database import DATABASE, SPEC_FILE
+from ..store.durable import read_text
 from ..store.store import Store
 
 if TYPE_CHECKING:
@@ -121,14 +122,16 @@ def other_spec(store: Store) -> str | None:
     if not path.exists():
         return None
     try:
-        copy = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        copy = tomllib.loads(read_text(path))
         if copy != own:
             from .spec import Spec
             from .tables import dumps
 
             tables = Spec.of(copy, sources_of(store)).table(), own
             copy, own = (tomllib.loads(dumps(table)) for table in tables)  # without what is None
-    except (OSError, ValueError, RecursionError) as error:
+    except OSError as error:
+        return f"{path}: is not the spec of {DATABASE} beside it: {error.strerror or error}"
+    except (ValueError, RecursionError) as error:
         return f"{path}: is not the spec of {DATABASE} beside it: {error}"
     for key in sorted(own.keys() | copy.keys()):
         here, there = copy.get(key, "absent"), own.get(key, "absent")

@@ -35,6 +35,7 @@ from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ...topologies.builders import join_names
 from ..errors import SpecError, refused
+from ..store.durable import read_text
 from .conditions import Condition, Curriculum, Length, Name, Override, below, expand, grid, section
 from .presets import PRESETS
 from .studies import STUDIES
@@ -294,7 +295,7 @@ class Spec(Settings):
         """
         path = Path(path)
         try:
-            text = path.read_text(encoding="utf-8-sig")
+            text = read_text(path)
         except OSError as error:
             raise SpecError(f"{path}: {error.strerror or error}") from None
         except UnicodeDecodeError:
