@@ -110,7 +110,8 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
     except OSError:
         return None
     try:
-        mark, now = json.loads(durable.read_text(directory / MARK)), time.time()
+        mark = json.loads(durable.read_text(directory / MARK))
+        now = time.time()
         seconds = {identity: max(now - begun, 0.0) for identity, begun in mark["begun"].items()}
         return mark["processes"], seconds
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
