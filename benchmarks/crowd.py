@@ -12,9 +12,9 @@ from pathlib import Path
 
 from nested_agents.core.agents.loop import control_loop, policy_seed, world_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.recording import EpisodeRecorder
-from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot
@@ -32,7 +32,7 @@ def main() -> None:
     settings = BoxPushingSettings(robots=options.robots)
     scenario = settings.build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
-    learner = TDLambdaSettings(step_size=0.05, decision=Decision())
+    learner = TDLambdaSettings(step_size=0.05, decision=DecisionSettings())
     team = Team(learner, scenario, hierarchy, policy_seed(options.seed))
     watch, steps = Stopwatch(), 0
     scenario.reset(world_seed(options.seed, 0), 0)

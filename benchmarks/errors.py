@@ -26,6 +26,7 @@ from rich.table import Table
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
@@ -35,7 +36,6 @@ from nested_agents.core.evaluators.evaluator import (
 )
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
@@ -64,7 +64,7 @@ def errors(
     scenario = BoxPushingSettings(**scenario_settings).build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
     n, neutral = len(scenario.agents), scenario.action_set.neutral
-    decision = Decision(evaluator=SamplingSettings(samples=8), teammates=teammates)
+    decision = DecisionSettings(evaluator=SamplingSettings(samples=8), teammates=teammates)
     samples: dict[str, list[tuple[float, float]]] = {}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         team = Team(BatchTDSettings(decision=decision), scenario, hierarchy, policy_seed(seed))

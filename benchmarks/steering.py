@@ -23,8 +23,8 @@ from rich.table import Table
 
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.numerics import FloatArray, IntArray, wrap
+from nested_agents.results import ROWS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.studies.claims import claims
 from nested_agents.studies.results import published
 from nested_agents.studies.results.statistics import rate
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
@@ -63,7 +63,7 @@ def heading_errors(robots: int, seed: int, episodes: int) -> FloatArray:
 
 def trained(robots: int, name: str, phase: str, condition: str) -> list[str]:
     """Return by bin how many of how many episodes of published results succeeded."""
-    results = published.load(claims.PUBLISHED / f"{name}.json").results
+    results = published.load(ROWS / f"{name}.json").results
     return counts(robots, results.seeds(condition), results.success(condition, phase))
 
 

@@ -26,7 +26,8 @@ from rich.console import Console
 from nested_agents.scenarios.box_pushing.environments import WheelsEnv
 from nested_agents.scenarios.box_pushing.world.boxes import box_for
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
-from nested_agents.scenarios.box_pushing.world.world import World, place
+from nested_agents.scenarios.box_pushing.world.starts import place
+from nested_agents.scenarios.box_pushing.world.world import World
 
 from .naive_world import NaiveWorld
 from .tables import Row, show

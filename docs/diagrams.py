@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Wedge
 
 from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.studies.claims import claims
+from nested_agents.results import ROWS
 from nested_agents.studies.presentation import figures
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
 from nested_agents.studies.results import published
@@ -244,7 +244,7 @@ def scale() -> Figure:
 def published_rate(table: str, condition: str) -> Estimate:
     """Return the success in evaluation of a published table, of `wide` that with 64 robots."""
     phase = "evaluation:sixty-four" if table == "wide" else "evaluation"
-    results = published.load(claims.PUBLISHED / f"{table}.json").results
+    results = published.load(ROWS / f"{table}.json").results
     return rate(results.success(condition, phase))
 
 

@@ -5,7 +5,6 @@ commands and modules. Little on these pages is written by hand: what columns of 
 """
 
 from collections.abc import Iterable, Iterator
-from importlib import import_module
 from pathlib import Path
 
 import click
@@ -18,7 +17,7 @@ from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLE
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
-from nested_agents.studies.cli.main import COMMANDS
+from nested_agents.studies.cli.main import COMMANDS, load_command
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.results.results import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
 from nested_agents.studies.spec.keys import tables
@@ -54,16 +53,16 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "interface.hierarchy", "interface.spaces", "interface.prediction", "interface.scenario",
-        "interface.measures", "interface.experience", "interface.plain", "agents.team",
-        "adaptation.predictors", "agents.loop", "agents.joint", "decision.exploration",
+        "interface.spaces", "interface.scenario", "interface.prediction", "interface.measures",
+        "interface.experience", "interface.agents", "interface.plain", "hierarchy.hierarchy",
+        "hierarchy.turns", "hierarchy.failures", "agents.team", "agents.fuzzy", "agents.peer",
+        "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
         "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
         "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",
         "evaluators.best_response", "evaluators.coordination", "coordination.graphs",
-        "adaptation.self_model",
-        "agents.cost", "plugins.registry", "plugins.settings", "numerics.arrays",
-        "numerics.random", "numerics.compiler", "numerics.libraries",
-        "networks.settings", "networks.peer",
+        "adaptation.predictors", "adaptation.self_model", "adaptation.foresight",
+        "networks.settings", "agents.cost", "plugins.registry", "plugins.settings",
+        "numerics.arrays", "numerics.random", "numerics.compiler", "numerics.libraries",
     )),
     "topologies": ("Who is above whom.", ("builders", "config", "drawing", )),
     "scenarios": ("Where agents act.", (
@@ -72,19 +71,24 @@ MODULES = {
         "box_pushing.environments", "adapters.passing_down", "adapters.adapted",
         "adapters.settings", "box_pushing.states.relational",
         "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
-        "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.world",
+        "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.starts",
+        "box_pushing.world.world",
         "box_pushing.pictures.rendering",
-        "box_pushing.pushing_points", "kinematic_chain.config",
+        "box_pushing.driving", "kinematic_chain.config",
         "kinematic_chain.scenario", "kinematic_chain.variables", "matrix_games.scenario",
         "matrix_games.team_games", "line_up", "faults.settings", "faults.wrappers",
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.running", "api.alternatives", "api.recovery",
+        "api.study", "api.comparison", "api.replay", "api.running", "api.planning",
+        "api.tuning", "api.reevaluation", "api.recovery",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.power", "results.contrasts", "results.published", "catalogue.study",
-        "cost.cost", "cost.table", "claims.claims",
+        "results.power", "results.contrasts", "results.aggregates", "results.published",
+        "catalogue.study", "cost.cost", "cost.table",
+    )),
+    "results": ("What has been published, and what is said of it.", (
+        "claims", "measures", "push_n",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""
@@ -225,8 +229,8 @@ def commands() -> Iterator[str]:
     yield from table(
         ("command", "purpose"), ((f"[`{n}`](#{n})", t) for n, (_, t) in COMMANDS.items())
     )
-    for name, (module, _) in COMMANDS.items():
-        command = getattr(import_module(f"nested_agents.studies.cli.commands.{module}"), name)
+    for name in COMMANDS:
+        command = load_command(name)
         yield f"## {name}\n"
         if isinstance(command, click.Group):
             for below, one in command.commands.items():

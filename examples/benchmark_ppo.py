@@ -12,8 +12,8 @@ from pathlib import Path
 
 from stable_baselines3 import PPO
 
+from nested_agents.results.push_n import LEAST_SEEDS, STEPS, Entry, TeamScores, evaluate
 from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
-from nested_agents.studies.benchmark.push_n import LEAST_SEEDS, STEPS, Entry, TeamScores, evaluate
 
 PATH, DECISIONS, ROBOTS = Path(sys.argv[1]), int(sys.argv[2]), 2
 success, steps, decisions = [], [], []

@@ -15,8 +15,8 @@ Two e-Pucks, their four wheels in a chain, learning by the default settings:
 [0, 1, 2]
 """
 
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 __version__: str
@@ -25,6 +25,7 @@ if not Path(__file__).with_name("core").exists():  # a checkout: the four folder
     __path__.append(str(Path(__file__).parents[1]))
 
 _PLACES = {
+    "Agents": ("core.interface.agents", "Agents"),
     "ActionSet": ("core.interface.spaces", "ActionSet"),
     "Analysis": ("studies.results.analysis", "Analysis"),
     "BatchTDSettings": ("core.learners.batch", "BatchTDSettings"),
@@ -38,12 +39,14 @@ _PLACES = {
     "EvaluatorSettings": ("core.evaluators", "EvaluatorSettings"),
     "ExplorationSettings": ("core.decision.exploration", "ExplorationSettings"),
     "FrozenSettings": ("core.learners.td", "FrozenSettings"),
+    "FuzzyAgents": ("core.agents.fuzzy", "FuzzyAgents"),
     "Hierarchy": ("core.hierarchy.hierarchy", "Hierarchy"),
     "KinematicChain": ("scenarios.kinematic_chain.scenario", "KinematicChain"),
     "KinematicChainSettings": ("scenarios.kinematic_chain.config", "KinematicChainSettings"),
     "LearnerSettings": ("core.learners", "LearnerSettings"),
     "LineUpSettings": ("scenarios.line_up", "LineUpSettings"),
     "Measure": ("core.interface.measures", "Measure"),
+    "Observation": ("core.interface.experience", "Observation"),
     "Partition": ("core.rules.kernels.fuzzy", "Partition"),
     "RuleBase": ("core.rules.rule_base", "RuleBase"),
     "SUCCESS": ("core.interface.measures", "SUCCESS"),
@@ -76,15 +79,15 @@ _PLACES = {
     "greatest": ("core.numerics", "greatest"),
     "load": ("studies.api.study", "load"),
     "parse_topology": ("topologies", "parse"),
-    "plan": ("studies.api.running", "plan"),
+    "plan": ("studies.api.planning", "plan"),
     "policy_seed": ("core.agents.loop", "policy_seed"),
     "power": ("studies.results.power", "power"),
     "rate": ("studies.results.statistics", "rate"),
-    "reevaluate": ("studies.api.alternatives", "reevaluate"),
-    "run": ("studies.api.study", "run"),
+    "reevaluate": ("studies.api.reevaluation", "reevaluate"),
+    "run": ("studies.api.running", "run"),
     "run_trial": ("studies.trials.session", "run_trial"),
     "seeds_for": ("studies.results.power", "seeds_for"),
-    "tune": ("studies.api.alternatives", "tune"),
+    "tune": ("studies.api.tuning", "tune"),
     "state_variable": ("scenarios.state_variables", "state_variable"),
 }
 
@@ -99,7 +102,7 @@ def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, attribute = _PLACES[name]
-    return getattr(import_module(f".{module}", __name__), attribute)
+    return resolve_name(f"{__name__}.{module}:{attribute}")
 
 
 def __dir__() -> list[str]:

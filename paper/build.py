@@ -12,9 +12,8 @@ from pathlib import Path
 import jinja2
 
 import nested_agents as na
-from nested_agents.studies.benchmark import push_n
+from nested_agents.results import ROWS, claims, push_n
 from nested_agents.studies.catalogue.chain_order import order_tests
-from nested_agents.studies.claims import claims
 from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results import published
 from nested_agents.studies.results.analysis import Summary
@@ -26,7 +25,7 @@ FOLDER = Path(__file__).parent
 @cache
 def rows(name: str) -> na.StudyResults:
     """Return the committed results of a name."""
-    return na.load(claims.PUBLISHED / f"{name}.json")
+    return na.load(ROWS / f"{name}.json")
 
 
 def cell(name: str, condition: str, column: str) -> str:
@@ -77,7 +76,7 @@ def orders() -> dict[str, str]:
 
 def verdicts() -> Counter[str]:
     """Return how many claims of the paper have each verdict."""
-    results = published.read(claims.PUBLISHED, claims.studies_of(claims.OWN))
+    results = published.read(ROWS, claims.studies_of(claims.OWN))
     findings = claims.judge({name: study.results for name, study in results.items()})
     return Counter(finding.verdict for finding in findings)
 

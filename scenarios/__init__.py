@@ -18,7 +18,6 @@ SCENARIOS = SettingsRegistry(
     "scenario",
     {
         "box-pushing": f"{__name__}.box_pushing.config:BoxPushingSettings",
-        "pushing-points": f"{__name__}.box_pushing.config:PushingPointsSettings",
         "matrix-game": f"{__name__}.matrix_games.scenario:MatrixGameSettings",
         "team-game": f"{__name__}.matrix_games.team_games:TeamGameSettings",
         "kinematic-chain": f"{__name__}.kinematic_chain.config:KinematicChainSettings",
@@ -27,6 +26,10 @@ SCENARIOS = SettingsRegistry(
         "pettingzoo": f"{__name__}.adapters.settings:PettingZooSettings",
     },
     ScenarioSettings,
+    moved={
+        "pushing-points": "is a file of its own: scenario.kind = "
+        "'examples/worlds/pushing_points.py:PushingPoints', relative to the spec",
+    },
 )
 """Scenarios by the name that specs use."""
 

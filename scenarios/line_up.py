@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property, reduce
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -61,7 +61,7 @@ class LineUpSettings(ScenarioSettings):
 
 
 class LineUp(Scenario):
-    """The line-up scenario; a `Scenario`.
+    """Carts that meet side by side on a line.
 
     Parameters
     ----------
@@ -81,7 +81,6 @@ class LineUp(Scenario):
     def __init__(self, settings: LineUpSettings) -> None:
         self.settings = settings
         self.agents = tuple(f"cart{i + 1}" for i in range(settings.carts))
-        self.groups = tuple((i,) for i in range(settings.carts))
         self.roles = ("cart",) * settings.carts
         self.action_set = ActionSet()
         self.state_space = StateSpace("line-up", (DISTANCE, LEAD), n_own=1)
@@ -101,8 +100,8 @@ class LineUp(Scenario):
         self._commands = self._commanded(joint_action)
         self._places, self._speeds = advance(self._places, self._speeds, self._commands)
         arrived = bool((np.abs(self._places) < TOLERANCE).all())
-        paid = float(reward(self._places))
-        return Transition(self._states(), paid, arrived, False, self.measure())
+        received = float(reward(self._places))
+        return Transition(self._states(), received, arrived, False, self.measure())
 
     def predict(self) -> LineUpPrediction:
         """Predict from the present state."""
@@ -110,7 +109,7 @@ class LineUp(Scenario):
         places, _ = advance(self._places, self._speeds, self._commanded(every))
         return LineUpPrediction(places.T.copy())
 
-    def measure(self) -> Mapping[str, Any]:
+    def measure(self) -> Mapping[str, object]:
         """Return the places of the carts, their mean distance from the line and spread [m]."""
         return {
             "places": self._places.copy(),
@@ -119,7 +118,7 @@ class LineUp(Scenario):
             "seconds": {"physics": 0.0, "sensors": 0.0},
         }
 
-    def constants_of_episode(self) -> Mapping[str, Any]:
+    def constants_of_episode(self) -> Mapping[str, object]:
         """Return the seconds between two recorded steps."""
         return {"dt": PERIOD}
 
@@ -128,7 +127,8 @@ class LineUp(Scenario):
         return self
 
     def _commanded(self, joint_actions: IntArray) -> FloatArray:
-        unit, limit = np.array([INCREMENT]), np.array([MAX_SPEED])
+        unit = np.array([INCREMENT])
+        limit = np.array([MAX_SPEED])
         return self.action_set.apply(self._commands, joint_actions, unit, limit)
 
     def _states(self) -> FloatArray:
@@ -137,7 +137,7 @@ class LineUp(Scenario):
 
 
 class LineUpPrediction(Prediction, Tables):
-    """Exact prediction; a `Prediction`.
+    """Where carts will be: exactly.
 
     Parameters
     ----------
@@ -195,7 +195,8 @@ def advance(
     places: FloatArray, speeds: FloatArray, commands: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return places [m] and speeds [m/s] one period on, commands [m/s] being held."""
-    lag, decay = speeds - commands, np.exp(-PERIOD / TAU)
+    lag = speeds - commands
+    decay = np.exp(-PERIOD / TAU)
     return places + commands * PERIOD + lag * TAU * (1.0 - decay), commands + lag * decay
 
 

@@ -81,7 +81,7 @@ def film(draw: Callable[[int], Pixels], last: int, seconds: float, path: Path) -
     if path.suffix == ".gif":
         _write_gif(partial, frames, seconds)
     else:
-        imageio.mimwrite(partial, frames, fps=1 / seconds, macro_block_size=16)  # type: ignore[arg-type]
+        imageio.mimwrite(partial, [*frames], fps=1 / seconds, macro_block_size=16)
     partial.replace(path)
 
 

@@ -4,13 +4,13 @@ A state variable is a function of a view and of the number of a body (a robot, a
 over the situations that the view holds; the same function serves sensing, where there is one
 situation, and prediction, where there are many. It must depend on nothing else: ``nested-agents
 check`` finds out where it means two things. What a view is, and which variables are built in, is
-the scenario's business: each has a registry and a view of its own, a dataclass which tells
-`n_situations`, how many it holds.
+the scenario's business: each has a registry and a view of its own.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -20,7 +20,20 @@ from ..core.numerics import FloatArray
 from ..core.plugins.registry import Registry
 
 StateFunction = Callable[[Any, int], FloatArray]
-"""The values ``(m,)`` of a variable for one body in the ``m`` situations of a view."""
+"""The values ``(m,)`` of a variable for one body in the ``m`` situations of a scenario's view."""
+
+
+@dataclass(frozen=True)
+class Situations(ABC):
+    """Situations to be describe, ``m`` at once: what the view of a scenario inherits."""
+
+    @property
+    @abstractmethod
+    def n_situations(self) -> int:
+        """How many situations there are."""
+
+
+SituationsT = TypeVar("SituationsT", bound=Situations)
 
 
 @dataclass(frozen=True)
@@ -36,7 +49,7 @@ class StateVariable:
     trusted: bool = False
     """Whether it is a built-in one, whose values are not checked."""
 
-    def __call__(self, view: Any, body: int) -> FloatArray:
+    def __call__(self, view: Situations, body: int) -> FloatArray:
         """Return the values ``(m,)`` for a body.
 
         Raises
@@ -47,7 +60,9 @@ class StateVariable:
         values = self.function(view, body)
         if self.trusted:
             return values
-        values, name, m = np.asarray(values), self.variable.name, view.n_situations
+        values = np.asarray(values)
+        name = self.variable.name
+        m = view.n_situations
         if values.shape != (m,):
             raise ValueError(
                 f"state variable {name!r}: shape {values.shape}, must be {(m,)}: one value for "
@@ -76,21 +91,24 @@ def space_of(name: str, own: Variable, things: Sequence[StateVariable]) -> State
     return StateSpace(name, variables, 1, common)
 
 
-def fixed(array: FloatArray) -> FloatArray:
+def freeze(array: FloatArray) -> FloatArray:
     """Make an array read-only, and return it."""
     array.flags.writeable = False
     return array
 
 
-def guarded(view: Any) -> Any:
+def guard(view: SituationsT) -> SituationsT:
     """Return a view of the same situations whose arrays cannot be written to."""
-    held = {field.name: getattr(view, field.name) for field in fields(view)}
-    arrays = {k: fixed(v.view()) for k, v in held.items() if isinstance(v, np.ndarray)}
+    held = {field.name: vars(view)[field.name] for field in fields(view)}
+    arrays = {k: freeze(v.view()) for k, v in held.items() if isinstance(v, np.ndarray)}
     return replace(view, **arrays)
 
 
-def sensed(
-    parts: Sequence[StateVariable], view: Any, bodies: Sequence[int], done: FloatArray | None = None
+def sense(
+    parts: Sequence[StateVariable],
+    view: Situations,
+    bodies: Sequence[int],
+    done: FloatArray | None = None,
 ) -> FloatArray:
     """Return state variables ``(len(bodies), m, variables)`` of bodies.
 
@@ -98,10 +116,11 @@ def sensed(
     compiled ones are `done`, with those of users filled in: then every body is asked, so that a
     check of the scenario finds what is wrongly called common.
     """
-    once, shape = done is None, (len(bodies), view.n_situations, len(parts))
+    once = done is None
+    shape = (len(bodies), view.n_situations, len(parts))
     values = np.empty(shape) if done is None else done
     wanted = [(c, thing) for c, thing in enumerate(parts) if once or not thing.trusted]
-    safe = view if all(thing.trusted for _, thing in wanted) else guarded(view)
+    safe = view if all(thing.trusted for _, thing in wanted) else guard(view)
     for column, thing in wanted:
         for k, body in enumerate(bodies):
             known = once and k > 0 and thing.common
@@ -136,12 +155,11 @@ def state_variable(
     'closest'
     """
 
-    def described(function: StateFunction) -> StateVariable:
-        name: Any = getattr(function, "__name__", None)
-        variable = Variable(name, unit, low, high, periodic, centres, labels, mirrored)
+    def describe(function: StateFunction) -> StateVariable:
+        variable = Variable(function.__name__, unit, low, high, periodic, centres, labels, mirrored)
         return StateVariable(variable, function, common)
 
-    return described
+    return describe
 
 
 def find_variable(registry: Registry, name: str) -> StateVariable:
@@ -161,7 +179,7 @@ def find_variable(registry: Registry, name: str) -> StateVariable:
     return replace(thing, trusted=name in registry.built_in)
 
 
-def referred(registry: Registry) -> BeforeValidator:
+def names_of(registry: Registry) -> BeforeValidator:
     """Return what replaces state variables of a registry by their names, in a list of both."""
 
     def named(given: object) -> object:

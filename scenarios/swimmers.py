@@ -12,9 +12,10 @@ from gymnasium.envs.mujoco.swimmer_v5 import SwimmerEnv
 
 SEGMENT = '<geom fromto="{begin} 0 0 {end} 0 0" size="0.1" type="capsule"/>'
 HINGE = (
-    '<body name="segment{number}" pos="{at} 0 0">' + SEGMENT.format(begin=0, end=-1)
+    '<body name="segment{number}" pos="{at} 0 0">'
+    + SEGMENT.format(begin=0, end=-1)
     + '<joint axis="0 0 1" limited="true" name="joint{joint}" range="-100 100" type="hinge"/>'
-)  # fmt: skip
+)
 SWIMMER = """
 <mujoco model="swimmer">
   <compiler angle="degree" inertiafromgeom="true"/>
@@ -42,7 +43,7 @@ SWIMMER = """
 """
 
 
-def described(joints: int) -> str:
+def format_model(joints: int) -> str:
     """Return the swimmer of so many joints in MuJoCo's format."""
     numbers = range(1, joints + 1)
     hinges = [HINGE.format(number=k + 1, at=0.5 if k == 1 else -1, joint=k) for k in numbers]
@@ -56,7 +57,7 @@ class Swimmer(SwimmerEnv):
 
     def __init__(self, joints: int = 2, **options: Any) -> None:
         with NamedTemporaryFile("w", suffix=".xml") as file:
-            file.write(described(joints))
+            file.write(format_model(joints))
             file.flush()
             super().__init__(xml_file=file.name, **options)
 

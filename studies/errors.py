@@ -1,8 +1,8 @@
 """What is wrong with something that the user can mend, in one line to act on."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import unicodedata
+from collections.abc import Iterator
 from contextlib import contextmanager
-from decimal import Decimal
 
 LONGEST = 1200
 """Characters of a message; of a longer one the middle is left out."""
@@ -17,9 +17,30 @@ class SpecError(ValueError):
         line = " ".join(message.split())
         if len(line) > LONGEST:
             line = f"{line[: LONGEST // 2]} ... {line[-LONGEST // 4 :]}"
-        # A terminal obeys control characters, and cannot write half of a surrogate pair.
-        shown = (c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
-        super().__init__("".join(shown))
+        super().__init__(printable(line))
+
+
+def printable(text: str) -> str:
+    r"""Return text in which what a terminal obeys is written out: nothing of it is an order.
+
+    These are control characters, such as those of colours and of the cursor, but for line feeds and
+    tabs; marks that reverse the direction of writing; and halves of surrogate pairs, which cannot
+    be written.
+
+    Examples
+    --------
+    >>> print(printable("plain\N{NO-BREAK SPACE}text, \x1b[31mred, \u202edesrever\r"))
+    plain\xa0text, \x1b[31mred, \u202edesrever\r
+    """
+    if text.isprintable():
+        return text
+    return "".join(map(_written_out, text))
+
+
+def _written_out(character: str) -> str:
+    if character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs":
+        return character
+    return character.encode("unicode_escape").decode("ascii")
 
 
 @contextmanager
@@ -29,20 +50,3 @@ def refused(before: str = "", after: str = "") -> Iterator[None]:
         yield
     except ValueError as error:
         raise SpecError(f"{before}{error}{after}") from None
-
-
-def show(value: object, width: int | None = 60) -> str:
-    """Return a value as TOML would write it, shortened to `width` characters if that is given."""
-    if isinstance(value, bool):
-        text = str(value).lower()
-    elif isinstance(value, int) and abs(value) >= 10**100:
-        text = f"{Decimal(value):.3e}"  # Python writes some thousand digits at most
-    elif isinstance(value, str):
-        text = repr(value)
-    elif isinstance(value, Mapping):
-        text = "{" + ", ".join(f"{k} = {show(v, width)}" for k, v in value.items()) + "}"
-    elif isinstance(value, Sequence):
-        text = "[" + ", ".join(show(v, width) for v in value) + "]"
-    else:
-        text = str(value)
-    return text if width is None or len(text) <= width else text[: width - 3] + "..."

@@ -19,8 +19,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from nested_agents.core.numerics import FloatArray, IntArray, wrap
+from nested_agents.scenarios.box_pushing.driving import CLEARANCE, Drivers, paths
 from nested_agents.scenarios.box_pushing.prediction.push import push
-from nested_agents.scenarios.box_pushing.pushing_points import CLEARANCE, Drivers, paths
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 
 from .crowd import SLOT_GAP, Crowd

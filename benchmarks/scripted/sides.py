@@ -18,7 +18,7 @@ from shapely.geometry.polygon import orient
 
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.scenarios.box_pushing.world.geometry import surface
-from nested_agents.scenarios.box_pushing.world.world import approach
+from nested_agents.scenarios.box_pushing.world.starts import approach
 
 SPREAD = 0.55
 """Robots use this part of a side's half length."""

@@ -78,7 +78,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         self.bodies = DrivenBodies(
             scenario, products=settings.products, memberships=settings.memberships
         )
-        self.kinds = rows_of(scenario, shared=True)
+        self.kinds = rows_of(scenario, np.arange(len(scenario.agents)), shared=True)
         """``(n,)`` agents of one kind have own variables that change alike."""
         own = [Partition.of(variable) for variable in space.own]
         self.own_rules = RuleBase(own, [(j,) for j in range(len(own))]) if own else None

@@ -14,18 +14,27 @@ import numpy as np
 
 from ..adaptation.foresight import Foresight
 from ..adaptation.predictors import GivenPredictor, Mirror
-from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
+from ..evaluators.evaluator import (
+    NOTHING_GIVEN,
+    DecisionProblem,
+    Deliberation,
+    Evaluator,
+    ValueOf,
+    concerned,
+)
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn, all_hear_all
 from ..interface.agents import Agents, Counts, Memory, Placement
 from ..interface.experience import Experience, Observation
 from ..interface.prediction import NOT_EXPLORING, UNPREDICTED, Prediction
-from ..interface.scenario import Scenario, carried_rows, rows_of
+from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
 from ..learners.learner import LearnerSettings
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
 from .plain import as_evaluator, as_explorer, as_learner
 
+UNKNOWN: FloatArray = np.zeros(0)
+"""The weights of agents of another part."""
 SHAPED = ("learner.theta", "learner.trace", "learner.reach", "seen", "explorer", "generator")
 """What of a memory has a shape that the settings fix."""
 
@@ -63,8 +72,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
     ----------
     learner
         Owns the consequent weights.
+    members
+        ``(k,)`` the agents for whom they decide.
     rows
-        ``(n,)`` which row of them each agent has.
+        ``(k,)`` which row of the weights each of them has.
     space, rules
         What values are functions of, and the rule base that all agents have.
     explorer
@@ -93,6 +104,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.settings = settings
         self.scenario = scenario
         self.hierarchy = hierarchy
+        self.members = placement.members
         self.action_set = scenario.action_set
         n = len(hierarchy)
         n_actions = len(scenario.action_set)
@@ -104,8 +116,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.foresight = Foresight(
             settings.predictor, settings.self_model, settings.calibration, scenario
         )
+        if settings.is_mirrored and not placement.is_whole:
+            raise ValueError("learner.mirrored = true: the mirror image is that of a whole team")
         self.mirror = Mirror.of(scenario) if settings.is_mirrored else None
-        self.rows = rows_of(scenario, shared=settings.weights == "role")
+        self.rows = rows_of(scenario, self.members, shared=settings.weights == "role")
         self._senders = _senders(settings, hierarchy)
         self._n_told = max(map(len, self._senders), default=0)
         self.space, self.rules = settings.rules_over(
@@ -132,6 +146,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         decision = settings.decision
         if decision.rule == "random":
             return None
+        members = set(self.members.tolist())
+        first = next(agent for agent in self.hierarchy.order if agent in members)
         problem = DecisionProblem(
             rules=self.rules,
             hierarchy=self.hierarchy,
@@ -144,10 +160,25 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             unseen=decision.unseen,
             plan=decision.plan,
             handed_down=self.hierarchy.told == "ancestors" and not placement.messages_fail,
+            first=first,
         )
+        if decision.rule != "reward" and not placement.is_whole:
+            self._check_values(decision.value_of)
         if isinstance(self.learner, Evaluator):
             return self.learner
         return as_evaluator(decision.evaluator.build(problem))
+
+    def _check_values(self, value_of: ValueOf) -> None:
+        """Refuse to decide by values of agents of other parts, whose weights nobody knows."""
+        own = set(self.members.tolist())
+        agents = self.hierarchy.agents
+        whose = concerned(self.hierarchy, value_of)
+        for agent in own:
+            for other in sorted(set(whose[agent].tolist()) - own):
+                raise ValueError(
+                    f"learner.decision.value_of = {value_of!r}: values of {agents[other]!r} are "
+                    f"not known to {agents[agent]!r}, who is of another part; use 'own'"
+                )
 
     @property
     def counts(self) -> Counts:
@@ -196,11 +227,14 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             left = np.hstack([left, nobody])
         prediction = None if self.settings.values_actions else self.foresight.predict(seen)
         theta = self.learner.theta
+        weights = [UNKNOWN] * len(self.hierarchy)
+        for agent, row in zip(self.members.tolist(), self.rows.tolist(), strict=True):
+            weights[agent] = theta[row]
         return FuzzyInputs(
             left=left,
             previous=seen.previous if self.settings.decision.unseen == "last" else None,
             prediction=UNPREDICTED if prediction is None else prediction,
-            weights=[theta[row] for row in self.rows],
+            weights=weights,
             frequencies=self.seen / self.seen.sum(axis=1, keepdims=True),
             explore=explore,
         )
@@ -291,6 +325,12 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         reward = transition.reward
         left = inputs.left
         taken = experience.decision.joint_action
+        if len(self.members) < len(taken):
+            states = states[self.members]
+            left = left[self.members]
+            taken = taken[self.members]
+            if np.ndim(reward):
+                reward = np.asarray(reward)[self.members]
         if transition.terminated and not transition.absorbing:
             # Learners take a terminal state as entered again for ever.
             reward = reward * (1.0 - self.settings.discount)
@@ -315,11 +355,15 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     def check_world(self, scenario: Scenario) -> None:
         """Refuse another world for the very same agents, if their values mean nothing there."""
-        self._carried_rows(scenario)
+        self._carried_rows(scenario, self.members)
 
-    def _carried_rows(self, scenario: Scenario) -> IntArray:
+    def _carried_rows(self, other: Scenario, members: IntArray) -> IntArray:
         """Return from which of these rows each row of agents in another scenario goes on."""
-        return carried_rows(self.scenario, scenario, shared=self.settings.weights == "role")
+        return carried_rows(
+            Members(self.scenario, self.members),
+            Members(other, members),
+            shared=self.settings.weights == "role",
+        )
 
     def continue_from(self, former: Self) -> None:
         """Begin where agents of the same settings ended in another world.
@@ -334,12 +378,13 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         ValueError
             If the learner or the exploration knows no way; one line.
         """
-        rows = former._carried_rows(self.scenario)
+        rows = former._carried_rows(self.scenario, self.members)
         self.learner.continue_from(former.learner, rows)
         self.explorer.continue_from(former.explorer)
         self.rng.bit_generator.state = former.rng.bit_generator.state
-        by_row = [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
-        self.seen = np.stack(by_row)
+        for agent, row in zip(self.members, self.rows, strict=True):
+            alike = former.members[former.rows == rows[row]]
+            self.seen[agent] = former.seen[alike].mean(axis=0)
         if self.given.shape == former.given.shape:
             self.given = former.given.copy()
         self.foresight.continue_from(former.foresight)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple, Self
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -80,11 +81,16 @@ class Peer(ABC):
         raise ValueError(no_way_on("learner.kind", self))
 
 
-class PeerInputs(NamedTuple):
+@dataclass
+class PeerInputs:
     """What a peer decides by."""
 
     seen: Observation
+    """What it sees."""
     explore: bool
+    """Whether it explores."""
+    joint_action: IntArray | None = None
+    """``(n,)`` what it has decided for all, asked once a decision."""
 
 
 class PeerAgents(Agents[PeerInputs]):
@@ -114,7 +120,9 @@ class PeerAgents(Agents[PeerInputs]):
 
     def decide(self, inputs: PeerInputs, turn: Turn) -> IntArray:
         """Return what it decides for some agents."""
-        return self.decide_all(inputs)[turn.agents]
+        if inputs.joint_action is None:
+            inputs.joint_action = self.decide_all(inputs)
+        return inputs.joint_action[turn.agents]
 
     def decide_all(self, inputs: PeerInputs) -> IntArray:
         """Return what it decides for all."""

@@ -74,9 +74,17 @@ class Team:
         self.hierarchy = hierarchy
         self.action_set = world.action_set
         self.messages = Messages(hierarchy, failures, len(world.action_set))
-        placement = Placement(world, hierarchy, seed, messages_fail=bool(failures))
-        self.parts: tuple[Agents[Any], ...] = (settings.agents(placement),)
+        kinds = settings.members(world, hierarchy)
+        seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
+        parts: list[Agents[Any]] = []
         self._part_of = [0] * len(hierarchy)
+        for (members, own), own_seed in zip(kinds, seeds, strict=True):
+            for agent in members.tolist():
+                self._part_of[agent] = len(parts)
+            fail = bool(failures)
+            placement = Placement(world, hierarchy, members, own_seed, messages_fail=fail)
+            parts.append(own.agents(placement))
+        self.parts = tuple(parts)
 
     @cached_property
     def _slots(self) -> tuple[Slot, ...]:
@@ -217,8 +225,13 @@ class Team:
 
     def arrays(self) -> Memory:
         """Return everything that the team remembers as named arrays."""
-        (part,) = self.parts
-        return part.memory()
+        if len(self.parts) == 1:
+            return self.parts[0].memory()
+        return {
+            f"part{k}.{name}": array
+            for k, part in enumerate(self.parts)
+            for name, array in part.memory().items()
+        }
 
     def restore(self, arrays: Mapping[str, AnyArray]) -> None:
         """Continue from what `arrays` returned.
@@ -228,5 +241,12 @@ class Team:
         ValueError
             If they are of another team.
         """
-        (part,) = self.parts
-        part.restore(arrays)
+        if len(self.parts) == 1:
+            self.parts[0].restore(arrays)
+            return
+        for k, part in enumerate(self.parts):
+            head = f"part{k}."
+            own = {
+                name.removeprefix(head): a for name, a in arrays.items() if name.startswith(head)
+            }
+            part.restore(own)

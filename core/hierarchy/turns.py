@@ -77,14 +77,22 @@ def all_hear_all(hierarchy: Hierarchy) -> bool:
     )
 
 
-def _levels(hierarchy: Hierarchy, part_of: Sequence[int]) -> list[list[int]]:
-    depths: dict[int, int] = {}
+def levels_of(hierarchy: Hierarchy) -> list[int]:
+    """Return the level of every agent ``(n,)``: 0 if nobody tells it anything.
+
+    Those who are told are one level below the lowest of those who tell them.
+    """
+    levels: dict[int, int] = {}
     for agent in hierarchy.order:
-        above = [depths[other] for other in hierarchy.above(agent)]
-        depths[agent] = 1 + max(above, default=-1)
+        above = [levels[other] for other in hierarchy.above(agent)]
+        levels[agent] = 1 + max(above, default=-1)
+    return [levels[agent] for agent in range(len(hierarchy))]
+
+
+def _levels(hierarchy: Hierarchy, part_of: Sequence[int]) -> list[list[int]]:
     levels: dict[tuple[int, int], list[int]] = {}
-    for agent in sorted(depths):
-        levels.setdefault((depths[agent], part_of[agent]), []).append(agent)
+    for agent, level in enumerate(levels_of(hierarchy)):
+        levels.setdefault((level, part_of[agent]), []).append(agent)
     return [levels[place] for place in sorted(levels)]
 
 

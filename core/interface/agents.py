@@ -35,10 +35,17 @@ class Placement:
     """The world as they see it."""
     hierarchy: Hierarchy
     """Who decides before whom, of all agents of the team."""
+    members: IntArray
+    """``(k,)`` the agents for whom they decide, in agent order: all of a team of one kind."""
     seed: np.random.SeedSequence
     """Source of everything random in them."""
     messages_fail: bool = False
     """Whether messages may not arrive as they were sent."""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all agents of the team are theirs."""
+        return len(self.members) == len(self.hierarchy)
 
 
 @dataclass

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -72,7 +72,7 @@ class Embodiment(ABC):
     """Per body the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
     constants: tuple[str, ...] = ()
     """Names of the positive constants of its predictor that can be calibrated."""
-    levers: FloatArray
+    levers: FloatArray = np.zeros(0)
     """``(K + M,)`` the speed per turning rate of what is moved and of the bodies [m], if there are
     constants."""
 
@@ -229,28 +229,48 @@ class Scenario(ABC):
         raise ValueError(f"the scenario {type(self).__name__} draws no recordings")
 
 
-def rows_of(scenario: Scenario, *, shared: bool) -> IntArray:
-    """Return the row of weights of every agent ``(n,)``: its own, or that of its role.
+class Members(NamedTuple):
+    """Some agents of a scenario."""
+
+    scenario: Scenario
+    members: IntArray
+    """``(k,)`` who they are, in agent order."""
+
+    def owners(self, *, shared: bool) -> list[str]:
+        """Return whose weights there are, in order: those of agents, or of their roles."""
+        names = self.scenario.roles if shared else tuple(self.scenario.agents)
+        return list(dict.fromkeys(names[i] for i in self.members))
+
+    @property
+    def text(self) -> str:
+        """How many of them there are over which state space."""
+        return f"{len(self.members)} agents over {self.scenario.state_space.name!r}"
+
+
+def rows_of(scenario: Scenario, members: IntArray, *, shared: bool) -> IntArray:
+    """Return the row of weights of agents ``(k,)``: its own, or that of its role.
 
     Examples
     --------
     >>> from nested_agents.scenarios.line_up import LineUpSettings
     >>> three = LineUpSettings(carts=3).build()
-    >>> rows_of(three, shared=True).tolist(), rows_of(three, shared=False).tolist()
-    ([0, 0, 0], [0, 1, 2])
+    >>> rows_of(three, np.arange(3), shared=True).tolist()
+    [0, 0, 0]
+    >>> rows_of(three, np.arange(1, 3), shared=False).tolist()
+    [0, 1]
     """
-    owners = scenario.roles if shared else tuple(scenario.agents)
-    names = list(dict.fromkeys(owners))
-    return np.array([names.index(owner) for owner in owners])
+    owners = Members(scenario, members).owners(shared=shared)
+    names = scenario.roles if shared else tuple(scenario.agents)
+    return np.array([owners.index(names[i]) for i in members])
 
 
-def carried_rows(former: Scenario, scenario: Scenario, *, shared: bool) -> IntArray:
-    """Return the row of weights of a scenario's team that each row of another's goes on from.
+def carried_rows(former: Members, successor: Members, *, shared: bool) -> IntArray:
+    """Return the row of weights of some agents that each row of others goes on from.
 
     Parameters
     ----------
-    former, scenario
-        The scenario that was learned in, and the one that follows.
+    former, successor
+        Those who learned, and those who follow.
     shared
         Whether weights are those of roles; if not, the agents must be the same.
 
@@ -268,20 +288,16 @@ def carried_rows(former: Scenario, scenario: Scenario, *, shared: bool) -> IntAr
     --------
     >>> from nested_agents.scenarios.line_up import LineUpSettings
     >>> one, three = (LineUpSettings(carts=carts).build() for carts in (1, 3))
-    >>> carried_rows(one, three, shared=True).tolist()
+    >>> carried_rows(Members(one, np.arange(1)), Members(three, np.arange(3)), shared=True).tolist()
     [0]
     """
-    trained, acting = (
-        f"{len(s.agents)} agents over {s.state_space.name!r}" for s in (former, scenario)
-    )
-    problem = f"a team trained with {trained} cannot act with {acting}"
-    if former.state_space != scenario.state_space:
+    problem = f"a team trained with {former.text} cannot act with {successor.text}"
+    if former.scenario.state_space != successor.scenario.state_space:
         raise ValueError(f"{problem}: the state spaces differ")
-    if former.action_set != scenario.action_set:
+    if former.scenario.action_set != successor.scenario.action_set:
         raise ValueError(f"{problem}: the actions differ")
-    owners, others = (
-        list(dict.fromkeys(s.roles if shared else s.agents)) for s in (former, scenario)
-    )
+    owners = former.owners(shared=shared)
+    others = successor.owners(shared=shared)
     if set(owners) != set(others):
         raise ValueError(
             f"{problem}: their roles are {', '.join(owners)}, and {', '.join(others)}"

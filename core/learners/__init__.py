@@ -8,9 +8,9 @@ R(s) / (1 - discount). Siblings differ where their mathematics differs.
 
 from ..interface.scenario import Scenario
 from ..plugins.registry import SettingsRegistry
-from .learner import LearnerSettings, TeamSettings
+from .learner import CORE, LearnerSettings, TeamSettings
 
-PEERS = f"{__name__.rpartition('.')[0]}.networks.settings"
+PEERS = f"{CORE}.networks.settings"
 
 LEARNERS = SettingsRegistry(
     "learner",
@@ -29,6 +29,7 @@ LEARNERS = SettingsRegistry(
         "hierarchy-ppo": f"{PEERS}:HierarchyPPOSettings",
         "mappo": f"{PEERS}:MAPPOSettings",
         "dqn": f"{PEERS}:DQNSettings",
+        "mixed": f"{CORE}.agents.mixed:MixedSettings",
     },
     LearnerSettings,
     TeamSettings,
@@ -47,7 +48,8 @@ def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
     if not settings.needs_prediction or scenario.predicts:
         return
     lack = scenario.lacks_prediction
-    others = [k for k in LEARNERS.built_in if not LEARNERS.parsed(k).needs_prediction]
+    kinds = [k for k in LEARNERS.built_in if k != "mixed"]
+    others = [k for k in kinds if not LEARNERS.parsed(k).needs_prediction]
     raise ValueError(
         f"learner.kind = {settings.kind!r}: decides by predicted states, and {lack}; without it "
         f"do {', '.join(others)}, and any with learner.predictor.kind = 'learned' or "

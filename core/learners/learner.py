@@ -5,8 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pkgutil import resolve_name
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
+import numpy as np
 from pydantic import Field
 
 from ..adaptation.calibration import CalibrationSettings
@@ -18,43 +19,18 @@ from ..decision.exploration import (
     ExplorationSettings,
     no_way_on,
 )
-from ..evaluators import EVALUATORS, EvaluatorSettings
-from ..evaluators.enumeration import AutoSettings
-from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
+from ..decision.settings import DecisionSettings
+from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import Agents, Placement
+from ..interface.scenario import Scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
-from ..plugins.settings import PartSettings, Settings, unwritten
+from ..plugins.settings import PartSettings, unwritten
 from ..rules.rule_base import RuleBase, RuleBaseSettings
 
 CORE = __name__.rpartition(".learners")[0]
 """Where the rooms are in which agents are found by name."""
-
-
-class Decision(Settings):
-    """How values become a joint action: the ``[learner.decision]`` table of a spec."""
-
-    rule: Literal["value", "reward", "reward-and-value", "random"] = "value"
-    """Decide by f of the predicted state, by its predicted reward, by reward + discount f, or at
-    random. f of an after-state contains its reward already: the sum weighs the reward twice, which
-    helps where rewards lead part of the way."""
-    teammates: Teammates = "best-response"
-    """What the agents below are expected to do: the best for this agent, anything with equal
-    probability, what they were seen to do so far (the paper's "stochastically observing"), or what
-    they were seen to do when this agent did the same as it considers now (``conditional``)."""
-    value_of: ValueOf = "own"
-    """Whose value decides: the agent's own; the mean of its own and those of the agents below it;
-    or the mean of all agents'. ``own`` where each state tells what its agent's action is worth,
-    ``team`` where what helps one may hinder others."""
-    unseen: Annotated[Unseen, unwritten("maintain")] = "maintain"
-    """What agents are expected to do that this one neither considers nor hears of: to maintain, to
-    do again what they did last, or to keep to the plan that ``best-response`` makes for them."""
-    plan: Annotated[Plan, unwritten("private")] = "private"
-    """Whose plan ``best-response`` decides by: each agent's own, unless one above it hands it down
-    with what it tells; or one that all work out alike, which is common knowledge and no message."""
-    evaluator: Annotated[EvaluatorSettings, Plugged(EVALUATORS, EVALUATORS.parsed)] = AutoSettings()
-    """Which joint actions of the agents below are tried: the name of an evaluator, or its table."""
 
 
 class Learner(ABC):
@@ -137,6 +113,15 @@ class Learner(ABC):
         raise ValueError(no_way_on("learner.kind", self))
 
 
+class MembersOf(NamedTuple):
+    """Agents of a team that are of one kind."""
+
+    members: IntArray
+    """``(k,)`` who they are, in agent order."""
+    settings: TeamSettings
+    """How they decide and learn."""
+
+
 class TeamSettings(PartSettings):
     """What stands in the ``[learner]`` table of a spec: how those who act learn.
 
@@ -162,6 +147,16 @@ class TeamSettings(PartSettings):
         """
         agents: Agents[Any] = resolve_name(self.kind_of_agents)(self, placement)
         return agents
+
+    def members(self, scenario: Scenario, hierarchy: Hierarchy) -> list[MembersOf]:
+        """Return the agents of every kind: by default all are of one.
+
+        Raises
+        ------
+        ValueError
+            If nobody decides for an agent; one line.
+        """
+        return [MembersOf(np.arange(len(hierarchy)), self)]
 
     @property
     def needs_prediction(self) -> bool:
@@ -195,7 +190,7 @@ class LearnerSettings(TeamSettings):
     wheels, say) share them and pool their experience; alike where a scenario has no roles."""
     exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration()
     """How agents explore."""
-    decision: Decision = Decision()
+    decision: DecisionSettings = DecisionSettings()
     """How values become a joint action."""
     self_model: SelfModelSettings = SelfModelSettings()
     """What bodies learn of their own wheels."""

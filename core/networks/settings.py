@@ -26,11 +26,8 @@ class PeerSettings(TeamSettings):
     """Discount per decision."""
 
 
-class NetworkSettings(TeamSettings):
+class NetworkSettings(PeerSettings):
     """What the settings of learners with networks share, which need stable-baselines3."""
-
-    discount: Annotated[float, Field(ge=0, lt=1)] = 0.97
-    """Discount per decision."""
 
     learning_rate: Positive = 3e-4
     """Step size of Adam."""
@@ -106,6 +103,7 @@ class HierarchyPPOSettings(MultiAgentPPOSettings):
     """PPO of agents in a hierarchy: each acts by its own state and the actions that it is told."""
 
     kind: Literal["hierarchy-ppo"] = "hierarchy-ppo"
+    kind_of_agents = f"{CORE}.networks.policies:hierarchy_ppo"
     uses_hierarchy: ClassVar[bool] = True
     value_of: Annotated[Literal["own", "team"], unwritten("team")] = "team"
     """Whether an agent's reward is its own, or the mean of all agents'."""

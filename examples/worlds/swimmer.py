@@ -7,6 +7,8 @@ that specs can sweep it: see ``studies/catalogue/learning_curve/swimmer_n.toml``
 own angle and speed and the angles of those next to them; an end has one neighbour, twice.
 """
 
+# That spec is in results/specs/learning_curve now. The text above stays, as identities of kept
+# trials rest on it.
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings
 
 TURN = (-1.8, 1.8)  # [rad]; all ranges are rounded from random episodes

@@ -8,13 +8,12 @@ again to be drawn.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 
 from ...core.interface.measures import SUCCESS, Measure
@@ -22,22 +21,21 @@ from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import StateSpace
 from ...core.numerics import FloatArray, IntArray
-from ...core.plugins.sources import format_error
+from ...core.plugins.sources import format_error, message
 from ..movies import film
-from .players import Actuators, Perception
+from .actuators import Actuators
+from .copies import Copies, copies_of, fault_of_copies
+from .making import Make, maker_of
+from .perception import Numbers, Perception
 from .settings import AdaptedSettings, GymnasiumSettings, PettingZooSettings
-from .simulators import (
-    Make,
-    Played,
-    Simulator,
-    copies_of,
-    fault_of_copies,
-    make_by_id,
-    simulator_of,
-)
+from .simulators import Environment, Played, Simulator, simulator_of
 
-EPISODES, STEPS = 10, 200
-"""Random episodes from which unknown ranges are taken, and the most steps of each."""
+REHEARSED = 8
+"""Steps that are played when a world is built: what does not fit is said then."""
+EPISODES = 10
+"""Random episodes from which unknown ranges are taken."""
+STEPS = 200
+"""The most steps of each."""
 HELD = 0.7
 """Probability that a random action is held for a further step."""
 FRAMES = 20.0
@@ -56,7 +54,7 @@ class AdaptedWorld(Scenario):
     settings
         See `AdaptedSettings`.
     make
-        Makes the simulator.
+        Makes the simulator; None: what the settings name.
 
     Raises
     ------
@@ -78,23 +76,24 @@ class AdaptedWorld(Scenario):
     recorded = ("joint_action",)
     repeats = True
 
-    def __init__(self, settings: AdaptedSettings, make: Make = make_by_id) -> None:
-        try:
-            self._actuators, self._perception = surveyed(settings, make)
-        except Exception as error:  # an environment may be anybody's
-            is_said = isinstance(error, ValueError)  # what does not fit
-            fault = str(error) if is_said else f"cannot be played, {format_error(error)}"
-            which = f"scenario.id = {settings.id!r}: " if settings.id else "the environment: "
-            is_named = fault.startswith("scenario.") or (is_said and not settings.id)
-            raise ValueError(fault if is_named else which + fault) from None
-        self.settings, self._make, self._simulator = settings, make, make(settings, None)
-        self.agents, self.roles = self._actuators.names, self._actuators.roles
-        self.groups, self.action_set = self._actuators.groups, self._actuators.action_set
+    def __init__(self, settings: AdaptedSettings, make: Make | None = None) -> None:
+        self._make = maker_of(settings) if make is None else make
+        self._actuators, self._perception = _survey_in_words(settings, self._make)
+        self.settings = settings
+        self._simulator = self._make(settings, None)
+        self.agents = self._actuators.names
+        self.roles = self._actuators.roles
+        self.groups = self._actuators.groups
+        self.action_set = self._actuators.action_set
         self._body = np.repeat(np.arange(len(self.groups)), [len(group) for group in self.groups])
         self.state_space = StateSpace(
             "observed", self._perception.variables, common=self._perception.common
         )
-        self.horizon, self._seed, self._return = settings.horizon, 0, 0.0
+        self.bounds = self._perception.bounds
+        self.horizon = settings.horizon
+        self._seed = 0
+        self._return = 0.0
+        self._terminated = False
         self._last: IntArray = np.full(len(self.agents), self.action_set.neutral)
         self._states: FloatArray = np.zeros((len(self.agents), self.state_space.n_variables))
 
@@ -111,7 +110,9 @@ class AdaptedWorld(Scenario):
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Let the environment start an episode; return states ``(n, d)``."""
         sequence = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
-        self._seed, self._return = int(sequence.generate_state(1)[0]), 0.0
+        self._seed = int(sequence.generate_state(1)[0])
+        self._return = 0.0
+        self._terminated = False
         self._last = np.full(len(self.agents), self.action_set.neutral)
         self._states = self.states_of(self._simulator.reset(self._seed))
         return self._states
@@ -120,21 +121,26 @@ class AdaptedWorld(Scenario):
         """Let the environment carry out a joint action ``(n,)`` for as long as it is held."""
         played = self.play(self._simulator, joint_action)
         self._last = np.array(joint_action)
-        self._states = self.states_of(played.observations)
+        self._states = self.states_of(played)
+        self._terminated = played.terminated
         paid = np.array(list(played.rewards.values()))
         mean = float(paid.mean())
         self._return += mean
         is_joint = self.settings.rewards == "joint" or len(paid) == 1
         return Transition(
-            self._states, mean if is_joint else paid[self._body], played.terminated,
-            played.truncated, {**self.measure(), "env_reward": mean}, absorbing=False,
-        )  # fmt: skip
+            states=self._states,
+            reward=mean if is_joint else paid[self._body],
+            terminated=played.terminated,
+            truncated=played.truncated,
+            info={**self.measure(), "env_reward": mean},
+            absorbing=False,
+        )
 
-    def measure(self) -> Mapping[str, Any]:
+    def measure(self) -> Mapping[str, object]:
         """Return the last joint action, and whether the present state is a success."""
         return {"joint_action": self._last, "succeeded": self._has_succeeded()}
 
-    def constants_of_episode(self) -> Mapping[str, Any]:
+    def constants_of_episode(self) -> Mapping[str, object]:
         """Return the seed of the environment."""
         return {"seed": self._seed}
 
@@ -146,13 +152,13 @@ class AdaptedWorld(Scenario):
             played = simulator.step(commands)
             for player, reward in played.rewards.items():
                 paid[player] += reward
-            if played.terminated or played.truncated:
+            if played.is_over:
                 break
         return played._replace(rewards=paid)
 
-    def states_of(self, observations: Mapping[str, Any]) -> FloatArray:
+    def states_of(self, played: Played) -> FloatArray:
         """Return the states ``(n, d)`` of all agents."""
-        return self._perception.states(observations)[self._body]
+        return self._perception.states(played)[self._body]
 
     def predict(self) -> CopiedPrediction | None:
         """Predict from the present state, if copies are played."""
@@ -167,15 +173,19 @@ class AdaptedWorld(Scenario):
         return exact
 
     def _has_succeeded(self) -> bool:
-        wanted: dict[str, Any] = dict(self.settings.success)
-        least = wanted.pop("return", -np.inf)
+        success = self.settings.success
+        if not isinstance(success, dict):
+            return self._terminated
         names = [variable.name for variable in self.state_space.variables]
-        inside = (
-            low <= value <= high
-            for name, (low, high) in wanted.items()
-            for value in self._states[:, names.index(name)]
-        )
-        return bool(self.settings.success) and self._return >= least and all(inside)
+        for name, ends in success.items():
+            if isinstance(ends, tuple):
+                values = self._states[:, names.index(name)]
+                reached = bool(((ends[0] <= values) & (values <= ends[1])).all())
+            else:
+                reached = self._return >= ends
+            if not reached:
+                return False
+        return bool(success)
 
     @property
     def draws(self) -> bool:
@@ -187,7 +197,7 @@ class AdaptedWorld(Scenario):
         try:
             simulator = self._make(self.settings, "rgb_array")
             simulator.reset(int(recording["seed"]))
-            frames: list[Any] = [simulator.env.render()]
+            frames = [simulator.env.render()]
             for joint_action in recording["joint_action"][1:]:
                 self.play(simulator, joint_action)
                 frames.append(simulator.env.render())
@@ -207,8 +217,9 @@ class CopiedPrediction(Prediction):
     """
 
     def __init__(self, world: AdaptedWorld, simulator: Simulator) -> None:
-        self._world, self._simulator = world, simulator
-        self._copies: Any = None
+        self._world = world
+        self._simulator = simulator
+        self._copies: Copies | None = None
         self._played: dict[bytes, tuple[FloatArray, float]] = {}
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -224,16 +235,31 @@ class CopiedPrediction(Prediction):
         key = np.ascontiguousarray(joint_action, dtype=np.int64).tobytes()
         if key in self._played:
             return self._played[key]
-        self._copies, paid = self._copies or copies_of(self._simulator), 0.0
+        if self._copies is None:
+            self._copies = copies_of(self._simulator)
+        paid = 0.0
         with self._copies.lane() as lane:
             for _ in range(self._world.horizon):
                 played = self._world.play(lane, joint_action)
                 paid += float(np.mean(list(played.rewards.values())))
-                if played.terminated or played.truncated:
+                if played.is_over:
                     break
-        states = self._world.states_of(played.observations)
+        states = self._world.states_of(played)
         self._played[key] = states, paid / self._world.horizon
         return self._played[key]
+
+
+def _survey_in_words(settings: AdaptedSettings, make: Make) -> tuple[Actuators, Perception]:
+    """Return what is found of an environment, or refuse it in one line that names it."""
+    try:
+        return surveyed(settings, make)
+    except Exception as error:  # an environment may be anybody's
+        is_said = isinstance(error, ValueError)  # what does not fit
+        fault = message(error) if is_said else f"cannot be played, {format_error(error)}"
+        if fault.startswith("scenario.") or (is_said and not settings.id):
+            raise ValueError(fault) from None
+        which = f"scenario.id = {settings.id!r}" if settings.id else "the environment"
+        raise ValueError(f"{which}: {fault}") from None
 
 
 @lru_cache(maxsize=32)
@@ -246,10 +272,12 @@ def surveyed(settings: AdaptedSettings, make: Make) -> tuple[Actuators, Percepti
         If the settings do not fit the environment, or it cannot be adapted or copied; one line.
     """
     simulator = make(settings, None)
-    bodies = getattr(settings, "groups", ())
-    actuators = Actuators(simulator.action_spaces, settings.actions, settings.neutral, bodies)
+    spaces = simulator.action_spaces
+    actuators = Actuators(spaces, settings.actions, settings.neutral, settings.bodies())
     met = partial(_met, simulator, actuators)
     perception = Perception(settings, simulator.observation_spaces, actuators.players, met)
+    for played in _play_randomly(simulator, actuators, 0, REHEARSED, np.random.default_rng(0)):
+        perception.states(played)
     if settings.predictor == "copy":
         neutral: IntArray = np.full(len(actuators.names), actuators.action_set.neutral)
         if fault := fault_of_copies(simulator, actuators.commands(neutral)):
@@ -260,26 +288,32 @@ def surveyed(settings: AdaptedSettings, make: Make) -> tuple[Actuators, Percepti
     return actuators, perception
 
 
-def _met(simulator: Simulator, actuators: Actuators, numbers_of: Any) -> FloatArray:
-    """Return the least and greatest numbers ``(2, k)`` of what is observed in random episodes."""
+def _met(simulator: Simulator, actuators: Actuators, numbers_of: Numbers) -> FloatArray:
+    """Return what is observed at least and at most in random episodes, ``(players, 2, k)``."""
     rng = np.random.default_rng(0)
     numbers = []
     for episode in range(EPISODES):
-        numbers.append(numbers_of(simulator.reset(episode)))
-        action = rng.integers(len(actuators.action_set), size=len(actuators.names))
-        for _ in range(STEPS):
-            drawn = rng.integers(len(actuators.action_set), size=len(action))
-            action = np.where(rng.random(len(action)) < HELD, action, drawn)
-            played = simulator.step(actuators.commands(action))
-            numbers.append(numbers_of(played.observations))
-            if played.terminated or played.truncated:
-                break
-    return np.array([np.min(numbers, axis=(0, 1)), np.max(numbers, axis=(0, 1))])
+        for played in _play_randomly(simulator, actuators, episode, STEPS, rng):
+            numbers.append(numbers_of(played))
+    return np.stack([np.min(numbers, axis=0), np.max(numbers, axis=0)], axis=1)
 
 
-def from_gymnasium(
-    env: gymnasium.Env[Any, Any] | Callable[..., gymnasium.Env[Any, Any]], **keys: Any
-) -> AdaptedWorld:
+def _play_randomly(
+    simulator: Simulator, actuators: Actuators, seed: int, steps: int, rng: np.random.Generator
+) -> Iterator[Played]:
+    """Yield the start and the steps of an episode of random actions, most of them held."""
+    yield simulator.reset(seed)
+    action = rng.integers(len(actuators.action_set), size=len(actuators.names))
+    for _ in range(steps):
+        drawn = rng.integers(len(actuators.action_set), size=len(action))
+        action = np.where(rng.random(len(action)) < HELD, action, drawn)
+        played = simulator.step(actuators.commands(action))
+        yield played
+        if played.is_over:
+            return
+
+
+def from_gymnasium(env: Environment | Callable[..., Environment], **keys: Any) -> AdaptedWorld:
     """Return an environment of Gymnasium as a scenario.
 
     Parameters
@@ -296,13 +330,14 @@ def from_gymnasium(
 
     Examples
     --------
+    >>> import gymnasium
     >>> from_gymnasium(gymnasium.make("Pendulum-v1"), actions=3).action_set.names
     ('-2', '0', '2')
     """
     return AdaptedWorld(GymnasiumSettings(id="", **keys), _maker(env))
 
 
-def from_pettingzoo(env: Any, **keys: Any) -> AdaptedWorld:
+def from_pettingzoo(env: Environment | Callable[..., Environment], **keys: Any) -> AdaptedWorld:
     """Return an environment of PettingZoo as a scenario.
 
     Parameters
@@ -321,7 +356,7 @@ def from_pettingzoo(env: Any, **keys: Any) -> AdaptedWorld:
     return AdaptedWorld(PettingZooSettings(id="", **keys), _maker(env))
 
 
-def _maker(env: Any) -> Make:
+def _maker(env: object) -> Make:
     def make(settings: AdaptedSettings, render_mode: str | None) -> Simulator:
         if not callable(env):
             return simulator_of(env)

@@ -25,8 +25,12 @@ def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
     return ends
 
 
-def _measurable(success: dict[str, Any]) -> dict[str, Any]:
-    for name, ends in success.items():
+Success = Literal["terminated"] | dict[str, float | Range]
+"""When an episode is a success."""
+
+
+def _measurable(success: Success) -> Success:
+    for name, ends in success.items() if isinstance(success, dict) else ():
         if isinstance(ends, tuple) == (name == "return"):
             needed = "a number, the least" if name == "return" else "a range"
             raise ValueError(f"{name} must be {needed}")
@@ -88,14 +92,16 @@ class AdaptedSettings(ScenarioSettings):
     all evenly."""
     rewards: Literal["joint", "own"] = "joint"
     """Whether all agents receive the mean reward, or those of each body its own."""
-    success: Annotated[dict[str, float | Range], AfterValidator(_measurable)] = Field(
-        default_factory=dict
-    )
-    """When an episode is a success: the least ``return``, and ranges of state variables in which
-    all agents are at the end. None: never."""
+    success: Annotated[Success, AfterValidator(_measurable)] = Field(default_factory=dict)
+    """When an episode is a success: if it ``terminated``, as where a goal ends it; or the least
+    ``return``, and ranges of state variables in which all agents are at the end. None: never."""
 
     def __hash__(self) -> int:
         return hash(repr(self))  # tables have no hash of their own
+
+    def bodies(self) -> tuple[tuple[int, ...], ...]:
+        """Return the agents of each body of an only player; none: each is its own."""
+        return ()
 
     def warnings(self) -> tuple[str, ...]:
         """Return that nothing is a success, if it is so."""
@@ -115,10 +121,15 @@ class GymnasiumSettings(AdaptedSettings):
 
     kind: Literal["gymnasium"] = "gymnasium"
     id: str
-    """As ``gymnasium.make`` takes it: ``Pendulum-v1``, or ``module:name``."""
+    """As ``gymnasium.make`` takes it: ``Pendulum-v1``, or ``module:name``; or ``file.py:Name`` of
+    your own, a class or function that makes an environment."""
     groups: tuple[tuple[Index, ...], ...] = ()
     """Numbers of the agents of every body, from 0 on, in order: those who have the same place in
     their bodies are of one role. None: each is its own body and role."""
+
+    def bodies(self) -> tuple[tuple[int, ...], ...]:
+        """Return the agents of each body."""
+        return self.groups
 
 
 class PettingZooSettings(AdaptedSettings):
@@ -126,5 +137,6 @@ class PettingZooSettings(AdaptedSettings):
 
     kind: Literal["pettingzoo"] = "pettingzoo"
     id: str
-    """Its module, such as ``mpe2/simple_spread_v3``; it has ``parallel_env``, or an ``env`` whose
-    agents act in cycles."""
+    """As ``pettingzoo.make`` takes it: ``sisl/multiwalker-v9``; or its module, such as
+    ``mpe2/simple_spread_v3``, which has ``parallel_env``, or an ``env`` whose agents act in cycles;
+    or ``file.py:name`` of your own, a class or function that makes an environment."""

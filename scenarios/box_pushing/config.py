@@ -7,12 +7,12 @@ for the physics holds, but it was hardly intended.
 
 from collections.abc import Iterator, Mapping
 from math import pi
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from ...core.plugins.settings import Positive, ScenarioSettings, team_size
-from ..state_variables import referred
+from ..state_variables import names_of
 from .prediction.settings import BeliefSettings
 from .states.relational import STATE_VARIABLES
 from .world.settings import (
@@ -26,8 +26,12 @@ from .world.settings import (
     label,
 )
 
-LARGEST_BOX, LARGEST_RADIUS, LARGEST_REACH = 20.0, 1.0, 5.0
-"""Beyond these a size was hardly intended [m]."""
+LARGEST_BOX = 20.0
+"""Beyond this a size of a box was hardly intended [m]."""
+LARGEST_RADIUS = 1.0
+"""The same of the radius of a robot [m]."""
+LARGEST_REACH = 5.0
+"""The same of the reach of infrared sensors [m]."""
 HEAVIEST = 50.0
 """The same of masses [kg]."""
 FASTEST = 10.0
@@ -82,7 +86,7 @@ class BoxTaskSettings(ScenarioSettings):
         return self.action_repeat * CONTROL_PERIOD
 
     @property
-    def drawn(self) -> dict[str, float | str]:
+    def drawing(self) -> dict[str, float | str]:
         """What a recording must tell beside motions, so that it can be drawn."""
         named = {"robot": self.robot, "box": self.box, "infrared": self.infrared}
         return {"dt": self.period} | {name: label(thing) for name, thing in named.items()}
@@ -95,7 +99,7 @@ class BoxPushingSettings(BoxTaskSettings):
     factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
     state_space: Annotated[
         Literal["paper", "relational", "pose", "crowd", "wide"] | tuple[str, ...],
-        referred(STATE_VARIABLES),
+        names_of(STATE_VARIABLES),
     ] = "relational"
     """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
     name, one's own included."""
@@ -116,18 +120,21 @@ class BoxPushingSettings(BoxTaskSettings):
             raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
         return self
 
-    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
+    def scenario_defaults(self, preset: str) -> Mapping[str, object]:
         """Return what learns best here: with one or two robots, every wheel by weights of its own.
 
         Two robots stand on different sides of the box and need different functions; larger teams
         learn sooner if all left wheels share theirs, and all right wheels.
         """
-        return {"learner": {"weights": "own"}} if preset == "default" and self.robots <= 2 else {}
+        if preset == "default" and self.robots <= 2:
+            return {"learner": {"weights": "own"}}
+        return {}
 
 
-def _warnings(settings: Any) -> Iterator[str]:
-    """Yield a line for every size of `BoxTaskSettings` that is probably given in another unit."""
-    box, robot = settings.box, settings.robot
+def _warnings(settings: BoxTaskSettings) -> Iterator[str]:
+    """Yield a line for every size that is probably given in another unit."""
+    box = settings.box
+    robot = settings.robot
     if not isinstance(box, str):
         width = max(max(axis) - min(axis) for axis in zip(*box.vertices, strict=True))
         yield from _length("box.vertices", width, LARGEST_BOX)
@@ -150,7 +157,8 @@ def _warnings(settings: Any) -> Iterator[str]:
 
 def _length(key: str, value: float, most: float) -> Iterator[str]:
     if value > most:
-        unit, factor = ("mm", 1e-3) if value * 1e-2 > most / 10.0 else ("cm", 1e-2)
+        is_far_off = value * 1e-2 > most / 10.0
+        unit, factor = ("mm", 1e-3) if is_far_off else ("cm", 1e-2)
         yield _suggest_unit(key, value, "m", unit, factor)
 
 
@@ -158,47 +166,3 @@ def _suggest_unit(key: str, value: float, unit: str, other: str, factor: float) 
     return (
         f"scenario.{key} = {value:g} {unit}: perhaps meant in {other}, {value * factor:.3g} {unit}"
     )
-
-
-CONTROLS = ("frozen", "random", "planner")
-"""Presets that do not learn."""
-
-
-class PushingPointsSettings(BoxTaskSettings):
-    """Box pushing with one agent per robot, whose actions are pushing points on the box."""
-
-    kind: Literal["pushing-points"] = "pushing-points"
-    factory: ClassVar[str] = f"{__package__}.pushing_points:PushingPoints"
-    points: Annotated[int, Field(ge=2, le=26)] = 8
-    """Pushing points, spread evenly around the outline of the box."""
-    option_length: Annotated[int, Field(ge=1, le=1000)] = 8
-    """Decision periods for which a robot keeps to the point that it has chosen."""
-    longest: Annotated[int, Field(ge=1, le=1_000_000)] = 450
-    """Decision periods after which an episode is broken off."""
-    bearings: Annotated[int, Field(ge=3, le=360)] = 12
-    """Membership functions of the bearing of the goal."""
-    observed: Literal["own", "joint"] = "own"
-    """Whether the value that an agent learns is of its own pushing point (each robot by itself), or
-    of those of all robots (as a team)."""
-    goal_reward: Positive = 1.0
-    """Reward of all robots for reaching the goal; any other option pays by how much nearer the box
-    came [m]."""
-
-    @property
-    def period(self) -> float:
-        """Seconds for which a decision is held: those of an option."""
-        return self.option_length * super().period
-
-    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
-        """Return Q-learning over pushing points, of every robot alone or of the joint choice."""
-        topology = "independent" if self.observed == "own" else "chain"
-        learner: dict[str, Any] = {"rule_base": {"order": "full"}}
-        if preset not in CONTROLS:
-            learner |= {
-                "kind": "q-learning",
-                "discount": 0.8,
-                "weights": "own",
-                "exploration": {"kind": "burst", "rate": 0.6, "decay": 0.85, "length": 1.0},
-                "decision": {"value_of": "own"},
-            }
-        return {"topology": {"kind": topology}, "learner": learner}

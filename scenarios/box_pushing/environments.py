@@ -15,12 +15,12 @@ Importing this module registers ``NestedAgents/BoxPushing-v0`` with Gymnasium::
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
 from ...core.interface.recording import EpisodeRecorder
@@ -31,6 +31,10 @@ from .scenario import BoxPushing
 
 ENV_ID = "NestedAgents/BoxPushing-v0"
 RENDER_MODES = ["rgb_array"]
+Observations = dict[str, FloatArray]
+"""By agent."""
+Infos = dict[str, dict[str, object]]
+"""Measurements by name, by agent."""
 
 
 class Player:
@@ -51,22 +55,25 @@ class Player:
     ) -> None:
         self.wheels = list(wheels)
         space = scenario.state_space
-        d, own = space.n_variables, space.n_own
-        every, parts = np.arange(len(scenario.agents) * d).reshape(-1, d), []
+        d = space.n_variables
+        own = space.n_own
+        every = np.arange(len(scenario.agents) * d).reshape(-1, d)
+        parts = []
         for group in scenario.groups:
             mine = [wheel for wheel in group if wheel in self.wheels]
             parts += [every[mine, :own].ravel(), every[mine[:1], own:].ravel()]
         self.places: IntArray = every[self.wheels] if by_wheel else np.concatenate(parts)
         low, high = np.moveaxis(space.bounds[self.places % d].astype(np.float32), -1, 0)
         self.observation_space = Box(low, high, dtype=np.float32)
-        actions, n = len(scenario.action_set), len(self.wheels)
+        actions = len(scenario.action_set)
+        n = len(self.wheels)
         self.action_space = Discrete(actions) if n == 1 else MultiDiscrete([actions] * n)
 
     def observe(self, states: FloatArray) -> FloatArray:
         """Return the observation in the states ``(n, d)`` of all wheels."""
         return states.ravel()[self.places].astype(np.float32)
 
-    def paid(self, reward: float | FloatArray) -> float:
+    def mean_reward(self, reward: float | FloatArray) -> float:
         """Return the mean reward of the wheels; `reward` is one, or ``(n,)`` of all wheels."""
         return float(reward if np.ndim(reward) == 0 else np.mean(np.take(reward, self.wheels)))
 
@@ -109,7 +116,9 @@ class Environment(ABC):
         if not isinstance(settings, BoxPushingSettings):
             settings = BoxPushingSettings(**(settings or {}))
         self.scenario = BoxPushing(settings)
-        self.steps, self.render_mode, self.sensors = steps, render_mode, sensors
+        self.steps = steps
+        self.render_mode = render_mode
+        self.sensors = sensors
         self._recorder: EpisodeRecorder | None = None
         self.players = {
             name: Player(self.scenario, wheels, by_wheel=by_wheel)
@@ -118,7 +127,8 @@ class Environment(ABC):
         self.possible_agents = list(self.players)
         self.agents: list[str] = []
         self._seeds = np.random.default_rng()
-        self._episode, self._step = -1, 0
+        self._episode = -1
+        self._step = 0
 
     @abstractmethod
     def _teams(self) -> dict[str, Sequence[int]]:
@@ -131,11 +141,15 @@ class Environment(ABC):
         ``world`` the seed of its world, in place of the next one of the stream.
         """
         if seed is not None:
-            self._seeds, self._episode = np.random.default_rng(seed), -1
-        self._episode = int((options or {}).get("episode", self._episode + 1))
-        self._step, self.agents = 0, list(self.possible_agents)
-        world = (options or {}).get("world")
-        world = int(self._seeds.integers(2**63)) if world is None else world
+            self._seeds = np.random.default_rng(seed)
+            self._episode = -1
+        options = options or {}
+        self._episode = int(options.get("episode", self._episode + 1))
+        self._step = 0
+        self.agents = list(self.possible_agents)
+        world = options.get("world")
+        if world is None:
+            world = int(self._seeds.integers(2**63))
         states = self.scenario.reset(world, self._episode)
         self._recorder = EpisodeRecorder(self.scenario) if self.render_mode else None
         return states
@@ -149,7 +163,7 @@ class Environment(ABC):
         late = self._step >= self.steps and not transition.terminated
         return transition, transition.truncated or late
 
-    def info(self, measured: Mapping[str, Any]) -> dict[str, Any]:
+    def info(self, measured: Mapping[str, object]) -> dict[str, object]:
         """Return a copy of measurements, without the times, which differ from run to run."""
         return {
             name: value.copy() if isinstance(value, np.ndarray) else value
@@ -157,7 +171,7 @@ class Environment(ABC):
             if name != "seconds"
         }
 
-    def render(self) -> Any:
+    def render(self) -> NDArray[np.uint8] | None:
         """Return a picture ``(height, width, 3)`` of the present; None without a render mode.
 
         Raises
@@ -186,7 +200,7 @@ class WheelsEnv(Environment, ParallelEnv):
     (['robot1.left', 'robot1.right'], Discrete(4))
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: ClassVar[dict[str, object]] = {
         "name": "box_pushing_wheels_v0",
         "render_modes": RENDER_MODES,
         "render_fps": 2,
@@ -206,16 +220,18 @@ class WheelsEnv(Environment, ParallelEnv):
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
+    ) -> tuple[Observations, Infos]:
         """Start an episode, see `Environment.begin`; return observations and infos by agent."""
         return self._observe(self.begin(seed, options), self.scenario.measure())
 
-    def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
+    def step(
+        self, actions: Mapping[str, int | IntArray]
+    ) -> tuple[Observations, dict[str, float], dict[str, bool], dict[str, bool], Infos]:
         """Carry out one action of every agent.
 
         Returns
         -------
-        tuple of dict
+        tuple
             Observations, rewards, terminations, truncations and infos by agent; all empty when the
             episode is over, as PettingZoo has it.
         """
@@ -230,7 +246,7 @@ class WheelsEnv(Environment, ParallelEnv):
             joint[self.players[name].wheels] = actions[name]
         transition, truncated = self.advance(joint)
         observations, infos = self._observe(transition.states, transition.info)
-        rewards = {name: self.players[name].paid(transition.reward) for name in self.agents}
+        rewards = {name: self.players[name].mean_reward(transition.reward) for name in self.agents}
         ends = dict.fromkeys(self.agents, transition.terminated)
         breaks = dict.fromkeys(self.agents, truncated)
         if transition.terminated or truncated:
@@ -238,12 +254,12 @@ class WheelsEnv(Environment, ParallelEnv):
         return observations, rewards, ends, breaks, infos
 
     def _observe(
-        self, states: FloatArray, measured: Mapping[str, Any]
-    ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
-        return (
-            {name: self.players[name].observe(states) for name in self.agents},
-            {name: self.info(measured) for name in self.agents},
-        )
+        self, states: FloatArray, measured: Mapping[str, object]
+    ) -> tuple[Observations, Infos]:
+        """Return what those who are still there observe, and are informed of."""
+        observations = {name: self.players[name].observe(states) for name in self.agents}
+        infos = {name: self.info(measured) for name in self.agents}
+        return observations, infos
 
 
 class RobotsEnv(WheelsEnv):
@@ -256,7 +272,7 @@ class RobotsEnv(WheelsEnv):
     (['robot1', 'robot2'], MultiDiscrete([4 4]))
     """
 
-    metadata: ClassVar[dict[str, Any]] = WheelsEnv.metadata | {"name": "box_pushing_robots_v0"}
+    metadata: ClassVar[dict[str, object]] = WheelsEnv.metadata | {"name": "box_pushing_robots_v0"}
 
     def _teams(self) -> dict[str, Sequence[int]]:
         return {f"robot{r + 1}": group for r, group in enumerate(self.scenario.groups)}
@@ -274,33 +290,40 @@ class BoxPushingEnv(Environment, gymnasium.Env):
 
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 2}  # noqa: RUF012
 
+    def __init__(
+        self,
+        settings: BoxPushingSettings | Mapping[str, Any] | None = None,
+        *,
+        steps: int = 450,
+        render_mode: str | None = None,
+        sensors: bool = False,
+        by_wheel: bool = False,
+    ) -> None:
+        super().__init__(
+            settings, steps=steps, render_mode=render_mode, sensors=sensors, by_wheel=by_wheel
+        )
+        self._player = self.players["single"]
+        self.observation_space = self._player.observation_space
+        self.action_space = self._player.action_space
+
     def _teams(self) -> dict[str, Sequence[int]]:
         return {"single": range(len(self.scenario.agents))}
 
-    @cached_property
-    def observation_space(self) -> Box:  # type: ignore[override]
-        """The space of observations."""
-        return self.players["single"].observation_space
-
-    @cached_property
-    def action_space(self) -> Discrete | MultiDiscrete:  # type: ignore[override]
-        """The space of actions."""
-        return self.players["single"].action_space
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[FloatArray, dict[str, Any]]:
+    ) -> tuple[FloatArray, dict[str, object]]:
         """Start an episode, see `Environment.begin`; return observation and info."""
         super().reset(seed=seed)
         states = self.begin(seed, options)
-        return self.players["single"].observe(states), self.info(self.scenario.measure())
+        return self._player.observe(states), self.info(self.scenario.measure())
 
-    def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[FloatArray, float, bool, bool, dict[str, object]]:
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
         transition, truncated = self.advance(np.asarray(action, dtype=np.int64))
-        player, info = self.players["single"], self.info(transition.info)
-        seen, paid = player.observe(transition.states), player.paid(transition.reward)
-        return seen, paid, transition.terminated, truncated, info
+        observation = self._player.observe(transition.states)
+        reward = self._player.mean_reward(transition.reward)
+        info = self.info(transition.info)
+        return observation, reward, transition.terminated, truncated, info
 
 
 if ENV_ID not in gymnasium.registry:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NotRequired, TypedDict
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
-from ...core.numerics import FloatArray, IntArray, stream_of, wrap
+from ...core.numerics import BoolArray, FloatArray, IntArray, stream_of, wrap
 from .config import BoxPushingSettings
 from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
@@ -28,7 +28,8 @@ from .states.state_spaces import state_space_for
 from .world.boxes import box_for, growth
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD, Task, reward
-from .world.world import WheelFailures, World, place
+from .world.starts import place
+from .world.world import WheelFailures, World
 
 if TYPE_CHECKING:
     from .pictures.policy import Policy
@@ -39,28 +40,71 @@ SENSING = 2**32 - 1
 MEASURES = (
     SUCCESS,
     Measure(
-        "stopped_at_goal", "stopped at goal", source="stopped_at_goal", better="higher",
+        "stopped_at_goal",
+        "stopped at goal",
+        source="stopped_at_goal",
+        better="higher",
         is_rate=True,
     ),
     Measure("final_distance_m", "final distance", "m", "distance_m", better="lower", least=0.0),
     Measure(
-        "final_orientation_rad", "final orientation error", "rad", "orientation_error_rad",
-        better="lower", least=0.0,
+        "final_orientation_rad",
+        "final orientation error",
+        "rad",
+        "orientation_error_rad",
+        better="lower",
+        least=0.0,
     ),
     Measure(
-        "contact_fraction", "time in contact", source="contact_fraction", gathering="mean",
-        better="higher", least=0.0, greatest=1.0,
+        "contact_fraction",
+        "time in contact",
+        source="contact_fraction",
+        gathering="mean",
+        better="higher",
+        least=0.0,
+        greatest=1.0,
     ),
-)  # fmt: skip
+)
 """What is measured of an episode: whether the box came within the tolerance of the goal at whatever
 speed, whether it was there once the robots had stopped, ..."""
+
+
+class Measurements(TypedDict):
+    """Poses, speeds, contact and errors of a state; poses [m, m, rad]."""
+
+    robot_poses: FloatArray
+    """``(M, 3)``."""
+    box_pose: FloatArray
+    """``(3,)``."""
+    goal_pose: FloatArray
+    """``(3,)``."""
+    wheel_speeds: FloatArray
+    """``(n,)`` as commanded [m/s]."""
+    contact: BoolArray
+    """``(M,)`` whether each robot touches the box now."""
+    contact_time: FloatArray
+    """``(M,)`` for which fraction of the last decision period each did."""
+    contact_fraction: float
+    """The mean of it."""
+    failed: BoolArray
+    """``(n,)`` wheels under a failure."""
+    distance_m: float
+    """Of the box from the goal."""
+    orientation_rad: float
+    """Of the box from the goal pose."""
+    orientation_error_rad: float
+    """The size of it."""
+    stopped_at_goal: bool
+    """Whether the box stayed at the goal once the wheels had stopped: known after the step that
+    ends the episode."""
+    seconds: NotRequired[dict[str, float]]
+    """What physics and sensors took in a step."""
 
 
 class BoxPushing(Scenario, Embodiment):
     """A box, a goal, and robots whose wheels are the agents.
 
-    Fulfils `Scenario`, and can be drawn, calibrated and predicted
-    exactly.
+    It can be drawn, calibrated and predicted exactly.
 
     Parameters
     ----------
@@ -91,7 +135,8 @@ class BoxPushing(Scenario, Embodiment):
         similar = settings.scaling == "similar"
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
         robots = [self.robot] * settings.robots
-        names, numbers = self.robot.wheel_names, range(settings.robots)
+        names = self.robot.wheel_names
+        numbers = range(settings.robots)
         self.agents = tuple(f"robot{r + 1}.{name}" for r in numbers for name in names)
         self.roles = names * settings.robots
         every = np.arange(len(self.agents)).reshape(-1, len(names))
@@ -112,14 +157,23 @@ class BoxPushing(Scenario, Embodiment):
         self._model = push_model(settings.predictor, robots, self.box, settings.belief)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = WheelFailures(settings.failures, self.agents, self._limits)
-        paid = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
-        self._task = Task(paid, self._unit * settings.tolerance, settings.orientation_tolerance)
+        reward_settings = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
+        self._task = Task(
+            reward_settings, self._unit * settings.tolerance, settings.orientation_tolerance
+        )
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._premises = Premises(
-            self._belief, self._space, self.action_set, settings.speed_increment, self._limits,
-            self._task, settings.infrared, self.box.outline, settings.period,
+            self._belief,
+            self._space,
+            self.action_set,
+            settings.speed_increment,
+            self._limits,
+            self._task,
+            settings.infrared,
+            self.box.outline,
+            settings.period,
             settings.prediction_horizon * CONTROL_PERIOD,
-        )  # fmt: skip
+        )
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
         # Whether the robots fit is better known now than in the middle of a study.
         BoxPushing.reset(self, 0)
@@ -148,7 +202,8 @@ class BoxPushing(Scenario, Embodiment):
         Failures are scheduled by the number of the `episode`.
         """
         self._sensing = stream_of(seed, SENSING)
-        rng, start = np.random.default_rng(seed), self.settings.start
+        rng = np.random.default_rng(seed)
+        start = self.settings.start
         robots, box, self._goal = place(start, rng, self.world.robots, self.box, self._unit)
         self.world.place(robots, box)
         self._speeds: FloatArray = np.zeros(len(self.agents))
@@ -162,8 +217,10 @@ class BoxPushing(Scenario, Embodiment):
         """Command the wheels, let the world go on for one decision period, observe and reward."""
         unit = self.settings.speed_increment * self._limits
         self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
-        before, poses = self._distance(), self.world.robot_poses.copy()
-        box, radius = self.world.box_pose.copy(), self.robot.radius
+        before = self._distance()
+        poses = self.world.robot_poses.copy()
+        box = self.world.box_pose.copy()
+        radius = self.robot.radius
         begin = perf_counter()
         self._advance(self._speeds)
         moved = perf_counter()
@@ -175,11 +232,13 @@ class BoxPushing(Scenario, Embodiment):
             twists = np.concatenate([of_box, twists])
         measured = self.measure()
         readings = self.settings.infrared.noisy(self.world.infrared()[0], self._sensing)
-        terminated, away = self._reached(), measured["distance_m"]
+        terminated = self._reached()
+        away = measured["distance_m"]
         distance, way, turn = np.array([[away], [away - before], [measured["orientation_rad"]]])
-        contact, strongest = self.world.contact[None], readings.max(axis=1)[None]
+        contact = self.world.contact[None]
+        strongest = readings.max(axis=1)[None]
         gained = reward(self._task, distance, way, turn, contact, strongest)[0]
-        paid = gained[self._body] if self.settings.reward.of == "robot" else float(gained[0])
+        received = gained[self._body] if self.settings.reward.of == "robot" else float(gained[0])
         sensed = perf_counter()
         if terminated:
             # Does the box come to rest within the tolerance when all wheels stop?
@@ -190,7 +249,7 @@ class BoxPushing(Scenario, Embodiment):
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
         farthest = self._unit * self.settings.termination_radius
         truncated = not terminated and away > farthest
-        return Transition(states, paid, terminated, truncated, measured, twists)
+        return Transition(states, received, terminated, truncated, measured, twists)
 
     def embodiment(self) -> Embodiment:
         """Return itself: its robots are open to self-models."""
@@ -205,9 +264,13 @@ class BoxPushing(Scenario, Embodiment):
     ) -> BoxPrediction:
         """Predict, believing in these effects of the wheels and constants of the push."""
         situation = Situation(
-            self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
-            self._speeds, tuple(effects), self.groups,
-        )  # fmt: skip
+            self.world.robot_poses.copy(),
+            self.world.box_pose.copy(),
+            self._goal,
+            self._speeds,
+            tuple(effects),
+            self.groups,
+        )
         model = self._model if constants is None else believing(self._belief, constants)
         if self._playground is None or self._saved is None:
             return BoxPrediction(situation, model, self._premises)
@@ -222,9 +285,9 @@ class BoxPushing(Scenario, Embodiment):
         exactly |= {"belief": BeliefSettings()}
         return type(self)(self.settings.model_copy(update=exactly))
 
-    def constants_of_episode(self) -> dict[str, Any]:
+    def constants_of_episode(self) -> dict[str, object]:
         """Return the goal pose of the episode, and what is drawn."""
-        return {"goal_pose": self._goal, **self.settings.drawn}
+        return {"goal_pose": self._goal, **self.settings.drawing}
 
     def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
         """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""
@@ -254,16 +317,8 @@ class BoxPushing(Scenario, Embodiment):
         # After every step, asked for or not, as saving costs the world its order of contacts.
         self._saved = None if self._playground is None else self.world.state()
 
-    def measure(self) -> dict[str, Any]:
-        """Return poses, speeds, contact and errors of the present state.
-
-        Keys: ``robot_poses`` (M, 3), ``box_pose``, ``goal_pose`` [m, m, rad], ``wheel_speeds``
-        (n,) as commanded [m/s], ``contact`` (M,) now, ``contact_time`` (M,) as a fraction of the
-        last decision period, ``contact_fraction`` its mean, ``failed`` (n,) wheels,
-        ``distance_m``, ``orientation_rad`` of the box from the goal pose,
-        ``orientation_error_rad`` its size, ``stopped_at_goal`` whether the box stayed there once
-        the wheels had stopped: known after the step that ends the episode.
-        """
+    def measure(self) -> Measurements:
+        """Return poses, speeds, contact and errors of the present state."""
         orientation = self._orientation()
         return {
             "robot_poses": self.world.robot_poses.copy(),
@@ -291,7 +346,8 @@ class BoxPushing(Scenario, Embodiment):
         return float(wrap(self.world.box_pose[2] - self._goal[2]))
 
     def _reached(self) -> bool:
-        distance, orientation = np.array([self._distance()]), np.array([self._orientation()])
+        distance = np.array([self._distance()])
+        orientation = np.array([self._orientation()])
         return bool(self._task.reached(distance, orientation)[0])
 
     def _observe(self, origin: FloatArray) -> FloatArray:
@@ -299,10 +355,17 @@ class BoxPushing(Scenario, Embodiment):
 
         `origin` is the pose ``(3,)`` of the box one decision period ago.
         """
-        world, poses = self.world, self.world.robot_poses
+        world = self.world
+        poses = self.world.robot_poses
         view = View(
-            poses[None], world.box_pose[None], world.gaps[None], self._goal, origin, 1.0,
-            self.box.outline, self.box.friction_radius,
-        )  # fmt: skip
+            poses[None],
+            world.box_pose[None],
+            world.gaps[None],
+            self._goal,
+            origin,
+            1.0,
+            self.box.outline,
+            self.box.friction_radius,
+        )
         own = self._space.own(poses[self._body], self._speeds, self._goal)
-        return np.hstack([own, self._space.sensed(view, range(len(poses)))[self._body, 0]])
+        return np.hstack([own, self._space.sense(view, range(len(poses)))[self._body, 0]])

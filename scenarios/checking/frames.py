@@ -3,26 +3,24 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import zip_longest
-from typing import Any
 
 import numpy as np
 
 from ...core.agents.loop import world_seed
+from ...core.interface.plain import as_scenario
 from ...core.interface.scenario import Scenario, Transition
 from ...core.numerics import IntArray
 
-Frame = dict[str, Any]
+Frame = dict[str, object]
 """What one step gave, by dotted name; without the measured times."""
-
-FIELDS = ("states", "reward", "terminated", "truncated", "twists", "info")
 
 
 @dataclass(frozen=True)
 class Examination:
     """What is played, and what could not be checked."""
 
-    factory: Callable[[], Scenario]
-    """Makes a new instance of the scenario."""
+    make: Callable[[], object]
+    """Makes a new instance of the scenario, which may be of a user's plain class."""
     steps: int
     """Most steps of an episode."""
     seeds: tuple[int, ...]
@@ -31,6 +29,10 @@ class Examination:
     """Numbers under which episodes are played: failures may be scheduled by them."""
     unchecked: dict[str, str] = field(default_factory=dict)
     """Why something could not be checked, by its name; checks write it."""
+
+    def factory(self) -> Scenario:
+        """Return a new instance of the scenario."""
+        return as_scenario(self.make())
 
     def actions(self, scenario: Scenario, seed: int) -> IntArray:
         """Return joint actions ``(steps, n)`` drawn by a seed, most of them held for some steps."""
@@ -77,18 +79,20 @@ class Examination:
 def opening(scenario: Scenario, seed: int, episode: int) -> Frame:
     """Reset a scenario and return the frame of the start."""
     states = scenario.reset(world_seed(seed, episode), episode)
-    return copied({"states": states, "info": measured(scenario)})
+    return copied({"states": states, "info": scenario.measure()})
 
 
-def measured(scenario: Scenario) -> Mapping[str, Any]:
-    """Return the measurements of the present state, of a scenario that has them between steps."""
-    return scenario.measure()
-
-
-def fields(transition: Transition) -> Iterator[tuple[str, Any]]:
+def fields(transition: Transition) -> Iterator[tuple[str, object]]:
     """Yield what a transition holds, by dotted name, not copied."""
-    held = vars(transition)
-    return _flat({name: held[name] for name in FIELDS})
+    table = {
+        "states": transition.states,
+        "reward": transition.reward,
+        "terminated": transition.terminated,
+        "truncated": transition.truncated,
+        "twists": transition.twists,
+        "info": transition.info,
+    }
+    return _flat(table)
 
 
 def differences(
@@ -107,7 +111,7 @@ def differences(
                     yield f"{here} {name}{_contrast(one[name], other[name])}"
 
 
-def bits(value: Any) -> tuple[Any, ...]:
+def bits(value: object) -> tuple[object, ...]:
     """Return what equal values share, to the last bit."""
     array = np.asarray(value)
     content = repr(value) if array.dtype == object else array.tobytes()
@@ -119,8 +123,9 @@ def at(step: int) -> str:
     return "at the start" if step == 0 else f"at step {step}"
 
 
-def _contrast(one: Any, other: Any) -> str:
-    one, other = np.asarray(one), np.asarray(other)
+def _contrast(value: object, other_value: object) -> str:
+    one = np.asarray(value)
+    other = np.asarray(other_value)
     if one.shape != other.shape or one.dtype != other.dtype:
         return f" of shapes {one.shape} and {other.shape}, types {one.dtype} and {other.dtype}"
     if not one.ndim:
@@ -131,7 +136,7 @@ def _contrast(one: Any, other: Any) -> str:
 
 def look_ahead(scenario: Scenario) -> None:
     """Ask for predictions, of a scenario that predicts, and measurements."""
-    measured(scenario)
+    scenario.measure()
     prediction = scenario.predict()
     if prediction is None:
         return
@@ -139,10 +144,10 @@ def look_ahead(scenario: Scenario) -> None:
     for agent in range(len(scenario.agents)):
         prediction.states(agent, some)
     prediction.rewards(some)
-    measured(scenario)
+    scenario.measure()
 
 
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
     for name, value in table.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{name}.")
@@ -150,7 +155,7 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
             yield prefix + name, value
 
 
-def copied(table: Mapping[str, Any]) -> Frame:
+def copied(table: Mapping[str, object]) -> Frame:
     """Return what is in a table, by dotted name, without the measured times."""
     return {
         name: value.copy() if isinstance(value, np.ndarray) else value

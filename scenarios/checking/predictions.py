@@ -9,7 +9,6 @@ looking at their sizes: a row too few is read from somewhere else in memory.
 """
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -26,7 +25,7 @@ CLOSE = 1e-9
 
 
 def faults_of_prediction(
-    scenario: Any, joint_actions: IntArray, rng: np.random.Generator
+    scenario: Scenario, joint_actions: IntArray, rng: np.random.Generator
 ) -> Iterator[str]:
     """Yield what is wrong with what a scenario predicts from its present state.
 
@@ -42,22 +41,22 @@ def faults_of_prediction(
     prediction = scenario.predict()
     if prediction is None:
         return
-    given = joint_actions.copy()
+    unchanged = joint_actions.copy()
     faults = [*_misformed(scenario, prediction, joint_actions)]
-    if not np.array_equal(joint_actions, given):
+    if not np.array_equal(joint_actions, unchanged):
         yield "the joint actions that are to be predicted are changed"
     yield from faults
-    states = np.array([prediction.states(i, given) for i in range(len(scenario.agents))])
+    states = np.array([prediction.states(i, unchanged) for i in range(len(scenario.agents))])
     for i in range(len(states)):
-        if differs(scenario, prediction.states(i, given[-1:])[0], states[i, -1]).any():
+        if differs(scenario, prediction.states(i, unchanged[-1:])[0], states[i, -1]).any():
             yield f"states of agent {i} after a joint action depend on those predicted with it"
     yield from faults_of_sharing(scenario, states)
-    yield from _wrong_groups(scenario, prediction, given, states)
+    yield from _wrong_groups(scenario, prediction, unchanged, states)
     tables = prediction.tables()
     if tables is not None and tables.rewarded:
         yield from _wrong_tables(scenario, prediction, tables, rng)
     else:
-        yield from _own_variable_moved(scenario, prediction, given, rng)
+        yield from _own_variable_moved(scenario, prediction, unchanged, rng)
 
 
 def too_many(scenario: Scenario) -> str:
@@ -70,9 +69,12 @@ def _misformed(
     scenario: Scenario, prediction: Prediction, joint_actions: IntArray
 ) -> Iterator[str]:
     """Yield what is predicted in a wrong shape, or is not finite."""
-    n, m, d = len(scenario.agents), len(joint_actions), scenario.state_space.n_variables
-    groups, n_own = scenario.groups, scenario.state_space.n_own
-    wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
+    n = len(scenario.agents)
+    m = len(joint_actions)
+    d = scenario.state_space.n_variables
+    groups = scenario.groups
+    n_own = scenario.state_space.n_own
+    wanted: dict[str, tuple[FloatArray, tuple[int, ...]]] = {
         f"states of agent {i}": (prediction.states(i, joint_actions), (m, d)) for i in range(n)
     }
     own, shared = states_by_group(prediction, joint_actions, groups, n_own)
@@ -105,7 +107,8 @@ def _wrong_tables(
     scenario: Scenario, prediction: Prediction, tables: Tables, rng: np.random.Generator
 ) -> Iterator[str]:
     """Yield where the tables differ from the prediction, whose states are taken to be right."""
-    n, n_actions = len(scenario.agents), len(scenario.action_set)
+    n = len(scenario.agents)
+    n_actions = len(scenario.action_set)
     count = n_actions**n
     if too_many(scenario):
         return
@@ -114,12 +117,14 @@ def _wrong_tables(
     for group in scenario.groups:
         divisor = n_actions ** (n - 1 - group[-1])
         for agent in group:
-            blocks, which = tables.blocks(agent), f"blocks of agent {agent}:"
+            blocks = tables.blocks(agent)
+            which = f"blocks of agent {agent}:"
             if blocks.divisor != divisor:
                 yield f"{which} divisor = {blocks.divisor}, must be {divisor}"
             for fault in _misshapen(blocks, n_actions ** len(group), count, scenario):
                 yield f"{which} {fault}"
-            expected, actual = prediction.states(agent, joint_actions), blocks.states(indices)
+            expected = prediction.states(agent, joint_actions)
+            actual = blocks.states(indices)
             wrong = differs(scenario, actual, np.asarray(expected))
             if blocks.alone:
                 wrong[:, : scenario.state_space.n_own] = False
@@ -134,7 +139,8 @@ def _wrong_tables(
 
 def _misshapen(blocks: Blocks, n_own_rows: int, count: int, scenario: Scenario) -> Iterator[str]:
     """Yield what would have a kernel read the wrong row, or none."""
-    n_own, d = scenario.state_space.n_own, scenario.state_space.n_variables
+    n_own = scenario.state_space.n_own
+    d = scenario.state_space.n_variables
     for name, table, rows, width, n_rows in (
         ("own", blocks.own, blocks.own_rows, n_own, n_own_rows),
         ("shared", blocks.shared, blocks.shared_rows, d - n_own, count),
@@ -185,9 +191,10 @@ def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatAr
     return differences
 
 
-def is_close(differences: FloatArray, expected: FloatArray) -> Any:
+def is_close(differences: FloatArray, expected: FloatArray) -> BoolArray:
     """Return which differences from what is expected rounding may make."""
-    return np.abs(differences) <= CLOSE * np.maximum(1.0, np.abs(expected))
+    close: BoolArray = np.abs(differences) <= CLOSE * np.maximum(1.0, np.abs(expected))
+    return close
 
 
 def differs(scenario: Scenario, states: FloatArray, expected: FloatArray) -> BoolArray:
@@ -204,10 +211,12 @@ def faults_of_sharing(scenario: Scenario, states: FloatArray) -> Iterator[str]:
     names = [variable.name for variable in space.variables]
     shared = [(group, names[space.n_own :], "shared by a group") for group in scenario.groups]
     for agents, claimed, claim in [*shared, (range(len(states)), space.common, "common")]:
-        first, columns = agents[0], [names.index(name) for name in claimed]
+        first = agents[0]
+        columns = [names.index(name) for name in claimed]
         wrong = differs(scenario, states[list(agents)], states[[first]])[..., columns]
         for member, *where, column in np.argwhere(wrong):
-            i, here = agents[member], (*where, columns[column])
+            i = agents[member]
+            here = (*where, columns[column])
             yield (
                 f"{names[here[-1]]}, said to be {claim}, is {states[i][here]:.6g} of agent {i} and "
                 f"{states[first][here]:.6g} of agent {first}"
@@ -227,7 +236,8 @@ def _own_variable_moved(
         changed = drawn.copy()
         changed[:, list(group)] = joint_actions[:, list(group)]
         for agent in group:
-            before, after = (prediction.states(agent, a) for a in (joint_actions, changed))
+            before = prediction.states(agent, joint_actions)
+            after = prediction.states(agent, changed)
             moved = differs(scenario, after, before)[:, : space.n_own].any(axis=0)
             for j in np.flatnonzero(moved):
                 yield (

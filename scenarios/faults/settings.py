@@ -2,13 +2,13 @@
 
 The kinds of failure, `KINDS`, know nothing of what fails. A scenario says under which key its
 actuators are named, ``wheels`` or ``joints``, in a model that inherits `FailureSettings`, and
-`befalling` joins it with the kinds that can befall them::
+`build_kinds` joins it with the kinds that can befall them::
 
     class WheelFailure(FailureSettings):
         part = "wheels"
         wheels: Names
 
-    Failure = Annotated[Union[*befalling(WheelFailure, **KINDS).values()], DISCRIMINATOR]
+    Failure = Annotated[Union[*build_kinds(WheelFailure, **KINDS).values()], DISCRIMINATOR]
 
 A failure lies between the command that an actuator gets and the speed that its servo holds, see
 `FailureSettings.held`; the agents see the commands, and the failure only in how their bodies move.
@@ -19,7 +19,7 @@ holds, see `FailureSettings.held`. A world without failures never comes here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Generic, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.random import Generator
@@ -116,7 +116,7 @@ DISCRIMINATOR = Field(discriminator="kind")
 """Of a field that holds failures of any of several kinds."""
 
 
-def befalling(
+def build_kinds(
     naming: type[FailureSettings], **kinds: type[FailureSettings]
 ) -> dict[str, type[Any]]:
     """Return the settings of failures that befall what `naming` names, by their ``kind``.
@@ -128,7 +128,7 @@ def befalling(
     >>> class CartFailure(FailureSettings):
     ...     part = "carts"
     ...     carts: tuple[str, ...]
-    >>> befalling(CartFailure, loose=Free)["loose"](carts=("left",))
+    >>> build_kinds(CartFailure, loose=Free)["loose"](carts=("left",))
     Loose(episode=0, step=0, end_episode=None, end_step=0, carts=('left',), kind='loose')
     >>> CartFailure.Loose.__doc__
     'The cart has no drive and gives way.'
@@ -149,7 +149,10 @@ def befalling(
     return models
 
 
-class Failures:
+FailureT = TypeVar("FailureT", bound=FailureSettings)
+
+
+class Failures(Generic[FailureT]):
     """The failures that a spec schedules, and the actuators under them.
 
     Parameters
@@ -184,7 +187,7 @@ class Failures:
 
     def __init__(
         self,
-        settings: Sequence[FailureSettings],
+        settings: Sequence[FailureT],
         agents: Sequence[str],
         limits: FloatArray,
         key: str = "scenario.failures",
@@ -228,17 +231,19 @@ class Failures:
         speeds = np.tile(commands, (periods, 1))
         remembered = np.vstack([self._commands, speeds])
         for i in self._active:
-            mask, failure = self._masks[i], self._settings[i]
+            mask = self._masks[i]
+            failure = self._settings[i]
             if isinstance(failure, Delayed):
                 first = self._memory - failure.periods
                 speeds[:, mask] = remembered[first : first + periods, mask]
             else:
-                limits, stream = self._limits[mask], self._streams[i]
+                limits = self._limits[mask]
+                stream = self._streams[i]
                 speeds[:, mask] = failure.held(speeds[:, mask], limits, stream)
         self._commands = remembered[len(remembered) - self._memory :]
         return speeds
 
-    def active(self) -> Iterator[tuple[Any, BoolArray]]:
+    def active(self) -> Iterator[tuple[FailureT, BoolArray]]:
         """Yield the failures that are on, each with the mask ``(n,)`` of what it has befallen."""
         for i in self._active:
             yield self._settings[i], self._masks[i]

@@ -27,18 +27,20 @@ From episode 3 on, the motor of a pendulum does a third of what it is commanded.
 ({}, array([0.66], dtype=float32))
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from numpy.typing import ArrayLike
 from pettingzoo.utils import BaseParallelWrapper
 
 from ...core.hierarchy.failures import Names
 from ...core.numerics import BoolArray, FloatArray
 from . import settings
-from .settings import Failures, FailureSettings, befalling
+from .settings import Failures, FailureSettings, build_kinds
 
 
 class ActuatorFault(FailureSettings):
@@ -52,7 +54,7 @@ class ActuatorFault(FailureSettings):
     """What is wrong with them."""
 
 
-KINDS = befalling(ActuatorFault, **settings.KINDS)
+KINDS = build_kinds(ActuatorFault, **settings.KINDS)
 """The kinds of fault by name."""
 Seized, Free, Weak, Reversed, Stuck, Delayed, Noisy = KINDS.values()
 
@@ -108,7 +110,7 @@ class ActionScale:
     """
 
     def __init__(
-        self, space: gymnasium.Space[Any], rest: Any = None, name: str = "action space"
+        self, space: gymnasium.Space[Any], rest: ArrayLike | None = None, name: str = "action space"
     ) -> None:
         self.space = space
         self._low, self._high = (ends.astype(float) for ends in limits_of(space, name))
@@ -121,11 +123,13 @@ class ActionScale:
             raise ValueError(f"rest = {rest!r}: no action of {space}")
         self.limits: FloatArray = np.maximum(self._high - self._rest, self._rest - self._low)
 
-    def place(self, action: Any) -> FloatArray:
+    def place(self, action: ArrayLike) -> FloatArray:
         """Return where an action lies from rest, ``(k,)``."""
         return np.ravel(action).astype(float) - self._rest
 
-    def action(self, place: FloatArray, chosen: Any, changed: BoolArray, drawn: FloatArray) -> Any:
+    def action(
+        self, place: FloatArray, chosen: object, changed: BoolArray, drawn: FloatArray
+    ) -> Any:
         """Return the action at a place.
 
         Parameters
@@ -162,7 +166,7 @@ INEXPRESSIBLE: Mapping[Commands, str] = {"effort": "seized", "velocity": "free",
 """What no action expresses, by what actions command."""
 
 
-class _Faulty:
+class _Faulty(ABC):
     """An environment under a schedule of faults; inherited beside a library's wrapper.
 
     Its actuators are those of one or more action spaces, by the prefix of their names. Noise and
@@ -184,11 +188,11 @@ class _Faulty:
         *,
         seed: int = 0,
         commands: Commands = "effort",
-        rest: Any = None,
+        rest: object = None,
         mechanism: Mechanism | None = None,
         inform: bool = False,
     ) -> None:
-        super().__init__(env)  # type: ignore[call-arg]  # of the wrapper
+        self._wrap(env)
         if commands not in INEXPRESSIBLE:
             raise ValueError(f"commands = {commands!r}, allowed: {', '.join(INEXPRESSIBLE)}")
         for i, fault in enumerate(faults):
@@ -197,24 +201,29 @@ class _Faulty:
                     f"faults[{i}]: no {commands} makes an actuator {fault.kind}; give a "
                     f"mechanism that does, or say what else actions command"
                 )
-        # Actions by prefix: those of Gymnasium have none, those of PettingZoo the agent's name.
-        spaces, rests = {"": env.action_space}, {"": rest}
-        if hasattr(env, "possible_agents"):
-            spaces = {agent: env.action_space(agent) for agent in env.possible_agents}
-            rests = rest or {}
         self._parts: dict[str, tuple[ActionScale, slice]] = {}
         names: list[str] = []
-        for prefix, space in spaces.items():
-            scale = ActionScale(space, rests.get(prefix), f"action space {prefix}".rstrip())
+        for prefix, scale in self._scales(env, rest).items():
             self._parts[prefix] = scale, slice(len(names), len(names) + len(scale.limits))
             names += [f"{prefix}.{i}" if prefix else str(i) for i in range(len(scale.limits))]
         self.actuators = tuple(names)
         limits = np.concatenate([scale.limits for scale, _ in self._parts.values()])
         self._failures = Failures(faults, self.actuators, limits, "faults")
-        self._commands, self._mechanism, self._seed = commands, mechanism, seed
-        self._inform, self._hooked = inform, False
+        self._commands = commands
+        self._mechanism = mechanism
+        self._seed = seed
+        self._inform = inform
+        self._hooked = False
         self.carried: Any = None
         self._begin(0, 0)
+
+    @abstractmethod
+    def _wrap(self, env: Any) -> None:
+        """Let the library's wrapper begin."""
+
+    @abstractmethod
+    def _scales(self, env: Any, rest: Any) -> dict[str, ActionScale]:
+        """Return the scales of an environment's action spaces by the prefix of their actuators."""
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> Any:
         """Start an episode of the environment beneath; a seed starts their count afresh.
@@ -223,18 +232,21 @@ class _Faulty:
         """
         left = dict(options or {})
         if seed is not None:
-            self._world, self._episode = seed, -1
+            self._world = seed
+            self._episode = -1
         self._begin(self._world, int(left.pop("fault_episode", self._episode + 1)))
         return self.env.reset(seed=seed, options=left or None)
 
     def _begin(self, world: int, episode: int) -> None:
-        self._world, self._episode, self._step = world, episode, 0
+        self._world = world
+        self._episode = episode
+        self._step = 0
         root = np.random.SeedSequence([self._seed, world, episode])
         self._failures.begin(root, episode)
         self._rng = np.random.default_rng(root)
         self._held = np.zeros(len(self.actuators))
 
-    def _carry(self, actions: Mapping[str, Any]) -> dict[str, Any]:
+    def _carry(self, actions: Mapping[str, ArrayLike]) -> dict[str, Any]:
         """Return what is carried out of the actions of one step, by prefix.
 
         Spaces whose action is missing rest.
@@ -313,7 +325,13 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
         If a fault names no actuator or cannot be expressed, or the actions are of another kind.
     """
 
-    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+    def _wrap(self, env: Any) -> None:
+        gymnasium.Wrapper.__init__(self, env)
+
+    def _scales(self, env: Any, rest: Any) -> dict[str, ActionScale]:
+        return {"": ActionScale(env.action_space, rest)}
+
+    def step(self, action: ArrayLike) -> tuple[Any, Any, bool, bool, dict[str, object]]:
         """Do what faulty actuators make of an action."""
         self.carried = self._carry({"": action})[""]
         seen, reward, terminated, truncated, info = self.env.step(self.carried)
@@ -342,12 +360,23 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
         The last actions that were done, by agent.
     """
 
-    def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
+    def _wrap(self, env: Any) -> None:
+        BaseParallelWrapper.__init__(self, env)
+
+    def _scales(self, env: Any, rest: Any) -> dict[str, ActionScale]:
+        rests = rest or {}
+        return {
+            agent: ActionScale(env.action_space(agent), rests.get(agent), f"action space {agent}")
+            for agent in env.possible_agents
+        }
+
+    def step(self, actions: Mapping[str, ArrayLike]) -> tuple[dict[str, Any], ...]:
         """Do what faulty actuators make of the agents' actions."""
         self.carried = self._carry(actions)
         *given, infos = self.env.step(self.carried)
         if self._inform:
-            now, infos = self._now(), dict(infos)
+            now = self._now()
+            infos = dict(infos)
             for agent, info in infos.items():
                 own = {name: kind for name, kind in now.items() if name.rpartition(".")[0] == agent}
                 infos[agent] = {**info, "faults": own, "carried": self.carried.get(agent)}

@@ -1,14 +1,14 @@
 """The settings of the kinematic chain, as they stand in the ``[scenario]`` table of a spec."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Union
 
 from pydantic import Field
 
 from ...core.hierarchy.failures import Names
 from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings, team_size
-from ..faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
-from ..state_variables import referred
+from ..faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
+from ..state_variables import names_of
 from .variables import CHAIN_VARIABLES
 
 PERIOD = 0.1
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     Failure = JointFailure
 else:
     _ALIKE = {kind: KINDS[kind] for kind in ("weak", "reversed", "stuck")}
-    _KINDS = befalling(JointFailure, locked=KINDS["seized"], **_ALIKE)
+    _KINDS = build_kinds(JointFailure, locked=KINDS["seized"], **_ALIKE)
     Failure = Annotated[Union[*_KINDS.values()], DISCRIMINATOR]
 """Any failure's settings, distinguished by `kind`."""
 
@@ -73,7 +73,7 @@ class KinematicChainSettings(ScenarioSettings):
     """Failures of joints, as ``[[scenario.failures]]`` tables."""
     predictor: Literal["nominal", "informed"] = "nominal"
     """Whether predictions take every joint for what it was built as, or know of failures."""
-    state_space: Annotated[tuple[str, ...], referred(CHAIN_VARIABLES)] = SIMPLE
+    state_space: Annotated[tuple[str, ...], names_of(CHAIN_VARIABLES)] = SIMPLE
     """State variables beside the speed of the own joint, by name, one's own included; see
     `kinematic_chain.variables`."""
     reward: ReachingRewardSettings = ReachingRewardSettings()
@@ -90,7 +90,7 @@ class KinematicChainSettings(ScenarioSettings):
     most_decisions: Annotated[int, Field(ge=1, le=1_000_000)] = 150
     """Decisions after which an episode is broken off."""
 
-    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
+    def scenario_defaults(self, preset: str) -> Mapping[str, object]:
         """Return what learns best here: little regularisation, and little foresight.
 
         The ridge weighs against the squared errors of all joints that share weights, so that it

@@ -24,7 +24,10 @@ Recording = Mapping[str, FloatArray]
 SIDE = 480
 """Width and height of a picture in pixels."""
 # Colour-blind-safe (Okabe and Ito 2008), as in the pictures of box pushing.
-LINK, TIP, GOAL, FAILED = "#0072B2", "#E69F00", "#555555", "#B00020"
+LINK = "#0072B2"
+TIP = "#E69F00"
+GOAL = "#555555"
+FAILED = "#B00020"
 
 
 class _ChainScene(Scene):
@@ -33,34 +36,47 @@ class _ChainScene(Scene):
     def __init__(self, recording: Recording) -> None:
         super().__init__((SIDE, SIDE), (0.15, 0.1, 0.83, 0.83))
         self.recording = recording
-        angles, reach = recording["angles"], float(recording["reach"])
+        angles = recording["angles"]
+        reach = float(recording["reach"])
         self.places = postures_of(angles, reach / angles.shape[1])
         ends = -1.05 * reach, 1.05 * reach
         self.axes.set(xlim=ends, ylim=ends)
         self.axes.add_patch(Circle((0, 0), reach, fill=False, ec="#dddddd", lw=1))
-        goal, ring = recording["goal"], max(float(recording["tolerance"]), 0.02 * reach)
+        goal = recording["goal"]
+        ring = max(float(recording["tolerance"]), 0.02 * reach)
         self.axes.add_patch(Circle(tuple(goal), ring, fill=False, ec=GOAL, ls="--", lw=1.5))
         self.axes.plot(0, 0, "s", color="black", ms=7, zorder=2)
 
     def _add(self, step: int) -> None:
-        recording, places = self.recording, self.places[step]
+        recording = self.recording
+        places = self.places[step]
         tips = self.places[: step + 1, -1]
         away = np.hypot(*(recording["goal"] - places[-1]))
         hurry = np.abs(recording["speeds"][step]) / float(recording["top_speed"])
-        n, failed = len(hurry), recording["failed"][step].astype(bool)
+        n = len(hurry)
+        failed = recording["failed"][step].astype(bool)
         size = 9.0 if n <= 8 else 5.0 if n <= 32 else 3.0
-        axes, joints = self.axes, places[:-1]
+        axes = self.axes
+        joints = places[:-1]
         x, y = joints.T
         self._moving = [
             *axes.plot(*tips.T, color=TIP, lw=1, alpha=0.7, zorder=1),
             *axes.plot(*places.T, color=LINK, lw=2.5 if n <= 16 else 1.5, zorder=3),
             axes.scatter(
-                x, y, c=hurry, cmap="Greys", vmin=0.0, vmax=1.0, s=size**2, edgecolors=LINK,
-                linewidths=1.0, zorder=4,
+                x,
+                y,
+                c=hurry,
+                cmap="Greys",
+                vmin=0.0,
+                vmax=1.0,
+                s=size**2,
+                edgecolors=LINK,
+                linewidths=1.0,
+                zorder=4,
             ),
             *axes.plot(*joints[failed].T, "x", color=FAILED, ms=size + 3, mew=2.5, zorder=5),
             *axes.plot(*places[-1], "o", color=TIP, ms=6, zorder=6),
-        ]  # fmt: skip
+        ]
         axes.set_title(f"step {step}: tip {100 * away:.0f} cm from the goal", loc="left")
 
 

@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -41,9 +40,7 @@ MOST_BEND = 2.5
 
 
 class KinematicChain(Scenario, Embodiment):
-    """A planar arm; a `Scenario` that can be drawn.
-
-    It is predicted exactly, and open to self-models.
+    """A planar arm. It can be drawn, is predicted exactly, and is open to self-models.
 
     Parameters
     ----------
@@ -70,7 +67,6 @@ class KinematicChain(Scenario, Embodiment):
         n = settings.joints
         self.agents = tuple(f"joint{i + 1}" for i in range(n))
         self.roles = ("joint",) * n
-        self.groups = tuple((i,) for i in range(n))
         self.action_set = ActionSet()
         self.length = REACH / n
         self._limits = np.full(n, settings.top_speed)
@@ -95,7 +91,8 @@ class KinematicChain(Scenario, Embodiment):
         Goals are spread evenly over the area. Failures are scheduled by the number of the
         `episode`.
         """
-        rng, n = np.random.default_rng(seed), len(self.agents)
+        rng = np.random.default_rng(seed)
+        n = len(self.agents)
         bend = min(MOST_BEND, 3.0 * np.sqrt(2.0 / n), self.settings.joint_limit or np.inf)
         self._angles = np.append(rng.uniform(-np.pi, np.pi), rng.uniform(-bend, bend, n - 1))
         self._speeds: FloatArray = np.zeros(n)
@@ -114,7 +111,8 @@ class KinematicChain(Scenario, Embodiment):
     def step(self, joint_action: IntArray) -> Transition:
         """Turn the joints for one decision period, observe and reward."""
         begin = perf_counter()
-        before, angles = self._distance(), self._angles
+        before = self._distance()
+        angles = self._angles
         self._failures.strike(self._step)
         unit = self.settings.speed_increment * self._limits
         self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
@@ -122,15 +120,16 @@ class KinematicChain(Scenario, Embodiment):
         self._angles = np.clip(angles + PERIOD * held, -self._most, self._most)
         self._step += 1
         moved = perf_counter()
-        states, measured = self._observe(before), self.measure()
+        states = self._observe(before)
+        measured = self.measure()
         away = np.array([measured["distance_m"]])
         terminated = bool(away[0] < self.settings.tolerance)
         truncated = not terminated and self._step >= self.settings.most_decisions
         twists = np.zeros((len(angles), 3))
         twists[:, 2] = (self._angles - angles) / PERIOD
-        paid = float(self._reward(away, before - away)[0])
+        received = float(self._reward(away, before - away)[0])
         measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
-        return Transition(states, paid, terminated, truncated, measured, twists)
+        return Transition(states, received, terminated, truncated, measured, twists)
 
     def embodiment(self) -> Embodiment:
         """Return itself: its joints are open to self-models."""
@@ -160,7 +159,7 @@ class KinematicChain(Scenario, Embodiment):
         """Return an arm alike whose predictions know of failures: all else is exact."""
         return type(self)(self.settings.model_copy(update={"predictor": "informed"}))
 
-    def measure(self) -> dict[str, Any]:
+    def measure(self) -> dict[str, object]:
         """Return posture ``angles`` (n,) [rad], ``speeds`` (n,) as commanded [rad/s] and more.
 
         ``tip`` and ``goal`` (2,), ``distance_m`` between them, ``failed`` (n,) joints.
@@ -174,7 +173,7 @@ class KinematicChain(Scenario, Embodiment):
             "distance_m": self._distance(),
         }
 
-    def constants_of_episode(self) -> Mapping[str, Any]:
+    def constants_of_episode(self) -> Mapping[str, object]:
         """Return the goal of the episode, and what is drawn."""
         return {
             "goal": self._goal,
@@ -244,8 +243,12 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         speeds: FloatArray,
         before: float,
     ) -> None:
-        self.arm, self.effects, self.angles, self.before = arm, effects, angles, before
-        self.goal, self.groups = arm._goal, arm.groups
+        self.arm = arm
+        self.effects = effects
+        self.angles = angles
+        self.before = before
+        self.goal = arm._goal
+        self.groups = arm.groups
         self._joints = np.arange(len(angles))
         gains, offsets = np.array([effect[2] for effect in effects]).T
         every = np.tile(np.arange(len(arm.action_set))[:, None], len(angles))
@@ -256,7 +259,7 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         self.turns = np.ascontiguousarray((after - angles).T)
         self._fractions = self.speeds / arm.settings.top_speed
 
-    def seen(self, joint_actions: IntArray) -> ChainView:
+    def view_after(self, joint_actions: IntArray) -> ChainView:
         """Return the situations after joint actions ``(m, n)``."""
         angles = self.angles + self.turns[self._joints, joint_actions]
         places = postures_of(angles, self.arm.length)
@@ -265,21 +268,22 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        return self.arm._states.of_joints(self.seen(joint_actions), agent, 1)[0]
+        return self.arm._states.of_joints(self.view_after(joint_actions), agent, 1)[0]
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the speeds ``(n, m, 1)`` and the other variables ``(n, m, d - 1)`` of all."""
-        states = self.arm._states.of_joints(self.seen(joint_actions), 0, len(self.angles))
+        states = self.arm._states.of_joints(self.view_after(joint_actions), 0, len(self.angles))
         return states[:, :, :1], states[self._joints, :, 1:]
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
-        view = self.seen(joint_actions)
+        view = self.view_after(joint_actions)
         return self.arm._reward(view.distance, view.approach)
 
     def after(self, joint_action: IntArray) -> ChainPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in one decision."""
-        reached, speeds = self.seen(joint_action[None]), self.commands(joint_action)
+        reached = self.view_after(joint_action[None])
+        speeds = self.commands(joint_action)
         before = float(reached.distance[0])
         return ChainPrediction(self.arm, self.effects, reached.angles[0], speeds, before)
 

@@ -35,7 +35,9 @@ class _Scripted(ABC):
     """What the two share: the action whose turn is nearest to the one that is wanted."""
 
     def __init__(self, settings: EvaluatorSettings, problem: DecisionProblem) -> None:
-        self.settings, self.problem, self.counts = settings, problem, Counts()
+        self.settings = settings
+        self.problem = problem
+        self.counts = Counts()
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action: how near its turn comes, negative.
@@ -45,7 +47,8 @@ class _Scripted(ABC):
         ValueError
             If the scenario is no kinematic chain.
         """
-        prediction, agent = deliberation.prediction, deliberation.agent
+        prediction = deliberation.prediction
+        agent = deliberation.agent
         if not isinstance(prediction, ChainPrediction):
             raise ValueError(
                 f"learner.decision.evaluator: {type(self).__name__} moves a kinematic-chain only"
@@ -77,7 +80,8 @@ class DampedLeastSquares(_Scripted):
 
     def _wanted(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
         above = list(self.problem.hierarchy.above(agent))
-        least, most = prediction.turns.min(axis=1), prediction.turns.max(axis=1)
+        least = prediction.turns.min(axis=1)
+        most = prediction.turns.max(axis=1)
         free = most > least
         free[above] = False
         if not free[agent]:

@@ -29,11 +29,18 @@ import numpy as np
 from ...core.interface.spaces import Variable
 from ...core.numerics import FloatArray, njit
 from ...core.plugins.registry import Registry
-from ..state_variables import find_variable, fixed, sensed, space_of, state_variable
+from ..state_variables import (
+    Situations,
+    find_variable,
+    freeze,
+    sense,
+    space_of,
+    state_variable,
+)
 
 
 @dataclass(frozen=True)
-class ChainView:
+class ChainView(Situations):
     """Situations to be described, ``m`` at once."""
 
     places: FloatArray
@@ -49,7 +56,7 @@ class ChainView:
 
     @property
     def n_situations(self) -> int:
-        """How many situations there are."""
+        """How many postures there are."""
         return len(self.places)
 
     @property
@@ -60,7 +67,7 @@ class ChainView:
     @cached_property
     def distance(self) -> FloatArray:
         """Distance ``(m,)`` of the tip from the goal [m]."""
-        return fixed(np.hypot(*(self.goal - self.tip).T))
+        return freeze(np.hypot(*(self.goal - self.tip).T))
 
     @property
     def approach(self) -> FloatArray:
@@ -219,5 +226,5 @@ class ChainStates:
         states: FloatArray = columns(
             view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
         )
-        sensed(self._things, view, range(first, first + count), states[:, :, 1:])
+        sense(self._things, view, range(first, first + count), states[:, :, 1:])
         return states

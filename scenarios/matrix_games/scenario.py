@@ -39,15 +39,21 @@ from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
 from ...core.numerics import FloatArray, IntArray
-from ...core.plugins.settings import ScenarioSettings, closest
+from ...core.plugins.settings import ScenarioSettings
+from ...core.plugins.words import closest
 
 OF_OPTIMA = (
     Measure(SUCCESS.name, SUCCESS.title, source="optimal", better="higher", is_rate=True),
     Measure(
-        "optimal_plays", "optimal plays", source="optimal", gathering="mean", better="higher",
-        least=0.0, greatest=1.0,
+        "optimal_plays",
+        "optimal plays",
+        source="optimal",
+        gathering="mean",
+        better="higher",
+        least=0.0,
+        greatest=1.0,
     ),
-)  # fmt: skip
+)
 """What is measured of any game: success is that the last play of an episode was optimal."""
 CLIMBING = ((11, -30, 0), (-30, 7, 6), (0, 0, 5))
 PARTIALLY_STOCHASTIC = ((11, -30, 0), (-30, (14, 0), 6), (0, 0, 5))
@@ -154,7 +160,7 @@ class MatrixGameSettings(ScenarioSettings):
 
 
 class MatrixGame(Scenario, Prediction):
-    """A matrix game; a `Scenario`, and its own `Prediction`.
+    """A matrix game, and its own prediction.
 
     Parameters
     ----------
@@ -187,7 +193,8 @@ class MatrixGame(Scenario, Prediction):
         """``(2, A, ..., A)`` two equally probable payoffs of every joint action."""
         self.optimal = optimal(self.payoffs)
         self.is_stochastic = bool((self.payoffs[0] != self.payoffs[1]).any())
-        n, n_actions = self.payoffs.ndim - 1, self.payoffs.shape[1]
+        n = self.payoffs.ndim - 1
+        n_actions = self.payoffs.shape[1]
         names = tuple("abcdefghijklmnopqrstuvwxyz"[:n_actions])
         self.agents = tuple(f"agent{i + 1}" for i in range(n))
         self.action_set = ActionSet(names, (0.0,) * n_actions, (0.0,) * n_actions, neutral=0)

@@ -18,7 +18,8 @@ that those who share weights can act differently only by what they see and are t
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Sequence
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -34,6 +35,8 @@ from .scenario import OF_OPTIMA
 SHARE_OF_BEST = Measure(
     "share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0
 )
+Entropy = int | Sequence[int] | None
+"""Of a seed."""
 PLAY = Variable("play", "1", 0.0, 1.0, centres=(0.0, 1.0))
 """What those see who see nothing: 0 always."""
 
@@ -65,15 +68,15 @@ class Game(ABC):
 
     Parameters
     ----------
-    seen
+    states
         What the agents see ``(n, d)``.
     """
 
     best = 1.0
     """The greatest payoff."""
 
-    def __init__(self, seen: FloatArray) -> None:
-        self.seen = seen
+    def __init__(self, states: FloatArray) -> None:
+        self.states = states
 
     @abstractmethod
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
@@ -133,8 +136,8 @@ class Landmarks(Game):
 
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
         """Return the share of landmarks that are taken, less the cost of the mean distance."""
-        n = len(self.seen)
-        far = self.seen[np.arange(n), joint_actions].mean(axis=1)
+        n = len(self.states)
+        far = self.states[np.arange(n), joint_actions].mean(axis=1)
         return distinct(joint_actions) / n - self._cost * far
 
     def is_optimal(self, joint_action: IntArray) -> bool:
@@ -143,9 +146,9 @@ class Landmarks(Game):
 
     def advance(self, rng: np.random.Generator) -> None:
         """Draw other places, and find the assignment of least distance."""
-        agents, landmarks = rng.random((2, len(self.seen), 2))
-        self.seen = np.linalg.norm(agents[:, None] - landmarks, axis=2)
-        assigned = optimize.linear_sum_assignment(self.seen)[1]
+        agents, landmarks = rng.random((2, len(self.states), 2))
+        self.states = np.linalg.norm(agents[:, None] - landmarks, axis=2)
+        assigned = optimize.linear_sum_assignment(self.states)[1]
         self.best = float(self.payoffs(assigned[None])[0])
 
 
@@ -159,7 +162,7 @@ def distinct(joint_actions: IntArray) -> IntArray:
 
 
 class TeamGame(Scenario):
-    """A game of many agents; a `Scenario`.
+    """A game of many agents, which is not predicted.
 
     Parameters
     ----------
@@ -177,7 +180,8 @@ class TeamGame(Scenario):
     measures = (*OF_OPTIMA, SHARE_OF_BEST)
 
     def __init__(self, settings: TeamGameSettings) -> None:
-        self.settings, n = settings, settings.players
+        self.settings = settings
+        n = settings.players
         self.agents = tuple(f"agent{i + 1}" for i in range(n))
         self.roles = ("player",) * n
         k = settings.actions if settings.game == "polymatrix" else n
@@ -193,10 +197,11 @@ class TeamGame(Scenario):
         self._edges: list[tuple[int, int]] = sorted(tuple(sorted(edge)) for edge in edges.edges)
         self.interactions = self._edges
         self._numbers = np.arange(float(n))[:, None][:, : len(number)]
-        self._drawn: Any = None
+        self._drawn: Entropy = None
         TeamGame.reset(self, 0)
 
-    def _of_seed(self, seed: Any) -> Game:
+    def _of_seed(self, seed: Entropy) -> Game:
+        """Return the game that is played; only a polymatrix game depends on the seed."""
         s = self.settings
         if s.game == "permutation":
             return Permutation(np.zeros((s.players, 1)))
@@ -210,7 +215,8 @@ class TeamGame(Scenario):
         """Begin with the first play."""
         entropy = seed.entropy if isinstance(seed, np.random.SeedSequence) else seed
         if entropy != self._drawn:
-            self.game, self._drawn = self._of_seed(entropy), entropy
+            self.game = self._of_seed(entropy)
+            self._drawn = entropy
         self._rng = np.random.default_rng(seed)
         self.game.advance(self._rng)
         return self._states()
@@ -226,4 +232,4 @@ class TeamGame(Scenario):
         return Transition(self._states(), payoff, False, False, info)
 
     def _states(self) -> FloatArray:
-        return np.hstack([self.game.seen, self._numbers])
+        return np.hstack([self.game.states, self._numbers])

@@ -10,8 +10,9 @@ False if its trials are too short for their times to say anything.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import SpecError, refused
 from ..results.analysis import Analysis, Figures, identity_lines
@@ -22,26 +23,38 @@ if TYPE_CHECKING:
     from ..spec.spec import Spec
     from ..trials.trial import Trial, TrialResult
 
+T = TypeVar("T")
+
 
 PARTS = ("measure", "analyse", "draw")
 """What every study offers."""
+OPTIONS = {"check": "check", "NUMBERS": "numbers", "PUBLISHED": "published", "TIMED": "timed"}
+"""What it may offer beside, and the attribute of `Study` that this becomes."""
 
 
-class Study(Protocol):
-    """The functions of a study's module."""
+def accept(spec: Spec) -> None:
+    """Take any spec, as studies do that have no ``check``."""
 
-    def measure(self, trial: Trial) -> TrialResult:
-        """Run one trial; imported by name in worker processes."""
 
-    def analyse(self, results: Results) -> Any:
-        """Turn results into estimates; its attribute `table` holds the `Summary` lines.
+@dataclass(frozen=True)
+class Study:
+    """What a study's module or class offers, see the head of this file."""
 
-        Further attributes are those of `nested_agents.studies.results.analysis.Analysis`, each of
-        which may be missing.
-        """
-
-    def draw(self, analysis: Any) -> Figures:
-        """Return the figures of an analysis by name."""
+    measure: Callable[[Trial], TrialResult]
+    """Runs one trial; imported by name in worker processes."""
+    analyse: Callable[[Results], Any]
+    """Turns results into estimates; its attribute `table` holds the `Summary` lines. Further ones
+    are those of `nested_agents.studies.results.analysis.Analysis`, each of which may be missing."""
+    draw: Callable[[Any], Figures]
+    """Returns the figures of an analysis by name."""
+    check: Callable[[Spec], None] = accept
+    """Raises `SpecError` if the spec has not what the study needs."""
+    numbers: Sequence[str] = ()
+    """Names of the numbers of whole trials that the analysis rests on."""
+    published: Sequence[str] | None = None
+    """Names of the measures of an episode that published results keep; None: all."""
+    timed: bool = True
+    """Whether trials are long enough for their times to say anything."""
 
 
 def load_study(name: str) -> Study:
@@ -54,11 +67,20 @@ def load_study(name: str) -> Study:
     """
     with refused(f"study = {name!r}: "):
         entry = STUDIES.find(name)
-    study = entry() if isinstance(entry, type) else entry
-    missing = [part for part in PARTS if not callable(getattr(study, part, None))]
+    source = entry() if isinstance(entry, type) else entry
+    names = OPTIONS | {part: part for part in PARTS}
+    offered: dict[str, Any] = {
+        own: getattr(source, part) for part, own in names.items() if hasattr(source, part)
+    }
+    missing = [part for part in PARTS if not callable(offered.get(part))]
     if missing:
         raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
-    return cast(Study, study)
+    return Study(**offered)
+
+
+def notes_of(analysis: Any) -> tuple[str, ...]:
+    """Return what an analysis says in words, line by line; one of your own may say nothing."""
+    return tuple(getattr(analysis, "notes", ()))
 
 
 def measure(trial: Trial) -> TrialResult:
@@ -109,7 +131,7 @@ def check_rule_bases(spec: Spec, why: str) -> None:
             )
 
 
-def analysed(name: str, results: Results) -> Any:
+def analyse_as(name: str, results: Results) -> Any:
     """Return what a study makes of results, which may be those of another study.
 
     Raises
@@ -118,39 +140,56 @@ def analysed(name: str, results: Results) -> Any:
         If there is no such study, or trials lack what it rests on; one line.
     """
     study = load_study(name)
-    for needed in getattr(study, "NUMBERS", ()):
+    for needed in study.numbers:
         for condition in results.conditions:
             if needed not in results.numbers(condition):
                 raise SpecError(
                     f"study = {name!r}: needs {needed} of every trial, which those of "
                     f"{condition!r} have not measured"
                 )
-    analysis, same = study.analyse(results), identity_lines(results.identical)
+    analysis = study.analyse(results)
+    same = identity_lines(results.identical)
     if same and isinstance(analysis, Analysis):
         analysis = replace(analysis, notes=(*analysis.notes, *same))
     return analysis
 
 
-def published_part(name: str, results: Results) -> Results:
+def select_published(name: str, results: Results) -> Results:
     """Return what a study's results are published with, see `PUBLISHED` and `TIMED` above."""
     study = load_study(name)
-    wanted = getattr(study, "PUBLISHED", [m.name for m in results.measures])
-    usage = [] if getattr(study, "TIMED", True) else list(results.usage)
-    return replace(
-        results,
-        measures=tuple(m for m in results.measures if m.name in wanted),
-        trials=results.trials.drop(columns=usage),
-    )
+    measures = results.measures
+    if study.published is not None:
+        measures = tuple(m for m in measures if m.name in study.published)
+    trials = results.trials if study.timed else results.trials.drop(columns=list(results.usage))
+    return replace(results, measures=measures, trials=trials)
 
 
-def drawn(study: Study, analysis: Any) -> Figures:
+def distinct(values: Iterable[T]) -> list[T]:
+    """Return values without repetition, in the order in which they first come.
+
+    >>> distinct("banana")
+    ['b', 'a', 'n']
+    """
+    return list(dict.fromkeys(values))
+
+
+def system_of(results: Results, condition: str) -> tuple[str, dict[str, object]]:
+    """Return the name of a condition's override, and what else is swept, by key."""
+    columns = dict(results.columns.get(condition, {}))
+    name = str(columns.pop("name", condition))
+    return name, {key: value for key, value in columns.items() if value != ""}
+
+
+def draw_figures(study: Study, analysis: Any) -> Figures:
     """Return the figures of an analysis by name, as all figures look; none of an empty table."""
-    from ..presentation.figures import styled  # matplotlib takes its time
+    from ..presentation.figures import spell_dollars, styled  # matplotlib takes its time
 
     with styled():
-        return study.draw(analysis) if analysis.table else {}
+        figures = study.draw(analysis) if analysis.table else {}
+        names = [line.condition for line in analysis.table]
+        return {name: spell_dollars(figure, names) for name, figure in figures.items()}
 
 
-def measured(trial: Trial) -> TrialResult:
+def measure_by_name(trial: Trial) -> TrialResult:
     """Run a trial by the study that it names; imported by name in worker processes."""
     return load_study(trial.study).measure(trial)

@@ -26,12 +26,12 @@ from ...core.agents.cost import Problem, below_counts
 from ...core.agents.joint import join_agents
 from ...core.agents.loop import control_loop, policy_seed
 from ...core.agents.team import Team
+from ...core.decision.settings import DecisionSettings
 from ...core.evaluators.best_response import CUTS
 from ...core.evaluators.coordination import MaxPlusSettings
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.agents import Counts
 from ...core.interface.scenario import Scenario
-from ...core.learners.learner import Decision
 from ...core.learners.td import TDLambdaSettings
 from ...core.rules.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
@@ -47,7 +47,7 @@ RULES = MEMBERSHIPS**2
 """|S| of an agent in what is counted and timed."""
 LEARNER = TDLambdaSettings(
     rule_base=RuleBaseSettings(membership="sigmoid", memberships=MEMBERSHIPS, order=2),
-    decision=Decision(rule="value", evaluator="exact"),
+    decision=DecisionSettings(rule="value", evaluator="exact"),
 )
 """The learner that is counted and timed: the paper's, over the two variables of line-up."""
 
@@ -72,8 +72,10 @@ PASSES = ("fitted-q", "hierarchy-ppo")
 """Those of them that are not counted and timed."""
 MOST_OPERATIONS = 4 * 10**8
 """Rule evaluations a step beyond which nothing is measured: about a second a step."""
-LEAST_SECONDS, MOST_TIMES = 0.3, 100
-"""How long each repeat is timed at least, but no more times than that."""
+LEAST_SECONDS = 0.3
+"""How long each repeat is timed at least [s]."""
+MOST_TIMES = 100
+"""How often each repeat is timed at most."""
 LABELLED = re.compile(r"([\w -]+)=(.+)")
 """A topology with a label of one's own."""
 
@@ -115,6 +117,17 @@ class CostRow:
     measured: StepCost | None = None
     network: tuple[int, int] | None = None
     """If asked for, messages of a decision, and how many of them follow one another."""
+
+    @property
+    def by_formula(self) -> dict[str, int | Fraction | None]:
+        """What the formulas give, by name."""
+        return {
+            "nested_exact": self.nested_exact,
+            "nested_closed_form": self.nested_closed_form,
+            "nested_asymptotic": self.nested_asymptotic,
+            "single_agent": self.single_agent,
+            "ratio": self.ratio,
+        }
 
     @property
     def ratio(self) -> Fraction | None:
@@ -228,7 +241,7 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
         return learner, scenario, Hierarchy(scenario.agents, [])
     settings = parse(WAYS.get(text, (text,))[0])
     usual = "variable-elimination" if settings.kind == "coordination-graph" else "exact"
-    decision = Decision(rule="value", evaluator=text if text in WAYS else usual)
+    decision = DecisionSettings(rule="value", evaluator=text if text in WAYS else usual)
     learner = LEARNER.model_copy(update={"decision": decision})
     return learner, line_up, build(settings, line_up.agents, pairs(n))
 

@@ -1,6 +1,6 @@
 """How every figure looks, and how figures are written to files."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
@@ -10,11 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import ArrayLike
 
+from ..results.aggregates import Aggregates
 from ..results.analysis import Difference, Figures
-from ..results.contrasts import Aggregates
 from ..results.statistics import LEVEL, Estimate, stacked
 from ..store.durable import replacing
 
@@ -31,6 +32,8 @@ STYLES = (
 """As many as there are colours, most of which are one grey on paper."""
 MARKERS = "osD^vPX"
 """The same for points."""
+IN_ROW = 0.2
+"""How far the points of one row of a chart stand apart, in rows."""
 SETTINGS: dict[str, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -46,6 +49,15 @@ def styled() -> Iterator[None]:
     """Let figures that are made within look as all do."""
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
         yield
+
+
+def spell_dollars(figure: Figure, names: Iterable[str]) -> Figure:
+    """Let ``$`` be a character in a figure if it is one in names; else it begins a formula."""
+    if any("$" in name for name in names):
+        for text in figure.findobj(Text):
+            if isinstance(text, Text) and "$" in text.get_text():  # ticks of logarithms come later
+                text.set_parse_math(False)
+    return figure
 
 
 def panels(
@@ -107,6 +119,15 @@ def draw_row(
     if np.isfinite(ends).all():
         axes.plot(ends, [row, row], color=color)
     axes.plot(value, row, marker, color=color, **kwargs)
+
+
+def beside(count: int) -> list[float]:
+    """Return where the points of one row stand, in rows from its middle.
+
+    >>> beside(3)
+    [-0.2, 0.0, 0.2]
+    """
+    return [IN_ROW * (index - (count - 1) / 2) for index in range(count)]
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:
@@ -279,9 +300,18 @@ def _forest_legend(figure: Figure, lines: Sequence[Difference]) -> None:
         handle("higher than the reference", color=COLOURS[0], linewidth=1.5),
         handle("lower than the reference", color=COLOURS[1], linewidth=1.5),
     ]
-    seeds = sorted({line.seeds for line in lines})
-    counted = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
-    add_legend(figure, handles, f"means over {counted} seeds, bars: 95 % intervals", ncols=2)
+    seeds = count_seeds(line.seeds for line in lines)
+    add_legend(figure, handles, f"means over {seeds} seeds, bars: 95 % intervals", ncols=2)
+
+
+def count_seeds(counts: Iterable[int]) -> str:
+    """Return in words how many seeds there are, of conditions that may differ in them.
+
+    >>> count_seeds([20, 20]), count_seeds([20, 18, 20])
+    ('20', '18 to 20')
+    """
+    low, *others = sorted(set(counts))
+    return f"{low} to {others[-1]}" if others else f"{low}"
 
 
 def draw_profiles(aggregates: Aggregates) -> Figure:
@@ -300,4 +330,4 @@ def draw_profiles(aggregates: Aggregates) -> Figure:
             own.set(title="interquartile mean, training")
             as_episodes(own)
         name_curves(figure, names)
-    return figure
+    return spell_dollars(figure, names)

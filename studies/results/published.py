@@ -3,28 +3,28 @@
 Rates are kept as one character an episode, steps and other measures in three decimals; returns are
 left out. Claims are always decided by results in this form, so the committed files give the table
 that the run gave.
-
-The other form is the JSON of marl-eval (Gorsane et al. 2022), which BenchMARL and Mava write, too:
-``environment -> task -> algorithm -> run``; a run has ``step_0``, ``step_1``, ..., each with its
-``step_count`` and lists of what was measured there, and ``absolute_metrics``, lists of what the
-trained were measured by. Here a condition is an algorithm, an episode of training a step, and the
-evaluation the absolute metrics. Of a step that lists several values their mean is read.
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import Measure
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
-from ..store.database import RESULTS_VERSION, measures_from, tables
+from ..store.database import RESULTS_VERSION, tables
 from ..store.database import SECONDS as PARTS
+from . import marl_eval
+from .json_values import JsonValue, parse
 from .results import SECONDS, Array, Results, from_arrays
 
+GATHERINGS = get_args(Measure.__annotations__["gathering"])
+"""How the steps of an episode make one number."""
 DECIMALS = 3
 FEW = 100
 """Fewer rows, or values, are always written one by one."""
@@ -74,39 +74,31 @@ class Published(NamedTuple):
 
 
 def loads(text: str) -> Published:
-    """Return what `dumps` has written, or results of the form of marl-eval."""
-    content = json.loads(text)
-    if "results_version" not in content:
-        results = _from_marl_eval(content)
-        outline = StudyOutline.noted(_spec_of_marl_eval(results), results.columns)
+    """Return what `dumps` has written, or results of the form of marl-eval.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        If it is neither; one line names the key, its value and what is allowed.
+    """
+    file = parse(text)
+    if "results_version" not in file.table():
+        results = marl_eval.results_of(file)
+        outline = StudyOutline.noted(marl_eval.spec_of(results), results.columns)
         return Published(outline, results, RESULTS_VERSION)
-    measures = measures_from(content["measures"])
-    rates = {measure.name for measure in measures if measure.is_rate}
+    version = file.child("results_version").whole(1, MOST_VERSION)
+    measures = _measures(file.child("measures"))
+    seeds = {name: _seeds(own) for name, own in file.child("seeds").table().items()}
+    columns = _columns(file.child("columns"), seeds)
+    room = Room()
     phases = {
-        phase: {
-            condition: {
-                name: _unpacked(packed, is_rate=name in rates) for name, packed in arrays.items()
-            }
-            for condition, arrays in by_condition.items()
-        }
-        for phase, by_condition in content["phases"].items()
+        phase: _arrays(by_condition, seeds, measures, room)
+        for phase, by_condition in file.child("phases").table().items()
     }
-    seeds = {
-        condition: tuple(range(seeds) if isinstance(seeds, int) else seeds)
-        for condition, seeds in content["seeds"].items()
-    }
-    numbers, usage = (
-        {
-            c: {SECONDS * (n in parts) + n: _unpacked(v, is_rate=False) for n, v in named.items()}
-            for c, named in content[key].items()
-        }
-        for key, parts in (("numbers", ()), ("usage", PARTS))
-    )
-    columns = content["columns"]
+    numbers = _numbers(file.child("numbers"), seeds, (), room)
+    usage = _numbers(file.child("usage"), seeds, PARTS, room)
     results = from_arrays(phases, seeds, numbers, usage, columns, measures)
-    return Published(
-        StudyOutline.noted(content["spec"], columns), results, int(content["results_version"])
-    )
+    return Published(_outline(file.child("spec"), columns), results, version)
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:
@@ -131,7 +123,7 @@ def load(path: Path) -> Published:
     """
     try:
         return loads(path.read_text(encoding="utf-8"))
-    except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise SpecError(f"{path}: holds no published results: {error}") from None
 
 
@@ -141,7 +133,7 @@ def _counted(seeds: tuple[int, ...]) -> int | list[int]:
     return len(seeds) if many else list(seeds)
 
 
-Packed = list[Any] | dict[str, Any]
+Packed = Sequence[object] | dict[str, object]
 """An array as lists; of many rows, as flags or one value for all, with its shape."""
 
 
@@ -153,15 +145,7 @@ def _packed(values: np.ndarray, *, is_rate: bool) -> Packed:
     return rows if len(rows) < FEW else {"flags": "".join(rows), "shape": list(values.shape)}
 
 
-def _unpacked(packed: Packed, *, is_rate: bool) -> np.ndarray:
-    if not isinstance(packed, dict):
-        return np.array([list(map(int, row)) for row in packed] if is_rate else packed)
-    if is_rate:
-        return np.array(list(map(int, packed["flags"]))).reshape(packed["shape"])
-    return np.full(packed["shape"], packed["all"])
-
-
-def _constant(values: np.ndarray) -> dict[str, Any] | None:
+def _constant(values: np.ndarray) -> Packed | None:
     """Return many equal values as one of them and their shape; None of others."""
     if values.size < FEW or not (values == values.flat[0]).all():
         return None
@@ -180,118 +164,185 @@ def _rounded(results: Results, wanted: Callable[[str], bool]) -> dict[str, dict[
     }
 
 
-STEP, FINAL = "step_", "absolute_metrics"
-KNOWN = ("steps", "return", SUCCESS.name)
-NO_METRICS = ("step_count", "elapsed_time")
+MOST_SEEDS = 100_000
+"""Of a condition; no study has more trials."""
+MOST_EPISODES = 1_000_000
+"""Of a trial; a spec allows no more."""
+MOST_VERSION = 1_000_000
+"""Larger than any version of results will be."""
+MOST_VALUES = 20_000_000
+"""Values of a file that are written as one for all: some characters could fill any memory."""
 
 
-def dumps_marl_eval(results: Results, environments: Mapping[str, str], task: str) -> str:
-    """Return results as JSON text in the form of marl-eval.
+class Room:
+    """How many values may still be made of one that is written for all."""
 
-    Parameters
-    ----------
-    results
-        Of a study.
-    environments
-        The environment of each condition.
-    task
-        What all of them do.
-    """
-    table: dict[str, Any] = {}
-    for condition in results.conditions:
-        runs = table.setdefault(environments[condition], {}).setdefault(task, {})
-        name = condition.replace(",", ";")  # marl-eval refuses commas in names of algorithms
-        runs[name] = dict(_runs(results, condition))
-    return json.dumps(table) + "\n"
+    def __init__(self) -> None:
+        self._left = MOST_VALUES
+
+    def take(self, shape: JsonValue, *most: int) -> tuple[int, ...]:
+        """Return the shape of an array, each side at most so long, and note what it takes."""
+        sides = shape.items()
+        if len(sides) != len(most):
+            raise shape.refusal(f"a list of {len(most)}")
+        lengths = tuple(side.whole(1, m) for side, m in zip(sides, most, strict=True))
+        self._left -= math.prod(lengths)
+        if self._left < 0:
+            raise shape.refusal(f"small: at most {MOST_VALUES} values of a file are one for all")
+        return lengths
 
 
-def _runs(results: Results, condition: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    measured = {
-        phase: {
-            name: results.values(condition, name, phase).astype(float)
-            for name in ("steps", *(measure.name for measure in results.measures), "return")
-            if results.has(condition, phase, name)
+def _outline(spec: JsonValue, columns: Mapping[str, Mapping[str, object]]) -> StudyOutline:
+    """Return the outline of a spec, which is read where a page or a table names it."""
+    spec.child("study").text()
+    _seeds(spec.child("seeds"))
+    for name in ("episodes", "steps", "evaluation"):
+        spec.child(name).whole(0, MOST_EPISODES)
+    own = spec.table()
+    overrides = own["overrides"].items() if "overrides" in own else []
+    for part in (spec, *overrides):
+        if "curriculum" in part.table():
+            for stage in part.child("curriculum").items():
+                stage.child("episodes").whole(0, MOST_EPISODES)
+    return StudyOutline.noted(spec.content, columns)
+
+
+def _seeds(value: JsonValue) -> tuple[int, ...]:
+    if not isinstance(value.content, list):
+        return tuple(range(value.whole(1, MOST_SEEDS)))
+    seeds = tuple(seed.whole(0, 2**63 - 1) for seed in value.items())
+    if not 1 <= len(seeds) <= MOST_SEEDS:
+        raise value.refusal(f"a list of 1 to {MOST_SEEDS} seeds")
+    if len(set(seeds)) < len(seeds):
+        raise value.refusal("a list of distinct seeds")
+    return seeds
+
+
+def _columns(
+    value: JsonValue, conditions: Collection[str]
+) -> dict[str, dict[str, str | float | bool | None]]:
+    """Return what tells the conditions apart, texts and numbers."""
+    columns = {name: row.table() for name, row in value.table().items()}
+    for condition in conditions:
+        value.child(condition)
+    for row in columns.values():
+        for own in row.values():
+            if isinstance(own.content, int | float) and not isinstance(own.content, bool):
+                own.number()
+            elif own.content is not None and not isinstance(own.content, str | bool):
+                raise own.refusal("text, a number, true or false")
+    return {name: {key: own.content for key, own in row.items()} for name, row in columns.items()}
+
+
+def _measures(value: JsonValue) -> tuple[Measure, ...]:
+    measures = tuple(_measure(table) for table in value.items())
+    names = [measure.name for measure in measures]
+    if len({*names, "steps", "return"}) < len(names) + 2:
+        raise value.refusal("of distinct names, none of them steps or return")
+    return measures
+
+
+def _measure(value: JsonValue) -> Measure:
+    table = value.table()
+    known = {field.name for field in fields(Measure)}
+    for name, own in table.items():
+        if name not in known:
+            raise ValueError(f"{own.key}: known: {', '.join(sorted(known))}")
+    for name in ("name", "title", "unit", "source"):
+        if name in table or name in ("name", "title"):
+            value.child(name).text()
+    for name in ("least", "greatest"):
+        if name in table and table[name].content is not None:
+            table[name].number()
+    if "gathering" in table:
+        table["gathering"].text(GATHERINGS)
+    if "better" in table and table["better"].content is not None:
+        table["better"].text(("higher", "lower"))
+    if "is_rate" in table:
+        table["is_rate"].flag()
+    return Measure(**value.content)
+
+
+def _arrays(
+    by_condition: JsonValue,
+    seeds: Mapping[str, tuple[int, ...]],
+    measures: Collection[Measure],
+    room: Room,
+) -> dict[str, dict[str, Array]]:
+    """Return what was measured in a phase, by condition and name."""
+    rates = {measure.name for measure in measures if measure.is_rate}
+    names = {"steps", "return", *(measure.name for measure in measures)}
+    arrays: dict[str, dict[str, Array]] = {}
+    for condition, value in by_condition.table().items():
+        _check_condition(value, condition, seeds)
+        arrays[condition] = {}
+        for name, own in value.table().items():
+            if name not in names:
+                raise ValueError(f"{own.key}: no measure is called so")
+            unpack = _unpack_rates if name in rates else _unpack
+            array = unpack(own, room, len(seeds[condition]), MOST_EPISODES)
+            if name == "steps" and (array.dtype.kind != "i" or array.min() < 0):
+                raise own.refusal("whole numbers, none below 0")
+            arrays[condition][name] = array
+        if len({array.shape for array in arrays[condition].values()}) > 1:
+            raise ValueError(f"{value.key}: must have as many episodes of every measure")
+    return arrays
+
+
+def _numbers(
+    value: JsonValue,
+    seeds: Mapping[str, tuple[int, ...]],
+    parts: Collection[str],
+    room: Room,
+) -> dict[str, dict[str, Array]]:
+    """Return numbers of whole trials by condition and name; those of `parts` are seconds."""
+    numbers: dict[str, dict[str, Array]] = {}
+    for condition, named in value.table().items():
+        _check_condition(named, condition, seeds)
+        numbers[condition] = {
+            f"{SECONDS}{name}" if name in parts else name: _unpack(own, room, len(seeds[condition]))
+            for name, own in named.table().items()
         }
-        for phase in ("training", "evaluation")
-        if results.has(condition, phase)
-    }
-    for i, seed in enumerate(results.seeds(condition)):
-        training = {name: own[i].tolist() for name, own in measured.get("training", {}).items()}
-        steps = np.cumsum(training.get("steps", [])).astype(int).tolist()
-        run: dict[str, Any] = {
-            f"{STEP}{k}": {"step_count": n, **{name: [own[k]] for name, own in training.items()}}
-            for k, n in enumerate(steps)
-        }
-        final = {name: own[i].tolist() for name, own in measured.get("evaluation", {}).items()}
-        yield f"seed_{seed}", run | {FINAL: final}
+    return numbers
 
 
-def _from_marl_eval(table: Mapping[str, Any]) -> Results:
-    """Return the results that a table of JSON holds; columns are ``algorithm`` and ``task``.
-
-    Raises
-    ------
-    ValueError, KeyError, TypeError, AttributeError
-        If it is not of this form.
-    """
-    phases: dict[str, dict[str, dict[str, Array]]] = {"training": {}, "evaluation": {}}
-    seeds, columns = dict[str, tuple[int, ...]](), dict[str, dict[str, str]]()
-    tasks = [
-        (f"{environment}/{task}", algorithm, runs)
-        for environment, by_task in table.items()
-        for task, by_algorithm in by_task.items()
-        for algorithm, runs in by_algorithm.items()
-    ]
-    several = len({task for task, *_ in tasks}) > 1
-    for task, algorithm, runs in tasks:
-        label = f"{algorithm}, {task}" if several else algorithm
-        columns[label] = {"algorithm": algorithm, **({"task": task} if several else {})}
-        seeds[label] = tuple(range(len(runs)))
-        for phase, arrays in _arrays(list(runs.values())).items():
-            phases[phase][label] = arrays
-    names = dict.fromkeys(n for by in phases.values() for own in by.values() for n in own)
-    if not names.keys() - {"steps"}:
-        raise ValueError("no run has measured anything")
-    others = (Measure(n, n, better="higher") for n in names if n not in KNOWN)
-    measures = (*([SUCCESS] if SUCCESS.name in names else []), *others)
-    return from_arrays(phases, seeds, {}, {}, columns, measures)
+def _check_condition(value: JsonValue, name: str, known: Collection[str]) -> None:
+    if name not in known:
+        raise ValueError(f"{value.key}: is no condition that has seeds")
 
 
-def _arrays(runs: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Array]]:
-    """Return what runs measured by phase and name, ``(n_runs, n_episodes)``, steps as differences.
-
-    Of runs that were cut short, what all have; of what one has not measured, nothing.
-    """
-    trained = [
-        [run[f"{STEP}{k}"] for k in range(sum(key.startswith(STEP) for key in run))] for run in runs
-    ]
-    length = min(map(len, trained))
-    training: dict[str, Array] = {}
-    if length:
-        for name in _shared([step for steps in trained for step in steps[:length]]):
-            means = [[np.mean(step[name]) for step in steps[:length]] for steps in trained]
-            training[name] = np.array(means, dtype=float)
-        counts = [[step["step_count"] for step in steps[:length]] for steps in trained]
-        training["steps"] = np.diff(np.array(counts, dtype=float), axis=1, prepend=0.0)
-    finals = [run.get(FINAL, {}) for run in runs]
-    final = {n: [np.ravel(own[n]).astype(float) for own in finals] for n in _shared(finals)}
-    most = min((len(values) for own in final.values() for values in own), default=0)
-    evaluation = {n: np.array([values[:most] for values in own]) for n, own in final.items()}
-    return {"training": training, "evaluation": evaluation if most else {}}
+def _unpack(value: JsonValue, room: Room, n_seeds: int, *most: int) -> Array:
+    """Return numbers that `_packed` wrote, ``(n_seeds, ...)``."""
+    if isinstance(value.content, dict):
+        number = value.child("all").number()
+        array = np.full(room.take(value.child("shape"), n_seeds, *most), number)
+    else:
+        array = value.array(1 + len(most))
+    return _checked(array, value, n_seeds)
 
 
-def _shared(tables: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the metrics that all tables have, in the order of the first."""
-    return [n for n in tables[0] if n not in NO_METRICS and all(n in own for own in tables)]
+def _unpack_rates(value: JsonValue, room: Room, n_seeds: int, most: int) -> Array:
+    """Return zeros and ones that `_packed` wrote, ``(n_seeds, n_episodes)``."""
+    if isinstance(value.content, dict):
+        flags = _bits(value.child("flags"))
+        shape = room.take(value.child("shape"), n_seeds, most)
+        if len(flags) != math.prod(shape):
+            raise value.child("shape").refusal(f"that of {len(flags)} flags")
+        return _checked(flags.reshape(shape), value, n_seeds)
+    rows = [_bits(row) for row in value.items()]
+    if len(set(map(len, rows))) > 1:
+        raise value.refusal("rows of equal length")
+    return _checked(np.array(rows), value, n_seeds)
 
 
-def _spec_of_marl_eval(results: Results) -> dict[str, Any]:
-    """Return the table of a spec as far as results tell of it."""
-    training = [results.values(c, "steps") for c in results.of_phase("training")]
-    return {
-        "study": "learning-curve",
-        "seeds": max(len(results.seeds(c)) for c in results.conditions),
-        "episodes": max((own.shape[1] for own in training), default=0),
-        "steps": int(max((own.max() for own in training), default=0)),
-        "evaluation": int("evaluation" in results.phases),
-    }
+def _bits(value: JsonValue) -> Array:
+    text = value.text()
+    if {*text} - {"0", "1"}:
+        raise value.refusal("text of 0 and 1")
+    return np.array(list(map(int, text)))
+
+
+def _checked(array: Array, value: JsonValue, n_seeds: int) -> Array:
+    if len(array) != n_seeds or array.size == 0:
+        raise value.refusal(f"of {n_seeds} seeds, a row for each")
+    return array

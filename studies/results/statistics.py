@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.numerics import IntArray, special, stats
+from ...core.numerics import special, stats
 
 Array = NDArray[np.float64]
 
@@ -95,15 +95,18 @@ def bootstrap(
         raise ValueError(
             f"bootstrap: values of shape {array.shape}, allowed (n_runs,) or (n_runs, n_points)"
         )
-    n_runs, value = len(array), array.copy().T.mean(axis=-1)
+    n_runs = len(array)
+    value = array.copy().T.mean(axis=-1)
     if n_runs < 2:
         return exactly(value)
     if n_runs < FEW:
         reach = special.stdtrit(n_runs - 1, 0.5 + level / 2.0)
         half = reach * np.sqrt(array.var(axis=0, ddof=1) / n_runs)
-        low, high = value - half, value + half
+        low = value - half
+        high = value + half
     else:
-        drawn, means = _drawn(n_runs, resamples, seed), []
+        drawn = _drawn(n_runs, resamples, seed)
+        means = []
         # Memory holds next to each other what the mean runs along fastest: with several points all
         # resamples of a run, else the runs of a resample.
         axis = 0 if array.size > n_runs else 1
@@ -112,7 +115,8 @@ def bootstrap(
         tail = _tail(level, n_runs)
         low, high = np.quantile(np.concatenate(means), [tail, 1.0 - tail], axis=0)
     least, greatest = bounds
-    low, high = np.clip(low, *bounds), np.clip(high, *bounds)
+    low = np.clip(low, *bounds)
+    high = np.clip(high, *bounds)
     if np.isfinite(greatest - least):  # the interval ends at the bounds, but is no point there
         z = float(special.ndtri(0.5 + level / 2.0))
         reach = (greatest - least) * z**2 / (n_runs + z**2)
@@ -278,7 +282,8 @@ def paired_permutation(
     >>> paired_permutation([1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 5])
     0.03125
     """
-    one, other = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    one = np.asarray(first, dtype=float)
+    other = np.asarray(second, dtype=float)
     if one.ndim != 1 or one.shape != other.shape or not len(one):
         raise ValueError(
             f"paired_permutation: values of shape {one.shape} against {other.shape}, allowed: one "
@@ -286,7 +291,8 @@ def paired_permutation(
         )
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
         raise ValueError("paired_permutation: values must be finite")
-    difference, n = one - other, len(one)
+    difference = one - other
+    n = len(one)
     if difference.sum() < 0.0:
         difference = -difference
     # Whole numbers differ exactly; others are off by rounding, some units in the last place each.
@@ -303,17 +309,30 @@ BITS = 10
 
 
 @lru_cache(maxsize=2)
-def _flips(n: int, permutations: int, seed: int) -> IntArray:
-    """Return patterns of flipped signs, all of them or so many, as numbers ``(n / BITS, m)``."""
-    if 2**n <= permutations:
-        flipped = np.arange(2**n)[:, None] >> np.arange(n) & 1
-    else:
-        flipped = 1 - np.random.default_rng(seed).integers(0, 2, size=(permutations, n))
-    parts = np.split(flipped, range(BITS, n, BITS), axis=1)
-    return np.stack([part @ 2 ** np.arange(part.shape[1]) for part in parts])
+def _flips(n: int, permutations: int, seed: int) -> NDArray[np.uint16]:
+    """Return patterns of flipped signs, all of them or so many, as numbers ``(n / BITS, m)``.
+
+    They are drawn in blocks: all signs at once would take a gigabyte for a thousand seeds.
+    """
+    is_all = 2**n <= permutations
+    m = 2**n if is_all else permutations
+    starts = range(0, n, BITS)
+    numbers = np.empty((len(starts), m), dtype=np.uint16)
+    rng = np.random.default_rng(seed)
+    rows = max(1, AT_ONCE // n)
+    for begin in range(0, m, rows):
+        end = min(begin + rows, m)
+        if is_all:
+            flipped = np.arange(begin, end)[:, None] >> np.arange(n) & 1
+        else:
+            flipped = 1 - rng.integers(0, 2, size=(end - begin, n))
+        for part, start in enumerate(starts):
+            signs = flipped[:, start : start + BITS]
+            numbers[part, begin:end] = signs @ 2 ** np.arange(signs.shape[1])
+    return numbers
 
 
-def _reaching(difference: Array, rounding: Array, flipped: IntArray) -> NDArray[np.bool_]:
+def _reaching(difference: Array, rounding: Array, flipped: NDArray[np.uint16]) -> NDArray[np.bool_]:
     """Return which patterns of flipped signs, see `_flips`, reach the sum of differences, S >= 0.
 
     With the flipped ones summing up to F, the pattern's sum is S - 2 F: its size is S or more if
@@ -325,12 +344,13 @@ def _reaching(difference: Array, rounding: Array, flipped: IntArray) -> NDArray[
     both = np.zeros((2, len(flipped) * BITS))
     both[:, :n] = difference, rounding
     patterns = np.arange(2**BITS)[:, None] >> np.arange(BITS) & 1
-    sums = both.reshape(2, -1, BITS) @ patterns.T
-    (moved, moved_rounding), (left, left_rounding) = (
-        sum(of.take(numbers, axis=1) for of, numbers in zip(sums.swapaxes(0, 1), each, strict=True))
-        for each in (flipped, 2**BITS - 1 - flipped)
-    )
-    return (moved <= moved_rounding) | (left <= left_rounding)
+    sums = (both.reshape(2, -1, BITS) @ patterns.T).swapaxes(0, 1)
+    moved = np.zeros((2, flipped.shape[1]))
+    left = np.zeros_like(moved)
+    for of, numbers in zip(sums, flipped, strict=True):
+        moved += of.take(numbers, axis=1)
+        left += of.take(2**BITS - 1 - numbers, axis=1)
+    return (moved[0] <= moved[1]) | (left[0] <= left[1])
 
 
 def holm(ps: ArrayLike) -> Array:

@@ -1,137 +1,31 @@
-"""The database of a study: connections, tables, checksums, and what is done if it is damaged.
+"""The tables of a study's database, and what is noted in them before anything is run.
 
-It is written through, and errors are one line. SQLite notices a torn page but not a flipped digit.
-Each trial that was run therefore has a checksum of its rows, and what concerns the study as a whole
-has another one, in `meta`. The table `ledger` says how many trials have been run, so that none can
-be gone unnoticed. A damaged database is set aside, and what can be trusted of it taken over.
+SQLite notices a torn page but not a flipped digit. Each trial that was run therefore has a checksum
+of its rows, and what concerns the study as a whole has another one, in `meta`. The table `ledger`
+says how many trials have been run, so that none can be gone unnoticed.
 """
 
 import hashlib
 import json
-import os
-import shutil
 import sqlite3
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import partial
-from itertools import chain, count, groupby
-from operator import itemgetter
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...core.interface.measures import Measure
 from ..errors import SpecError
+from .checksums import study_checksum
 
 DATABASE = "results.sqlite"
 """Name of the file, in the directory of a study."""
 SPEC_FILE = "study.toml"
 """Name of a study's own copy of its spec, beside it."""
 
-CIRCUMSTANCES = (
-    sqlite3.SQLITE_PERM,
-    sqlite3.SQLITE_BUSY,
-    sqlite3.SQLITE_LOCKED,
-    sqlite3.SQLITE_NOMEM,
-    sqlite3.SQLITE_READONLY,
-    sqlite3.SQLITE_FULL,
-    sqlite3.SQLITE_CANTOPEN,
-)
-"""Errors that are no fault of the database; all others are: our statements fit our tables."""
-
-ILL = (UnicodeError, MemoryError, OverflowError)
-"""What Python itself raises when SQLite hands it damaged text or sizes."""
-
 
 class NoStudyError(SpecError):
     """A directory holds no study, or only what a run left that was killed before it noted one."""
 
     reason = None
-
-
-class DamageError(SpecError):
-    """A database holds something else than was written.
-
-    Attributes
-    ----------
-    reason
-        What is wrong with it.
-    """
-
-    def __init__(self, path: Path, reason: str, message: str = "") -> None:
-        usual = f"{path}: is damaged: {reason}; nested-agents run mends it"
-        super().__init__(message or usual)
-        self.reason = reason
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[sqlite3.Connection]:
-    """Connect to write, and make the database if there is none; see `reading`.
-
-    Raises
-    ------
-    DamageError
-        If the database is damaged.
-    SpecError
-        If it cannot be used, or the disk is full.
-    """
-    with _one_line(path), closing(_connect(path, isolation_level=None)) as connection:
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("PRAGMA synchronous = FULL")
-        connection.execute("PRAGMA foreign_keys = ON")
-        yield connection
-
-
-@contextmanager
-def reading(path: Path) -> Iterator[sqlite3.Connection]:
-    """Connect to an existing database to read one state of it, also where nothing can be written.
-
-    Raises
-    ------
-    DamageError
-        If the database is damaged.
-    SpecError
-        If it cannot be read.
-    """
-    # Not mode=ro: such a connection leaves SQLite's -wal and -shm files behind.
-    uri = f"{path.absolute().as_uri()}?mode=rw"
-    with _one_line(path), closing(_connect(uri, uri=True, isolation_level=None)) as connection:
-        try:
-            connection.execute("BEGIN")
-            connection.execute("SELECT 1 FROM sqlite_master").fetchone()
-        except sqlite3.OperationalError:
-            connection.close()
-            with copied(path) as copy:
-                yield copy
-            return
-        except ILL as error:
-            raise DamageError(path, " ".join(str(error).split())) from None
-        connection.execute("PRAGMA query_only = ON")
-        yield connection
-
-
-@contextmanager
-def copied(path: Path) -> Iterator[sqlite3.Connection]:
-    """Connect to a copy of a database, its log included, and leave the original as it is.
-
-    SQLite itself reads no log where it cannot make a file, as on a full disk.
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        for suffix in ("", "-wal"):
-            source = path.with_name(path.name + suffix)
-            if source.exists():
-                shutil.copyfile(source, Path(folder) / source.name)
-        with closing(_connect(Path(folder) / path.name)) as connection:
-            yield connection
-
-
-@contextmanager
-def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """Keep all that is written in the context, or nothing."""
-    connection.execute("BEGIN IMMEDIATE")
-    with connection:  # which commits, or rolls back what SQLite has not when the disk is full
-        yield
 
 
 def insert(connection: sqlite3.Connection, table: str, rows: list[tuple[object, ...]]) -> None:
@@ -144,32 +38,6 @@ def insert(connection: sqlite3.Connection, table: str, rows: list[tuple[object, 
 def quoted(name: str) -> str:
     """Return a name as SQL takes any name."""
     return '"' + name.replace('"', '""') + '"'
-
-
-def _connect(database: Path | str, **options: Any) -> sqlite3.Connection:
-    connection = sqlite3.connect(database, **options)
-    # A flipped bit may make text that is no UTF-8; checksums tell, decoding need not.
-    connection.text_factory = partial(str, encoding="utf-8", errors="replace")
-    return connection
-
-
-@contextmanager
-def _one_line(path: Path) -> Iterator[None]:
-    """Raise errors of a database as one line; it and the files beside it must be files."""
-    for suffix in ("", "-wal", "-shm"):
-        beside = path.with_name(path.name + suffix)
-        if os.path.lexists(beside) and not beside.is_file():
-            raise SpecError(f"{beside}: is no file, and in the way of one; remove it")
-    try:
-        yield
-    except sqlite3.DatabaseError as error:
-        code = getattr(error, "sqlite_errorcode", 0) & 0xFF
-        if code == sqlite3.SQLITE_IOERR:  # all it says when the disk is full at some places
-            free = shutil.disk_usage(path.parent).free
-            raise SpecError(f"{path}: {error}, {free // 1000} kB free on this disk") from None
-        if code in CIRCUMSTANCES:
-            raise SpecError(f"{path}: {error}") from None
-        raise DamageError(path, str(error)) from None
 
 
 RESULTS_VERSION = 4
@@ -305,171 +173,11 @@ def prepare(db: sqlite3.Connection, noted: Noted) -> None:
     ]
     insert(db, "planned", planned)
     db.execute("DELETE FROM meta")
-    meta = {"results_version": RESULTS_VERSION, "measures": tables(noted.measures)}
-    meta |= {k: getattr(noted, k) for k in ("spec", "conditions", "sources", "code")}
+    meta: dict[str, object] = {"results_version": RESULTS_VERSION}
+    meta["measures"] = tables(noted.measures)
+    meta |= {"spec": noted.spec, "conditions": noted.conditions}
+    meta |= {"sources": noted.sources, "code": noted.code}
     insert(db, "meta", [(key, json.dumps(value)) for key, value in meta.items()])
     insert(db, "meta", [("sha256", study_checksum(db))])
     if db.execute("SELECT 1 FROM ledger").fetchone() is None:
         db.execute("INSERT INTO ledger VALUES (0)")
-
-
-def study_checksum(db: sqlite3.Connection) -> str:
-    """Return the SHA-256 of what the database says of the study as a whole."""
-    queries = (
-        "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY name",
-        "SELECT key, value FROM meta WHERE key <> 'sha256' ORDER BY key",
-        "SELECT * FROM conditions ORDER BY condition",
-        "SELECT * FROM planned ORDER BY position",
-    )
-    return _sha256([db.execute(query).fetchall() for query in queries])
-
-
-def trial_checksums(
-    db: sqlite3.Connection, identity: str | None = None
-) -> Iterator[tuple[str, str]]:
-    """Yield the SHA-256 of all rows of each trial, or of one alone, after its identity.
-
-    What has rows in any table counts as a trial. Tables are read from end to end, as asking for
-    each of many trials on its own takes longer.
-    """
-    columns = "identity, condition, seed, state, recording_sha256, code, error"
-    trials = _by_identity(db, identity, "trials", columns=columns)
-    # Only what failed has a traceback; that of a finished trial is no part of its checksum.
-    first = {key: [r[:-1] if r[-1] is None else r for r in rows] for key, rows in trials}
-    seconds = {key: list(rows) for key, rows in _by_identity(db, identity, "seconds")}
-    numbers = {key: list(rows) for key, rows in _by_identity(db, identity, "numbers", ", name")}
-    seen: set[str] = set()
-    without: Rows = ((key, ()) for key in first | seconds | numbers if key not in seen)
-    for key, rows in chain(_by_identity(db, identity, "episodes", ", phase, episode"), without):
-        seen.add(key)
-        parts = first.get(key, []), list(rows), seconds.get(key, []), numbers.get(key, [])
-        yield key, _sha256(parts)
-
-
-Rows = Iterator[tuple[str, Iterable[tuple[Any, ...]]]]
-"""The identity of each trial, with its rows of a table."""
-
-
-def _by_identity(
-    db: sqlite3.Connection, identity: str | None, table: str, order: str = "", columns: str = "*"
-) -> Rows:
-    where, values = ("", ()) if identity is None else ("WHERE identity = ?", (identity,))
-    query = f"SELECT {columns} FROM {table} {where} ORDER BY identity{order}"
-    return groupby(db.execute(query, values), itemgetter(0))
-
-
-ENCODER = json.JSONEncoder(check_circular=False, default=repr)
-"""Writes rows as text. A flipped type makes bytes of a text: hence the default."""
-
-
-def _sha256(content: object) -> str:
-    return hashlib.sha256(ENCODER.encode(content).encode()).hexdigest()
-
-
-def is_orphaned(path: Path) -> bool:
-    """Tell whether only the log is left of a database: SQLite would drop it without a word."""
-    files = path.with_name(f"{path.name}-wal"), path
-    log_size, size = (file.stat().st_size if file.exists() else 0 for file in files)
-    return log_size > 0 and size == 0
-
-
-def fault(path: Path, db: sqlite3.Connection) -> str | None:
-    """Return what is wrong with an open database as a whole; None if nothing is.
-
-    Raises
-    ------
-    NoStudyError
-        If it is empty.
-    SpecError
-        If it is of another version, or is no study's.
-    """
-    try:
-        tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master")}
-        if not tables:
-            (pages,) = db.execute("PRAGMA page_count").fetchone()
-            if pages > 1:
-                return "it has no tables"
-            raise NoStudyError(f"{path}: is empty, it holds no study yet")
-        if not tables & {"meta", "trials", *OF_A_TRIAL}:
-            raise SpecError(f"{path}: is a database, but no study; use another directory")
-        (answer,) = db.execute("PRAGMA integrity_check(1)").fetchone()
-        if answer != "ok":
-            return " ".join(str(answer).replace("*** in database main ***", "").split())
-        noted = dict(db.execute("SELECT key, value FROM meta").fetchall())
-        version = str(noted.get("results_version"))
-        # Checksums of another version may be others.
-        if version.isdecimal() and int(version) != RESULTS_VERSION:
-            is_newer = int(version) > RESULTS_VERSION
-            raise SpecError(
-                f"{path}: holds results of version {version}, this is version {RESULTS_VERSION}; "
-                f"{'a newer' if is_newer else 'an older'} nested-agents reads it"
-            )
-        if noted.get("sha256") != study_checksum(db):
-            return "what it says of the study is not what was written"
-        kept = db.execute("SELECT count(*) FROM checksums").fetchall()
-        if db.execute("SELECT trials FROM ledger").fetchall() != kept:
-            return "it does not hold as many trials as were run"
-    except ILL as error:
-        return " ".join(str(error).split()) or type(error).__name__
-    return None
-
-
-def set_aside(path: Path) -> Path:
-    """Give a database, with its log, a name that nothing else has; return it."""
-    names = (path.with_name(f"{path.name}.damaged-{number}") for number in count(1))
-    aside = next(name for name in names if not name.exists())
-    # The database last: if this is interrupted, it is found damaged once more.
-    for suffix in ("-wal", ""):
-        old = path.with_name(path.name + suffix)
-        if old.exists():
-            os.replace(old, aside.with_name(aside.name + suffix))
-    path.with_name(f"{path.name}-shm").unlink(missing_ok=True)
-    return aside
-
-
-def recover(damaged: Path, db: sqlite3.Connection) -> int:
-    """Copy the trials whose rows are what was written; within a transaction.
-
-    Parameters
-    ----------
-    damaged
-        A database that was set aside.
-    db
-        The new one, which has tables but no trials.
-
-    Returns
-    -------
-    int
-        How many trials were copied; none if episodes have other measures now.
-    """
-    identities: dict[str, str] = {}
-    taken_over = 0
-    with copied(damaged) as old:
-        with suppress(sqlite3.Error, *ILL):
-            # A table that it cannot understand is passed over.
-            old.execute("PRAGMA writable_schema = ON")
-            noted_by = old.execute("SELECT identity, sha256 FROM checksums")
-            for identity, noted in noted_by if _columns(old) == _columns(db) else ():
-                identities.setdefault(identity, noted)
-        for identity, noted in identities.items():
-            try:
-                if dict(trial_checksums(old, identity)) != {identity: noted}:
-                    continue
-                query = "SELECT * FROM {} WHERE identity = ?"
-                tables = {
-                    table: old.execute(query.format(table), (identity,)).fetchall()
-                    for table in ("trials", *OF_A_TRIAL)
-                }
-            except (sqlite3.Error, *ILL):
-                continue
-            # The row that an index leads to may be another one.
-            tables["checksums"] = [(identity, noted)]
-            for table, rows in tables.items():
-                insert(db, table, rows)
-            taken_over += 1
-    db.execute("UPDATE ledger SET trials = ?", (taken_over,))
-    return taken_over
-
-
-def _columns(db: sqlite3.Connection) -> list[str]:
-    return [name for _, name, *_ in db.execute("PRAGMA table_info(episodes)")]

@@ -13,45 +13,27 @@ The view `results` is made for other tools::
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import json
-import os
 import sqlite3
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from ...core.interface.measures import Measure
 from ..errors import SpecError
-from . import database, durable
-from .database import DATABASE, DamageError, NoStudyError, Noted, Planned
+from . import database, durable, integrity
+from .checksums import trial_checksums
+from .connection import DamageError, has_log, open_to_read, open_to_write, transaction
+from .database import DATABASE, NoStudyError, Noted, Planned
 from .durable import Recording
 
-NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
+NO_LOG = (
+    "this file system shares no memory (as NFS, Lustre, GPFS), so results are kept with a rollback "
+    "journal; the same results, written more slowly"
+)
+NamesAndRows = tuple[list[str], Iterable[tuple[object, ...]]]
 """The names of columns, and rows of values, which may be read one by one."""
-
-
-@contextmanager
-def locked(directory: Path) -> Iterator[None]:
-    """Keep others from writing to a directory, which is made if it does not exist.
-
-    Raises
-    ------
-    SpecError
-        If it cannot be made or written, or another process is writing to it.
-    """
-    try:
-        for folder in (directory, directory / "recordings"):
-            folder.mkdir(parents=True, exist_ok=True)
-        lock = open(directory / LOCK, "w")  # noqa: SIM115 - held until the context ends
-    except OSError as error:
-        raise SpecError(f"{error.filename}: {error.strerror or error}") from None
-    with lock:
-        _take(lock, directory)
-        yield
 
 
 class Store:
@@ -87,17 +69,18 @@ class Store:
             If it cannot be read for another reason, is of another version, or is no study's.
         """
         path = directory / DATABASE
-        if database.is_orphaned(path):
+        if integrity.is_orphaned(path):
             raise DamageError(
-                path, "its log is there without it",
+                path,
+                "its log is there without it",
                 f"{path}-wal: is the log of a database that is not there any more; nested-agents "
                 "run sets it aside",
-            )  # fmt: skip
+            )
         if not path.exists():
             raise NoStudyError(f"{directory}: holds no study (no {DATABASE})")
-        with database.reading(path) as connection:
-            if (wrong := database.fault(path, connection)) is not None:
-                raise DamageError(path, wrong)
+        with open_to_read(path) as connection:
+            if (fault := integrity.find_fault(path, connection)) is not None:
+                raise DamageError(path, fault)
             yield cls(directory, connection)
 
     def spec(self) -> Mapping[str, Any]:
@@ -157,16 +140,16 @@ class Store:
 
     def _damaged_rows(self) -> dict[str, str]:
         """Return by identity whose rows are not what was written, one line each."""
-        noted = dict(self._db.execute("SELECT identity, sha256 FROM checksums").fetchall())
+        written = dict(self._db.execute("SELECT identity, sha256 FROM checksums").fetchall())
         known = "SELECT identity, condition, seed FROM "
         trials = self._db.execute(f"{known} trials UNION ALL {known} planned")
         names = {identity: f"{condition}, seed {seed}" for identity, condition, seed in trials}
-        actual = dict(database.trial_checksums(self._db))
+        actual = dict(trial_checksums(self._db))
         path = self.directory / DATABASE
         return {
             identity: f"{path}: {names.get(identity, identity)}: rows are damaged"
-            for identity in actual | noted
-            if identity not in actual or noted.get(identity, actual[identity]) != actual[identity]
+            for identity in actual | written
+            if actual.get(identity) != written.get(identity)
         }
 
     def failed(self) -> list[tuple[str, int, str]]:
@@ -204,7 +187,7 @@ class Store:
         swept = [column[0] for column in cursor.description][2:]
         return {row[1]: dict(zip(swept, row[2:], strict=True)) for row in cursor}
 
-    def episodes(self) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
+    def episodes(self) -> tuple[list[str], Iterator[tuple[object, ...]]]:
         """Return the column names and the rows of all phases, by condition, seed and episode.
 
         Rows are read one by one, as long as the study is open: there may be millions.
@@ -212,7 +195,7 @@ class Store:
         cursor = self._db.execute("SELECT * FROM results")
         return [column[0] for column in cursor.description], cursor
 
-    def trials(self) -> tuple[list[str], list[tuple[Any, ...]]]:
+    def trials(self) -> tuple[list[str], list[tuple[object, ...]]]:
         """Return the column names and one row per trial, by condition and seed.
 
         After the swept keys and the seed: its state, its identity, the last line of its traceback
@@ -231,7 +214,8 @@ class Store:
             "ORDER BY position, seed"
         )
         columns = [column[0] for column in cursor.description]
-        identity, error = columns.index("identity"), columns.index("error")
+        identity = columns.index("identity")
+        error = columns.index("error")
         rows = []
         for row in cursor:
             last = (row[error] or "").rstrip().rpartition("\n")[2] or None
@@ -278,17 +262,22 @@ class Store:
             If it cannot be written.
         """
         path = directory / DATABASE
-        aside = database.set_aside(path) if damage is not None else None
-        with database.writing(path) as connection:
+        reason = None if damage is None else f"is damaged: {damage}"
+        if damage is None:
+            reason = integrity.find_superseded(path, {trial.identity for trial in noted.planned})
+        aside = None if reason is None else integrity.set_aside(path)
+        with open_to_write(path) as connection:
             store = cls(directory, connection)
-            with database.transaction(connection):
+            with transaction(connection):
                 database.prepare(connection, noted)
-                recovered = 0 if aside is None else database.recover(aside, connection)
+                recovered = 0 if aside is None else integrity.recover(aside, connection)
             if aside is not None:
                 store.notes.append(
-                    f"{path}: is damaged: {damage}; kept as {aside.name}, "
+                    f"{path}: {reason}; kept as {aside.name}, "
                     f"{recovered} trials taken over, the others run again"
                 )
+            if not has_log(connection):
+                store.notes.append(f"{path}: {NO_LOG}")
             for name, content in files.items():
                 kept = directory / name
                 kept.parent.mkdir(exist_ok=True)
@@ -324,7 +313,7 @@ class Store:
     def save(
         self,
         trial: Planned,
-        episodes: Sequence[tuple[Any, ...]],
+        episodes: Sequence[tuple[object, ...]],
         seconds: Mapping[str, float],
         numbers: Sequence[tuple[str, float, bool]],
         recordings: Mapping[str, Recording],
@@ -375,95 +364,18 @@ class Store:
     def _changing(self, *identities: str) -> Iterator[None]:
         """Change trials in one transaction; then note the checksums of some, and how many are."""
         count = "SELECT count(*) FROM checksums"
-        with database.transaction(self._db):
+        with transaction(self._db):
             (before,) = self._db.execute(count).fetchone()
             yield
             for identity in identities:
-                self._insert("checksums", list(database.trial_checksums(self._db, identity)))
+                self._insert("checksums", list(trial_checksums(self._db, identity)))
             (after,) = self._db.execute(count).fetchone()
             self._db.execute("UPDATE ledger SET trials = trials + ?", (after - before,))
 
-    def _insert(self, table: str, rows: list[tuple[Any, ...]]) -> None:
+    def _insert(self, table: str, rows: list[tuple[object, ...]]) -> None:
         database.insert(self._db, table, rows)
 
     def _note(self, trial: Planned, state: str, error: str | None, digest: str | None) -> None:
         self._db.execute("DELETE FROM trials WHERE identity = ?", (trial.identity,))
         row = (trial.identity, trial.condition, trial.seed, state, error, digest, self._code)
         self._insert("trials", [row])
-
-
-def _take(lock: TextIO, directory: Path) -> None:
-    """Take the lock of a directory; it is not waited for, but for a look at it."""
-    for wait in (0.05, 0.1, 0.0):
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return
-        except OSError:
-            time.sleep(wait)
-    raise SpecError(f"{directory}: another process is writing there")
-
-
-LOCK = ".lock"
-MARK = "running.json"
-
-
-class Running(contextlib.AbstractContextManager["Running"]):
-    """Marks a study as running for as long as its context lasts.
-
-    Parameters
-    ----------
-    directory
-        Of the study, whose lock this process holds.
-    processes
-        How many trials run at a time.
-    """
-
-    def __init__(self, directory: Path, processes: int) -> None:
-        self._path = directory / MARK
-        self._processes = processes
-        self._begun: dict[str, float] = {}
-
-    def __exit__(self, *_: object) -> None:
-        self._begun.clear()
-        self._write()
-
-    def begin(self, identity: str) -> None:
-        """Note that a trial has been handed to a worker."""
-        self._begun[identity] = time.time()
-        self._write()
-
-    def end(self, identity: str) -> None:
-        """Note that a trial has come back."""
-        self._begun.pop(identity, None)
-        self._write()
-
-    def _write(self) -> None:
-        temporary = self._path.with_name(f".{MARK}.new")
-        # Not worth an fsync, nor an error if the disk is full.
-        with contextlib.suppress(OSError):
-            temporary.write_text(json.dumps({"processes": self._processes, "begun": self._begun}))
-            os.replace(temporary, self._path)
-
-
-def look(directory: Path) -> tuple[int, dict[str, float]] | None:
-    """Return what is running in the directory of a study; None if nothing is.
-
-    Returns
-    -------
-    tuple
-        How many trials run at a time, and by identity how long each has been running so far [s].
-    """
-    try:
-        with open(directory / LOCK) as lock:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        return None
-    except BlockingIOError:
-        pass  # somebody writes there
-    except OSError:
-        return None
-    try:
-        mark, now = json.loads((directory / MARK).read_text()), time.time()
-        seconds = {identity: max(now - begun, 0.0) for identity, begun in mark["begun"].items()}
-        return mark["processes"], seconds
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return 1, {}  # begins or ends just now

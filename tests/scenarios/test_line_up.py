@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.interface.measures import measures_of
-from nested_agents.core.interface.scenario import RecordedScenario
+from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
@@ -13,8 +13,10 @@ from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 def test_it_is_a_scenario_like_any_other() -> None:
     scenario = SCENARIOS.model("line-up")(carts=3).build()
     assert isinstance(scenario, LineUp)
-    assert isinstance(scenario, RecordedScenario)
-    assert hasattr(scenario, "with_exact_prediction")
+    assert isinstance(scenario, Scenario)
+    assert scenario.recorded == ("places",)
+    assert scenario.with_exact_prediction() is scenario
+    assert scenario.groups == ((0,), (1,), (2,))
     assert scenario.roles == ("cart",) * 3
     assert [m.heading for m in measures_of(scenario.measures)] == [
         "success", "mean distance [m]", "spread [m]"

@@ -16,14 +16,10 @@ from io import TextIOWrapper
 import made_up
 import matplotlib.pyplot  # noqa: F401
 
+from nested_agents.results import commands
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
-from nested_agents.studies.cli.commands import (  # noqa: F401
-    committed,
-    reading,
-    running,
-    watch,
-)
+from nested_agents.studies.cli.commands import reading, running  # noqa: F401
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import text  # noqa: F401
 from nested_agents.studies.presentation import figures
@@ -73,6 +69,6 @@ if __name__ == "__main__":
         learning_curve.measure = getattr(made_up, task["measure"])
         studies_run.check = lambda spec, **_: made_up.MEASURES
         figures.USUAL = ("svg",)  # nobody looks at them
-        committed.studies_of = lambda paper: ("learning-curve",)
+        commands.studies_of = lambda paper: ("learning-curve",)
     sys.argv = ["nested-agents", *task["arguments"]]
     sys.exit(main())

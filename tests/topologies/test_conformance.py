@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from acting import fuzzy
+from acting import fuzzy, joint_of
 from pydantic import TypeAdapter
 
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.rules.rule_base import RuleBaseSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
@@ -29,7 +29,7 @@ KINDS = [*sorted(TOPOLOGIES.built_in), "pairs.py:pairs"]
 LEARNER = TDLambdaSettings(
     step_size=0.1,
     rule_base=RuleBaseSettings(order=1),
-    decision=Decision(teammates="uniform", evaluator="exact"),
+    decision=DecisionSettings(teammates="uniform", evaluator="exact"),
 )
 
 
@@ -176,7 +176,7 @@ def test_agents_that_are_not_seen_maintain() -> None:
     )
     scenario.reset(0)
     prediction = scenario.predict()
-    joint = team.act(prediction)
+    joint = joint_of(team, scenario, imagined=prediction)
     first, second, third, fourth = prediction.asked  # type: ignore[attr-defined]
     assert (first[:, 2:] == maintain).all()
     assert len(np.unique(first[:, :2], axis=0)) == 16  # all actions of itself and the one below

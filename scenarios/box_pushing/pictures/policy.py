@@ -24,7 +24,7 @@ from ..prediction.prediction import BoxPrediction
 from ..world.boxes import BoxSpec
 from ..world.geometry import surface
 from ..world.settings import RobotSettings
-from ..world.world import place
+from ..world.starts import place
 from .rendering import BOX_COLOUR, curve
 
 AHEAD = 0.6
@@ -124,9 +124,12 @@ class Policy(PolicyMap):
             for move, colour in COLOURS.items()
         ]
         figure.legend(
-            handles=handles, loc="outside lower center", ncols=4, frameon=False,
+            handles=handles,
+            loc="outside lower center",
+            ncols=4,
+            frameon=False,
             title="what a robot at rest, looking at the box, does next; grey discs: the others",
-        )  # fmt: skip
+        )
         return figure
 
 
@@ -193,7 +196,8 @@ def _behind(at: FloatArray, box: BoxSpec, robots: list[RobotSettings], start: st
 
 def _grid(box: BoxSpec, radius: float, others: FloatArray) -> FloatArray:
     """Return poses ``(m, 3)`` around the box, looking at its centre, where there is room."""
-    outline, polygon = box.outline, box.polygon
+    outline = box.outline
+    polygon = box.polygon
     holes = [] if polygon is None else [Polygon(ring) for ring in polygon.interiors]
     line = np.linspace(-1, 1, POINTS) * (box.reach + AROUND)
     points = []
@@ -218,9 +222,16 @@ def _draw(axes: Axes, field: Field, box: BoxSpec, radius: float) -> None:
     for spot in field.others:
         axes.add_patch(Circle((spot[0], spot[1]), radius, fc="#bbbbbb", ec="#777777"))
     axes.quiver(
-        *field.points[:, :2].T, *ways.T, color=colours,
-        angles="xy", scale_units="xy", scale=1.0, width=0.006, headwidth=4, headlength=4.5,
-    )  # fmt: skip
+        *field.points[:, :2].T,
+        *ways.T,
+        color=colours,
+        angles="xy",
+        scale_units="xy",
+        scale=1.0,
+        width=0.006,
+        headwidth=4,
+        headlength=4.5,
+    )
     for move, marker, size, here in (
         ("turns", r"$\circlearrowleft$", 7, field.turns > 0),
         ("turns", r"$\circlearrowright$", 7, field.turns < 0),

@@ -26,7 +26,7 @@ import zlib
 from collections.abc import Mapping
 from math import pi
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -42,20 +42,25 @@ from ..world.geometry import infrared_readings
 from ..world.robots import robot_for, sensor_directions
 from ..world.settings import InfraredSettings, RobotSettings
 
-Recording = Mapping[str, Any]
+Recording = Mapping[str, FloatArray]
 
 SIDES = (800, 480)
 """Width and height of a picture in pixels: multiples of 16, as video codecs want them."""
 AXES = (0.09, 0.11, 0.89, 0.81)
 """Left, bottom, width and height of the axes as fractions of the picture."""
-LEAST_RADIUS, WHEELS_FROM = 3.5, 6.0
-"""Radius of a robot in pixels, at least, and from which on its wheels are drawn."""
+LEAST_RADIUS = 3.5
+"""Radius of a robot in pixels, at least."""
+WHEELS_FROM = 6.0
+"""Radius of a robot in pixels from which on its wheels are drawn."""
 MARGIN = 0.04
 """Around what is drawn, as a fraction of it."""
 # Colour-blind-safe (Okabe and Ito 2008).
 ROBOT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
-BOX_COLOUR, GOAL_COLOUR, FAILED_COLOUR = "#E69F00", "#555555", "#B00020"
-RAY_COLOUR, HIT_COLOUR = "#BBBBBB", "#6A3D9A"
+BOX_COLOUR = "#E69F00"
+GOAL_COLOUR = "#555555"
+FAILED_COLOUR = "#B00020"
+RAY_COLOUR = "#BBBBBB"
+HIT_COLOUR = "#6A3D9A"
 
 
 def _pointer(box: BoxSpec) -> FloatArray:
@@ -79,7 +84,8 @@ class _BoxScene(Scene):
         # One metre is as long both ways: widen what is too narrow for the picture.
         room = np.array([SIDES[0] * AXES[2], SIDES[1] * AXES[3]])
         metres_per_pixel = float(((high - low) / room).max()) * (1 + 2 * MARGIN)
-        half, middle = 0.5 * metres_per_pixel * room, 0.5 * (low + high)
+        half = 0.5 * metres_per_pixel * room
+        middle = 0.5 * (low + high)
         across, along = np.stack([middle - half, middle + half], axis=1)
         self.axes.set(xlim=across, ylim=along, axisbelow=True)
         self.axes.grid(color="#eeeeee")
@@ -95,7 +101,8 @@ class _BoxScene(Scene):
     def _extent(self) -> tuple[FloatArray, FloatArray]:
         """Return the least and the greatest coordinates ``(2,)`` of all that is ever drawn."""
         poses = np.vstack([self.recording["box_pose"], self.recording["goal_pose"]])
-        cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        cos = np.cos(poses[:, 2])
+        sin = np.sin(poses[:, 2])
         turns = np.array([[cos, -sin], [sin, cos]])
         corners = np.einsum("ijt,kj->tki", turns, self.box.rings[0]) + poses[:, None, :2]
         robots = self.recording["robot_poses"][..., :2].reshape(-1, 2)
@@ -139,7 +146,8 @@ class _BoxScene(Scene):
         speeds = self.recording["wheel_speeds"][step, wheels]
         none = np.zeros_like(self.recording["wheel_speeds"])
         failed = self.recording.get("failed", none)[step, wheels]
-        radius, scale = self.radius, min(1.0, self.pixels_of_robot / 20)
+        radius = self.radius
+        scale = min(1.0, self.pixels_of_robot / 20)
         self._trail(poses, step, colour)
         small = self.pixels_of_robot < WHEELS_FROM
         fill = to_rgba(colour, 0.9 if touching or small else 0.4)
@@ -154,7 +162,8 @@ class _BoxScene(Scene):
             return
         nose = [(radius, 0), (0.4 * radius, 0.35 * radius), (0.4 * radius, -0.35 * radius)]
         self._patch(Polygon(nose, fc="white", ec=colour, lw=scale), poses[step])
-        length, width = 0.5 * radius, 0.16 * radius
+        length = 0.5 * radius
+        width = 0.16 * radius
         for wheel, speed, broken in zip(self.robot.wheels, speeds, failed, strict=True):
             corner = (wheel.x - length / 2, wheel.y - width / 2)
             paint = FAILED_COLOUR if broken else "black"
@@ -169,13 +178,22 @@ class _BoxScene(Scene):
                 )
 
     def _rays(self, step: int, infrared: InfraredSettings) -> None:
-        poses, box = self.recording["robot_poses"][step], self.recording["box_pose"][step]
-        outline, radius = self.box.outline, self.robot.radius
+        poses = self.recording["robot_poses"][step]
+        box = self.recording["box_pose"][step]
+        outline = self.box.outline
+        radius = self.robot.radius
         sensors = sensor_directions([self.robot] * len(poses))
         linear = infrared_readings(
-            poses, np.full(len(poses), radius), sensors, box, outline.edges, outline.rounding,
-            infrared.reach, infrared.decay, 1,
-        ).max(axis=0)  # fmt: skip
+            poses,
+            np.full(len(poses), radius),
+            sensors,
+            box,
+            outline.edges,
+            outline.rounding,
+            infrared.reach,
+            infrared.decay,
+            1,
+        ).max(axis=0)
         distances = infrared.reach * (1.0 - linear)
         angles = poses[:, 2:] + sensors
         along = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
@@ -243,15 +261,41 @@ def animate(recording: Recording, path: Path, speed: float = 4.0, *, sensors: bo
 SCRIPT = Path(__file__).with_name("player.js")
 """What draws an episode in a browser."""
 NEEDED = (
-    "robot_poses", "box_pose", "wheel_speeds", "contact", "failed", "goal_pose", "dt", "robot",
+    "robot_poses",
+    "box_pose",
+    "wheel_speeds",
+    "contact",
+    "failed",
+    "goal_pose",
+    "dt",
+    "robot",
     "box",
-)  # fmt: skip
+)
 """What the canvas draws."""
 LEAST_SCALE = 1e-4
 """Positions are kept to a tenth of a millimetre, or coarser where they reach beyond 3 m [m]."""
 
 
-def scene_of(recording: Recording) -> dict[str, Any]:
+class Shapes(TypedDict):
+    """What is drawn, as the canvas takes it; lengths in metres."""
+
+    radius: float
+    """Of a robot."""
+    speed: float
+    """Greatest speed of a wheel [m/s]."""
+    wheels: list[list[float]]
+    """Where the wheels of a robot stand."""
+    agents: list[str]
+    """Names of all wheels."""
+    rings: list[list[list[float]]]
+    """Outline of the box and of its holes; of a disc none."""
+    disc: float
+    """Radius of a box that is a disc, else 0."""
+    reach: float
+    """Distance from the centre within which all of the box lies."""
+
+
+def scene_of(recording: Recording) -> Shapes:
     """Return the shapes of an episode [m] and the names of the wheels.
 
     They are equal for episodes of equal bodies.
@@ -265,7 +309,8 @@ def scene_of(recording: Recording) -> dict[str, Any]:
     if missing:
         raise ValueError(f"the recording holds no {missing[0]}")
     robots = recording["robot_poses"].shape[1]
-    robot, box = robot_for(str(recording["robot"])), box_for(str(recording["box"]), robots)
+    robot = robot_for(str(recording["robot"]))
+    box = box_for(str(recording["box"]), robots)
     return {
         "radius": robot.radius,
         "speed": robot.max_speed,
@@ -277,7 +322,7 @@ def scene_of(recording: Recording) -> dict[str, Any]:
     }
 
 
-def pack(recording: Recording, scene: Mapping[str, Any]) -> dict[str, Any]:
+def pack(recording: Recording, scene: Shapes) -> dict[str, object]:
     """Return an episode packed, with what is needed to unpack it.
 
     Parameters
@@ -287,7 +332,8 @@ def pack(recording: Recording, scene: Mapping[str, Any]) -> dict[str, Any]:
     scene
         The shapes that `scene_of` gives for it.
     """
-    box, robots = recording["box_pose"], recording["robot_poses"]
+    box = recording["box_pose"]
+    robots = recording["robot_poses"]
     poses = np.concatenate([box[:, None], robots], axis=1)
     scale = max(LEAST_SCALE, float(np.abs(poses[..., :2]).max()) / 32767)
     whole = np.empty(poses.shape, dtype=np.int64)

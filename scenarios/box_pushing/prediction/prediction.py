@@ -73,7 +73,7 @@ class Premises:
 
 
 class BoxPrediction(EmbodiedPrediction, Tables):
-    """Predicts from one situation; see `Prediction`.
+    """Predicts from one situation.
 
     Parameters
     ----------
@@ -89,14 +89,17 @@ class BoxPrediction(EmbodiedPrediction, Tables):
     """Whether wheel commands of one twist are taken to lead to the same place."""
 
     def __init__(self, situation: Situation, model: PushModel, premises: Premises) -> None:
-        self.situation, self.model, self.premises = situation, model, premises
+        self.situation = situation
+        self.model = model
+        self.premises = premises
         self.groups = situation.groups
         self._last: tuple[bytes, View] | None = None  # what was asked for last
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:
         """What the wheels may be commanded."""
-        speeds, actions = self.situation.speeds, self.premises.action_set
+        speeds = self.situation.speeds
+        actions = self.premises.action_set
         limits = self.premises.limits[:, None]
         commands = actions.apply(
             speeds[:, None], np.arange(len(actions)), self.premises.increment * limits, limits
@@ -104,17 +107,27 @@ class BoxPrediction(EmbodiedPrediction, Tables):
         return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
 
     def _after(self, choices: IntArray, seconds: float) -> View:
-        now, twists = self.situation, self.wheel_commands.twists
+        now = self.situation
+        twists = self.wheel_commands.twists
         robots, box, gaps = push(now.robots, now.box, twists, choices, seconds, self.model)
-        return self._seen(robots, box, gaps, seconds)
+        return self._view_of(robots, box, gaps, seconds)
 
-    def _seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
+    def _view_of(
+        self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float
+    ) -> View:
         """Return a view of situations that the present one leads to in `seconds`."""
-        now, premises = self.situation, self.premises
+        now = self.situation
+        premises = self.premises
         return View(
-            robots, box, gaps, now.goal, now.box, seconds / premises.hold, premises.outline,
+            robots,
+            box,
+            gaps,
+            now.goal,
+            now.box,
+            seconds / premises.hold,
+            premises.outline,
             self.model.friction_radius,
-        )  # fmt: skip
+        )
 
     def _view_again(self, joint_actions: IntArray) -> tuple[IntArray, View]:
         """Return wheel commands ``(m, M)``, and their view: the last one, if they are the same."""
@@ -142,12 +155,16 @@ class BoxPrediction(EmbodiedPrediction, Tables):
     @cached_property
     def _alone(self) -> list[FloatArray]:
         """Per robot ``(K, 3)``: its pose after every wheel command if it pushed alone."""
-        now, model, commands = self.situation, self.model, self.wheel_commands
+        now = self.situation
+        model = self.model
+        commands = self.wheel_commands
         poses = []
         for r, count in enumerate(commands.counts):
-            only, every = slice(r, r + 1), np.arange(count)[:, None]
+            only = slice(r, r + 1)
+            every = np.arange(count)[:, None]
             alone = model._replace(radii=model.radii[only], compliance=model.compliance[only])
-            twists, seconds = commands.twists[only], self.premises.seconds
+            twists = commands.twists[only]
+            seconds = self.premises.seconds
             poses.append(push(now.robots[only], now.box, twists, every, seconds, alone)[0][:, 0])
         return poses
 
@@ -165,11 +182,14 @@ class BoxPrediction(EmbodiedPrediction, Tables):
 
         Own variables are those that occur, each with its row for every robot action.
         """
-        commands, space, goal = self.wheel_commands, self.premises.space, self.situation.goal
+        commands = self.wheel_commands
+        space = self.premises.space
+        goal = self.situation.goal
         r, wheel = divmod(agent, len(self.groups[0]))
         if space.own_needs_pose:
             speeds = commands.speeds[r, : commands.counts[r], wheel]
-            own, which = space.own(self._alone[r], speeds, goal), commands.which[r]
+            own = space.own(self._alone[r], speeds, goal)
+            which = commands.which[r]
         else:
             speeds = commands.levels[r, wheel, : commands.n_levels[r, wheel]]
             own = space.own(np.zeros((len(speeds), 3)), speeds, goal)
@@ -181,7 +201,8 @@ class BoxPrediction(EmbodiedPrediction, Tables):
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         choices, view = self._view_again(joint_actions)
-        (r, wheel), space = divmod(agent, len(self.groups[0])), self.premises.space
+        r, wheel = divmod(agent, len(self.groups[0]))
+        space = self.premises.space
         speeds = self.wheel_commands.speeds[r, choices[:, r], wheel]
         own = space.own(view.robots[:, r], speeds, self.situation.goal)
         return np.concatenate([own, space.shared_of(view, [r])[0]], axis=1)
@@ -192,7 +213,8 @@ class BoxPrediction(EmbodiedPrediction, Tables):
         ``(n, m, n_own)`` and ``(M, m, d - n_own)``, for joint actions ``(m, n)``.
         """
         choices, view = self._view_again(joint_actions)
-        space, speeds = self.premises.space, speeds_of(choices, self.wheel_commands.speeds)
+        space = self.premises.space
+        speeds = speeds_of(choices, self.wheel_commands.speeds)
         poses: FloatArray = np.zeros((0, 3))
         if space.own_needs_pose:
             of_robots = view.robots.transpose(1, 0, 2)
@@ -206,7 +228,8 @@ class BoxPrediction(EmbodiedPrediction, Tables):
 
     def after(self, joint_action: IntArray) -> BoxPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
-        view, speeds = self.poses(joint_action[None]), self.commands(joint_action)
+        view = self.poses(joint_action[None])
+        speeds = self.commands(joint_action)
         reached = replace(self.situation, robots=view.robots[0], box=view.box[0], speeds=speeds)
         return BoxPrediction(reached, self.model, self.premises)
 
@@ -232,7 +255,8 @@ class BoxPrediction(EmbodiedPrediction, Tables):
         """
         choices = self._choices(joint_action[None])[0]
         twists = self.wheel_commands.twists[np.arange(len(choices)), choices]
-        now, premises = self.situation, self.premises
+        now = self.situation
+        premises = self.premises
         constants = np.ascontiguousarray(constants)
         return outcomes(now.robots, now.box, twists, premises.hold, premises.belief, constants)
 
@@ -246,7 +270,8 @@ class BoxPrediction(EmbodiedPrediction, Tables):
         return self._rewards(view)[row]
 
     def _rewards(self, view: View) -> FloatArray:
-        contact, readings = view.gaps < CONTACT_GAP, self.premises.infrared.reading(view.gaps)
+        contact = view.gaps < CONTACT_GAP
+        readings = self.premises.infrared.reading(view.gaps)
         of_box = view.distance, -view.approach, view.turn
         return reward(self.premises.task, *of_box, contact, readings).mean(axis=1)
 
@@ -262,5 +287,6 @@ def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatA
     # The chord of an arc is shorter than the arc by the sinc of half its angle.
     shorter = np.maximum(np.sinc(0.5 * turn / pi), 2.0 / pi)
     x, y = ((after - before)[:, :2] / shorter[:, None]).T
-    cos, sin = np.cos(heading), np.sin(heading)
+    cos = np.cos(heading)
+    sin = np.sin(heading)
     return np.stack([cos * x + sin * y, cos * y - sin * x, turn], axis=1) / seconds

@@ -116,12 +116,13 @@ class ExactPrediction(BoxPrediction):
         commands = self.wheel_commands.speeds[np.arange(rows.shape[1]), rows]
         played = [self.future.after(each.ravel(), periods) for each in commands]
         poses, gaps = (np.array(part)[which] for part in zip(*played, strict=True))
-        return self._seen(poses[:, 1:], poses[:, 0], gaps, seconds)
+        return self._view_of(poses[:, 1:], poses[:, 0], gaps, seconds)
 
     def after(self, joint_action: IntArray) -> ExactPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
         speeds = self.commands(joint_action)
         future = self.future.onward(speeds)
-        box, robots = future.state.poses[0], future.state.poses[1:]
+        box = future.state.poses[0]
+        robots = future.state.poses[1:]
         reached = replace(self.situation, robots=robots, box=box, speeds=speeds)
         return ExactPrediction(reached, self.model, self.premises, future)

@@ -3,7 +3,7 @@
 Where the robot stands (gap, bearing of the box, side of the box as seen along the course to the
 goal), how far off the others are, where the robots' middle would push the box, how the box is
 turned, how far it has to go and whether it gets there. A further variable is one function here, and
-to be fast in prediction one column of `kernels`.
+to be fast in prediction one row of `relational_lanes`.
 
 A state variable is a function of a `View` and a robot, see
 `nested_agents.scenarios.state_variables`. One of your own is written as the built-in ones are, and
@@ -28,7 +28,7 @@ import numpy as np
 
 from ....core.numerics import FloatArray, njit, wrap
 from ....core.plugins.registry import Registry
-from ...state_variables import StateFunction, StateVariable, fixed, state_variable
+from ...state_variables import Situations, StateFunction, StateVariable, freeze, state_variable
 from ..world.geometry import Outline, surface
 
 CLOSE = 0.02
@@ -44,7 +44,7 @@ ARRIVED = 0.1
 
 
 @dataclass(frozen=True)
-class View:
+class View(Situations):
     """Situations to be described, ``m`` at once."""
 
     robots: FloatArray
@@ -66,7 +66,7 @@ class View:
 
     @property
     def n_situations(self) -> int:
-        """How many situations there are."""
+        """How many poses of the box there are."""
         return len(self.box)
 
     # What all robots share is computed once, and must stay as it is.
@@ -74,7 +74,7 @@ class View:
     @cached_property
     def distance(self) -> FloatArray:
         """Distance ``(m,)`` of the box from the goal [m]."""
-        return fixed(np.hypot(*(self.goal[:2] - self.box[:, :2]).T))
+        return freeze(np.hypot(*(self.goal[:2] - self.box[:, :2]).T))
 
     @cached_property
     def before(self) -> float:
@@ -121,20 +121,23 @@ class View:
         which they push the centre of the box, see `contact_push`.
         """
         inward = self._into_box(self._contact)
-        x, y = np.cos(inward), np.sin(inward)
+        x = np.cos(inward)
+        y = np.sin(inward)
         push = self.box[:, :2] - self._contact
-        depth, lever = push[:, 0] * x + push[:, 1] * y, push[:, 1] * x - push[:, 0] * y
+        depth = push[:, 0] * x + push[:, 1] * y
+        lever = push[:, 1] * x - push[:, 0] * y
         way = self.box[:, :2] - self.origin[:2]
-        along, across = way[:, 0] * x + way[:, 1] * y, way[:, 1] * x - way[:, 0] * y
+        along = way[:, 0] * x + way[:, 1] * y
+        across = way[:, 1] * x - way[:, 0] * y
         drift = np.arctan2(across, np.abs(along) + STILL * self.periods)
         reach = 2.0 * self.friction_radius**2 / np.maximum(self.distance, ARRIVED)
         turn = np.arctan2(lever, np.maximum(depth, reach))
-        return fixed(inward + KEPT * drift + turn)
+        return freeze(inward + KEPT * drift + turn)
 
     @cached_property
     def turn(self) -> FloatArray:
         """Turn ``(m,)`` of the box from the goal pose [rad]."""
-        return fixed(wrap(self.box[:, 2] - self.goal[2]))
+        return freeze(wrap(self.box[:, 2] - self.goal[2]))
 
     def azimuth(self, robot: int) -> FloatArray:
         """Direction ``(m,)`` from a robot to the box [rad]."""
@@ -146,13 +149,14 @@ class View:
         return self._into_box(self.robots[:, robot])
 
     def _into_box(self, points: FloatArray) -> FloatArray:
-        points, boxes = np.ascontiguousarray(points), np.ascontiguousarray(self.box)
+        points = np.ascontiguousarray(points)
+        boxes = np.ascontiguousarray(self.box)
         return _inward(points, boxes, self.outline.edges, self.outline.rounding)
 
 
 def _direction(ways: FloatArray) -> FloatArray:
     """Return the directions ``(m,)`` of ways ``(m, 2)`` [rad], read-only."""
-    return fixed(np.arctan2(ways[:, 1], ways[:, 0]))
+    return freeze(np.arctan2(ways[:, 1], ways[:, 0]))
 
 
 @njit(cache=True)
@@ -179,9 +183,15 @@ def _angle(
     centres: tuple[float, ...], labels: tuple[str, ...] = TURNS, *, common: bool = False
 ) -> Callable[[StateFunction], StateVariable]:
     return state_variable(
-        "rad", -pi, pi, periodic=True, centres=centres, labels=labels, common=common,
+        "rad",
+        -pi,
+        pi,
+        periodic=True,
+        centres=centres,
+        labels=labels,
+        common=common,
         mirrored="opposite",
-    )  # fmt: skip
+    )
 
 
 def _missed(view: View, bearing: FloatArray) -> FloatArray:
@@ -221,27 +231,42 @@ def push_bearing(view: View, robot: int) -> FloatArray:
 
 
 @state_variable(
-    "m", -0.4, 0.4, centres=(-0.3, -0.06, 0.0, 0.06, 0.3),
-    labels=("far right", "right", "none", "left", "far left"), common=True, mirrored="opposite",
-)  # fmt: skip
+    "m",
+    -0.4,
+    0.4,
+    centres=(-0.3, -0.06, 0.0, 0.06, 0.3),
+    labels=("far right", "right", "none", "left", "far left"),
+    common=True,
+    mirrored="opposite",
+)
 def cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
     return _missed(view, push_bearing(view, robot))
 
 
 @state_variable(
-    "m", 0.0, 1.1, centres=(0.0, 0.1, 0.3, 0.6, 1.1),
-    labels=("there", "close", "near", "away", "far"), common=True, mirrored="same",
-)  # fmt: skip
+    "m",
+    0.0,
+    1.1,
+    centres=(0.0, 0.1, 0.3, 0.6, 1.1),
+    labels=("there", "close", "near", "away", "far"),
+    common=True,
+    mirrored="same",
+)
 def box_distance(view: View, robot: int) -> FloatArray:
     """Distance of the box from the goal."""
     return view.distance
 
 
 @state_variable(
-    "m", -0.05, 0.05, centres=(-0.02, -0.005, 0.0, 0.01, 0.03),
-    labels=("receding", "slipping", "none", "slow", "fast"), common=True, mirrored="same",
-)  # fmt: skip
+    "m",
+    -0.05,
+    0.05,
+    centres=(-0.02, -0.005, 0.0, 0.01, 0.03),
+    labels=("receding", "slipping", "none", "slow", "fast"),
+    common=True,
+    mirrored="same",
+)
 def approach(view: View, robot: int) -> FloatArray:
     """By how much the box came nearer per decision period: -Delta D of Conditions 1, 2."""
     return view.approach
@@ -266,9 +291,13 @@ def face_bearing(view: View, robot: int) -> FloatArray:
 
 
 @state_variable(
-    "1", 0.0, 1.0, centres=(0.0, 0.25, 0.5, 0.75, 1.0),
-    labels=("none", "some", "half", "most", "all"), mirrored="same",
-)  # fmt: skip
+    "1",
+    0.0,
+    1.0,
+    centres=(0.0, 0.25, 0.5, 0.75, 1.0),
+    labels=("none", "some", "half", "most", "all"),
+    mirrored="same",
+)
 def others_away(view: View, robot: int) -> FloatArray:
     """How many of the other robots are away from the box, as a share: gaps up to `AWAY` in part.
 
@@ -285,10 +314,14 @@ def contact_push_bearing(view: View, robot: int) -> FloatArray:
 
 
 _wide_error = state_variable(
-    "m", -1.0, 1.0, centres=(-0.8, -0.3, -0.08, 0.0, 0.08, 0.3, 0.8),
+    "m",
+    -1.0,
+    1.0,
+    centres=(-0.8, -0.3, -0.08, 0.0, 0.08, 0.3, 0.8),
     labels=("very far right", "far right", "right", "none", "left", "far left", "very far left"),
-    common=True, mirrored="opposite",
-)  # fmt: skip
+    common=True,
+    mirrored="opposite",
+)
 
 
 @_wide_error

@@ -30,7 +30,7 @@ from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
 from ....core.numerics import FloatArray, nx, quadrature
-from ....core.plugins.settings import closest
+from ....core.plugins.words import closest
 from .geometry import Outline, ring_edges
 from .settings import GRAVITY, BoxSettings
 
@@ -40,8 +40,10 @@ MAX_VERTICES = 8
 """Of a convex piece; b2_maxPolygonVertices."""
 MOST_VERTICES = 1000
 """Of an outline and its holes; a drawing with more is to be simplified."""
-LEAST_EDGE, LARGEST = 1e-6, 100.0
-"""Shortest edge, and greatest distance of a vertex from another one [m]."""
+LEAST_EDGE = 1e-6
+"""Shortest edge [m]."""
+LARGEST = 100.0
+"""Greatest distance of a vertex from another one [m]."""
 STRAIGHT = 1e-9
 """Sine of the angle between edges that counts as straight on."""
 
@@ -65,7 +67,8 @@ def moments(edges: FloatArray) -> Moments:
     Sums over the signed triangles between the origin and each edge; exact but for `radial`, which
     is a 64-point Gauss-Legendre quadrature along each edge.
     """
-    a, b = edges[:, :2], edges[:, 2:]
+    a = edges[:, :2]
+    b = edges[:, 2:]
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     area = cross.sum() / 2
     ends = a + b
@@ -84,7 +87,7 @@ def polygon_edges(polygon: Polygon) -> FloatArray:
     return np.vstack([ring_edges(np.asarray(ring.coords)[:-1]) for ring in rings])
 
 
-def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Polygon:
+def centre(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Polygon:
     """Return a checked polygon, counter-clockwise, with its centre of mass at the origin.
 
     A clockwise outline is turned around with a warning.
@@ -127,14 +130,15 @@ def _check_ring(box: str, vertices: Vertices) -> None:
     edges = np.roll(ring, -1, axis=0) - ring
     short = np.flatnonzero(np.hypot(edges[:, 0], edges[:, 1]) < LEAST_EDGE)
     if len(short):
-        first, second = short[0] + 1, (short[0] + 1) % len(ring) + 1
+        first = short[0] + 1
+        second = (short[0] + 1) % len(ring) + 1
         raise ValueError(
             f"{box}: vertices {first} and {second} are at the same place {vertices[short[0]]}, "
             "allowed: each once, the first not again at the end"
         )
 
 
-def _merged(first: FloatArray, second: FloatArray) -> FloatArray | None:
+def _merge(first: FloatArray, second: FloatArray) -> FloatArray | None:
     """Return the union of two convex rings that share an edge, or None unless it is convex."""
     union = shapely.union(Polygon(first), Polygon(second))
     if not isinstance(union, Polygon) or union.interiors:
@@ -146,7 +150,8 @@ def _merged(first: FloatArray, second: FloatArray) -> FloatArray | None:
 
 def _turns(ring: FloatArray) -> FloatArray:
     """Return the sine of the turn at every vertex of a ring ``(n, 2)``."""
-    into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    into = ring - np.roll(ring, 1, axis=0)
+    out = np.roll(ring, -1, axis=0) - ring
     cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
     return cross / (np.linalg.norm(into, axis=1) * np.linalg.norm(out, axis=1))
 
@@ -172,7 +177,7 @@ def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
         if not beside.has_edge(i, j):  # one of them has been merged since
             continue
         shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
-        union = _merged(pieces[i], pieces[j]) if len(shared) >= 2 else None
+        union = _merge(pieces[i], pieces[j]) if len(shared) >= 2 else None
         if union is None:
             continue
         pieces[i] = union
@@ -242,7 +247,7 @@ class BoxSpec:
     @cached_property
     def polygon(self) -> Polygon | None:
         """The centred polygon; None for a disc."""
-        return centred(self.name, self.vertices, self.holes) if self.vertices else None
+        return centre(self.name, self.vertices, self.holes) if self.vertices else None
 
     @cached_property
     def rings(self) -> list[FloatArray]:
@@ -268,7 +273,8 @@ class BoxSpec:
     def moments(self) -> Moments:
         """Moments of the area."""
         if self.polygon is None:
-            area, quarter = pi * self.radius**2, pi * self.radius**4 / 4
+            area = pi * self.radius**2
+            quarter = pi * self.radius**4 / 4
             return Moments(area, np.zeros(2), quarter * np.eye(2), area * self.radius * 2 / 3)
         return moments(self.outline.edges)
 
@@ -325,9 +331,12 @@ class BoxSpec:
             tuple((along * x, factor * y) for x, y in ring) for ring in (self.vertices, *self.holes)
         ]
         return replace(
-            self, vertices=outline, holes=tuple(holes), radius=along * self.radius,
+            self,
+            vertices=outline,
+            holes=tuple(holes),
+            radius=along * self.radius,
             mass=factor * self.mass,
-        )  # fmt: skip
+        )
 
 
 def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
@@ -349,7 +358,8 @@ def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
     >>> round(box.area, 12), box.mass
     (0.16, 0.8)
     """
-    described, factor = _described(box), growth(box, robots)
+    described = _spec_of(box)
+    factor = growth(box, robots)
     return described if factor == 1.0 else described.scaled(factor)
 
 
@@ -366,10 +376,10 @@ def growth(box: str | BoxSettings, robots: int) -> float:
     >>> growth("square", 2), growth("square", 8)
     (1.0, 4.0)
     """
-    return max(robots / ROBOTS_PER_BOX, 1.0) if _described(box).grows else 1.0
+    return max(robots / ROBOTS_PER_BOX, 1.0) if _spec_of(box).grows else 1.0
 
 
-def _described(box: str | BoxSettings) -> BoxSpec:
+def _spec_of(box: str | BoxSettings) -> BoxSpec:
     """Return a box as it stands in the table or the spec."""
     if isinstance(box, str) and box.startswith("{"):
         box = BoxSettings.model_validate_json(box)
@@ -381,7 +391,8 @@ def _described(box: str | BoxSettings) -> BoxSpec:
 
 
 def _rectangle(name: str, depth: float, width: float) -> BoxSpec:
-    x, y = depth / 2, width / 2
+    x = depth / 2
+    y = width / 2
     return BoxSpec(name, ((-x, -y), (x, -y), (x, y), (-x, y)))
 
 

@@ -22,7 +22,7 @@ from pydantic import Field, model_validator
 from ....core.hierarchy.failures import Names
 from ....core.numerics import BoolArray, FloatArray
 from ....core.plugins.settings import NonNegative, Positive, Settings, unwritten
-from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
+from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
 
 GRAVITY = 9.81
 """Standard acceleration of free fall [m/s2], rounded."""
@@ -81,7 +81,7 @@ class WheelFailure(FailureSettings):
 if TYPE_CHECKING:
     Failure = WheelFailure
 else:
-    Failure = Annotated[Union[*befalling(WheelFailure, **KINDS).values()], DISCRIMINATOR]
+    Failure = Annotated[Union[*build_kinds(WheelFailure, **KINDS).values()], DISCRIMINATOR]
 """Any failure's settings, distinguished by `kind`."""
 
 
@@ -232,7 +232,8 @@ class Task(NamedTuple):
 
     def reached(self, distance: FloatArray, orientation: FloatArray) -> BoolArray:
         """Return whether the goal is reached ``(m,)``; parameters as of `reward`."""
-        near, most = distance <= self.tolerance, self.orientation_tolerance
+        near = distance <= self.tolerance
+        most = self.orientation_tolerance
         return near if most is None else near & (np.abs(orientation) <= most)
 
 
@@ -272,8 +273,12 @@ def reward(
     """
     settings = task.reward
     at = np.s_[:, None] if settings.of == "team" else np.s_[:, :, None]
-    contact, readings = contact[at], readings[at]  # of robots (m, parties, members)
-    distance, approach, orientation = distance[:, None], approach[:, None], orientation[:, None]
+    # Of robots: (m, parties, members).
+    contact = contact[at]
+    readings = readings[at]
+    distance = distance[:, None]
+    approach = approach[:, None]
+    orientation = orientation[:, None]
     r1 = settings.c1 * np.exp(-settings.r1 * distance)
     r2_r3 = (settings.c2 * np.exp(-settings.r2 * readings)).sum(axis=2)
     r4 = settings.c4 * np.abs(orientation)

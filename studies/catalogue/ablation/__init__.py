@@ -25,15 +25,16 @@ def analyse(results: Results) -> Analysis:
 
 def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
     """Return the analysis with conditions under these names, as many as have been trained."""
-    conditions, phases = results.of_phase("training"), phases_of(results)
-    others, pairs = list(zip(conditions, names, strict=True))[1:], dict[str, list[Pair]]()
-    for title, phase in phases.items() if others else ():
-        base = results.means(conditions[0], phase)
-        pairs[title] = [(name, title, results.means(c, phase), base) for c, name in others]
+    conditions = dict(zip(names, results.of_phase("training"), strict=True))
+    phases = phases_of(results)
+    pairs: dict[str, list[Pair]] = {}
+    for title, phase in phases.items() if len(conditions) > 1 else ():
+        means = {name: results.means(condition, phase) for name, condition in conditions.items()}
+        pairs[title] = [(name, title, own, means[names[0]]) for name, own in means.items()][1:]
     compared, notes = judged(pairs, "".join(names[:1]))
     by_place = {(d.condition, d.measure): d.estimate for ds in compared.values() for d in ds}
     table = []
-    for condition, name in zip(conditions, names, strict=True):
+    for name, condition in conditions.items():
         estimates = {}
         for title, phase in phases.items():
             estimates[title] = rate(results.success(condition, phase))

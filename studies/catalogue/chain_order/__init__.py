@@ -37,7 +37,7 @@ def analyse(results: Results) -> Analysis:
         groups = [group for group in by_order.groups if group.differences]
         notes = (*map(equivalence, groups), *by_order.notes)
         return Analysis(by_order.table, notes, (), {g.setting: g.differences for g in groups})
-    compared = ablation.compared_with_first(results, shortened(conditions))
+    compared = ablation.compared_with_first(results, shorten_orders(conditions))
     tests = order_tests(results)
     notes = (*(test.verdict for test in tests), *compared.notes, *_legend(conditions))
     return replace(compared, notes=notes, cases=tests)
@@ -45,14 +45,15 @@ def analyse(results: Results) -> Analysis:
 
 def equivalence(group: Group) -> str:
     """Return whether the orders of a group are equal but for `MARGIN`, in words."""
-    lows, highs = zip(*((d.estimate.low, d.estimate.high) for d in group.differences), strict=True)
-    low, high = min(lows), max(highs)
+    low = min(float(d.estimate.low) for d in group.differences)
+    high = max(float(d.estimate.high) for d in group.differences)
     if any(d.p < LEVEL for d in group.differences):
         verdict = "the order matters"
     else:
         verdict = "equal" if max(-low, high) <= MARGIN else "not decided"
+    orders = len(group.differences) + 1
     ends = f"{two_figures(low)} to {two_figures(high)}"
-    return f"{group.setting}, {len(lows) + 1} orders, within {MARGIN:g}: {verdict} ({ends})"
+    return f"{group.setting}, {orders} orders, within {MARGIN:g}: {verdict} ({ends})"
 
 
 class OrderTest(NamedTuple):
@@ -83,24 +84,25 @@ class OrderTest(NamedTuple):
 def order_tests(results: Results) -> tuple[OrderTest, ...]:
     """Return the tests of all orders together, one for each measure that all of them have."""
     conditions = results.of_phase("training")
-    made = []
+    tests = []
     for title, phase in phases_of(results).items() if len(conditions) > 1 else ():
         means = [results.means(condition, phase) for condition in conditions]
         values = np.stack(shared(means), axis=1)
         if len(values) >= 2:
-            made.append((title, len(conditions), len(values), friedman(values)))
-    ps = holm([test.p for *_, test in made])
-    return tuple(OrderTest(*own, float(p)) for own, p in zip(made, ps, strict=True))
+            test = friedman(values)
+            tests.append(OrderTest(title, len(conditions), len(values), test, test.p))
+    adjusted = holm([test.p for test in tests])
+    return tuple(test._replace(p=float(p)) for test, p in zip(tests, adjusted, strict=True))
 
 
-def shortened(orders: Sequence[str]) -> list[str]:
+def shorten_orders(orders: Sequence[str]) -> list[str]:
     """Return labels of orders with agents by number, as in the first one that names them.
 
     Examples
     --------
-    >>> shortened(("chain:r1.a,r1.b", "chain:r1.b,r1.a"))
+    >>> shorten_orders(("chain:r1.a,r1.b", "chain:r1.b,r1.a"))
     ['1 2', '2 1']
-    >>> shortened(("chain", "chain:reversed"))
+    >>> shorten_orders(("chain", "chain:reversed"))
     ['chain', 'reversed']
     """
     named = [order.removeprefix("chain:").split(",") for order in orders]

@@ -10,7 +10,6 @@ evaluation is compared with that under the hierarchy of training, as in the stud
 """
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from ...spec.tables import label_but
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..hierarchies import HierarchyCase, analysis_of, estimates
-from ..study import check_evaluated, check_evaluations, check_rule_bases
+from ..study import check_evaluated, check_evaluations, check_rule_bases, distinct
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -60,13 +59,14 @@ def measure(trial: Trial) -> TrialResult:
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
-    cases, sizes = [], Sizes.of(results, results.of_phase("evaluation"))
+    sizes = Sizes.of(results, results.of_phase("evaluation"))
+    cases = []
     for condition, robots in sizes.counts.items():
-        numbers, columns = results.numbers(condition), results.columns.get(condition, {})
-        value_of = label_but(columns, sizes.keys)
+        numbers = results.numbers(condition)
+        value_of = label_but(results.columns.get(condition, {}), sizes.keys)
         for name, phase in ({TRAINED: "evaluation"} | results.other_evaluations(condition)).items():
-            cost = numbers[f"decision.{name}"], numbers[f"messages.{name}"]
-            values = estimates(results, condition, phase, *cost)
+            deciding = numbers[f"decision.{name}"]
+            values = estimates(results, condition, phase, deciding, numbers[f"messages.{name}"])
             cases.append(HierarchyCase(condition, name, value_of, robots, sizes, values, phase))
     return analysis_of(results, cases, TRAINED)
 
@@ -90,18 +90,20 @@ def _draw_parted(analysis: Analysis) -> Figures:
 
     cases = sorted(analysis.cases, key=lambda case: (case.value_of, case.robots))
     by_name = {(case.setting, case.hierarchy): case.values[EVALUATED] for case in cases}
-    settings, sizes = dict.fromkeys(s for s, _ in by_name), len({case.robots for case in cases})
-    most, size = sizes if sizes > 1 else 4, ((1.9, 1.75), (0.9, 0.5))
-    figure, panels = figures.grid(len(settings), most, *size, sharex=True, sharey=True)
+    settings = distinct(case.setting for case in cases)
+    sizes = len({case.robots for case in cases})
+    figure, panels = figures.grid(
+        len(settings), sizes if sizes > 1 else 4, (1.9, 1.75), (0.9, 0.5), sharex=True, sharey=True
+    )
     for axes, setting in zip(panels.flat, settings, strict=False):
         fields = np.array([[by_name[setting, name] for name in row] for row in PARTED], dtype=float)
         axes.imshow(fields[..., 0], "Blues", vmin=0, vmax=1)
         for row, column in np.ndindex(2, 2):
             value, low, high = map(two_figures, fields[row, column])
             colour = "white" if fields[row, column, 0] > 0.5 else "black"
-            look: dict[str, Any] = {"ha": "center", "color": colour}
-            axes.text(column, row, value, va="bottom", fontsize=15, **look)
-            axes.text(column, row + 0.08, f"{low} to {high}", va="top", fontsize=7, **look)
+            write = partial(axes.text, column, ha="center", color=colour)
+            write(row, value, va="bottom", fontsize=15)
+            write(row + 0.08, f"{low} to {high}", va="top", fontsize=7)
         axes.set_title(setting, loc="left")
         axes.set_xticks((0, 1), ("nobody\nconsidered", "those below\nconsidered"))
         axes.set_yticks((0, 1), ("not told", "told"))

@@ -18,7 +18,7 @@ from ...spec.tables import label
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..hierarchies import HierarchyCase, analysis_of
-from ..study import check_evaluated
+from ..study import check_evaluated, distinct
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -47,7 +47,8 @@ def measure(trial: Trial) -> TrialResult:
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
-    sizes, cases = Sizes.of(results, results.of_phase("evaluation")), []
+    sizes = Sizes.of(results, results.of_phase("evaluation"))
+    cases = []
     if not sizes.keys:  # games of several sizes differ in other columns
         sizes = Sizes(dict.fromkeys(sizes.counts, 1))
     for condition, agents in sizes.counts.items():
@@ -56,8 +57,9 @@ def analyse(results: Results) -> Analysis:
         messages = results.numbers(condition)["messages"][0]
         success = rate(results.success(condition, "evaluation"))
         values = {EVALUATED: success, "messages": exactly(messages)}
-        edges, of_game = str(columns.get("name", "")), label(game) if game else ""
-        cases.append(HierarchyCase(condition, edges, of_game, agents, sizes, values))
+        edges = str(columns.get("name", ""))
+        setting = label(game) if game else ""
+        cases.append(HierarchyCase(condition, edges, setting, agents, sizes, values))
     return analysis_of(results, cases, REFERENCE)
 
 
@@ -66,15 +68,16 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures as f  # matplotlib takes its time
 
     cases = analysis.cases
-    games = list(dict.fromkeys(case.setting for case in cases))
-    edges = list(dict.fromkeys(case.hierarchy for case in cases))
+    games = distinct(case.setting for case in cases)
+    edges = distinct(case.hierarchy for case in cases)
     each = 1.7, 0.6 + 0.22 * len(edges)
     figure, panels = f.grid(len(games), COLUMNS, each, (1.2, 0.6), sharex=True, sharey=True)
     for axes, game in zip(panels.flat, games, strict=False):
         axes.set_title(game, loc="left")
         for case in (case for case in cases if case.setting == game):
-            row, success = edges.index(case.hierarchy), case.values[EVALUATED]
-            f.draw_row(axes, row, success, color=f.look(row)["color"], marker=f.marker(row))
+            row = edges.index(case.hierarchy)
+            colour = f.look(row)["color"]
+            f.draw_row(axes, row, case.values[EVALUATED], color=colour, marker=f.marker(row))
         f.as_rates(axes, "x")
         axes.grid(axis="x", alpha=0.25)
     f.name_rows(panels[0, 0], edges)

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from string import ascii_uppercase
 from textwrap import wrap
-from typing import Any
 
 from ....scenarios.matrix_games.plays import whole_episode
 from ...errors import WIDTH
@@ -22,6 +21,7 @@ from ...store.database import EVALUATION
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
+from ..study import distinct, system_of
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -31,8 +31,6 @@ AFTER_ONE = f"{EVALUATION}after one episode"
 """Phase of the evaluation after the first episode of training."""
 COLUMNS = 3
 """Panels of the figure that stand beside each other."""
-APART = 0.2
-"""How far the points of one system stand apart, in rows."""
 
 
 def measure(trial: Trial) -> TrialResult:
@@ -47,25 +45,26 @@ def measure(trial: Trial) -> TrialResult:
 
 def analyse(results: Results) -> Analysis:
     """Estimate; 95 % Wilson intervals, seeds as the unit of sampling."""
-    cases, table = [], []
+    cases = []
+    table = []
     for condition in results.of_phase("evaluation"):
-        columns = results.columns.get(condition, {"name": condition})
-        setting = tuple(str(v) for k, v in columns.items() if k != "name" and v != "")
+        system, swept = system_of(results, condition)
+        setting = tuple(map(str, swept.values()))
         steps = results.values(condition, "steps")
         optimal = {}
         if results.has(condition, AFTER_ONE) and steps.shape[1] > 1:
             optimal[int(steps[0, 0])] = rate(results.success(condition, AFTER_ONE))
         optimal[int(steps[0].sum())] = rate(results.success(condition, "evaluation"))
-        cases.append(Case(str(columns.get("name", condition)), setting, optimal))
-        estimates = {titled(plays): estimate for plays, estimate in optimal.items()}
+        cases.append(Case(system, setting, optimal))
+        estimates = {title_of(plays): estimate for plays, estimate in optimal.items()}
         table.append(Summary(condition, len(steps), estimates))
     return Analysis(tuple(table), tuple(_side_by_side(cases)), cases)
 
 
-def titled(plays: int) -> str:
+def title_of(plays: int) -> str:
     """Return the title of an estimate.
 
-    >>> titled(5000)
+    >>> title_of(5000)
     'optimal, 5,000 plays'
     """
     return f"optimal, {plays:,} plays"
@@ -73,8 +72,8 @@ def titled(plays: int) -> str:
 
 def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
     """Yield the systems as columns, the settings as rows, for each number of plays."""
-    systems = list(dict.fromkeys(case.system for case in cases))
-    settings = list(dict.fromkeys(case.setting for case in cases))
+    systems = distinct(case.system for case in cases)
+    settings = distinct(case.setting for case in cases)
     letters = dict(zip(systems, ascii_uppercase, strict=False))
     if len(letters) < 2 or len(letters) < len(systems):
         return
@@ -82,13 +81,15 @@ def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
     widest = max(len(", ".join(setting)) for setting in settings)
     legend = "; ".join(f"{letter} {system}" for system, letter in letters.items())
     yield from ("", *wrap(legend, WIDTH))
-    for plays in dict.fromkeys(plays for case in cases for plays in case.values):
+    for plays in distinct(plays for case in cases for plays in case.values):
         yield f"\nProbability of the optimal joint action after {plays:,} plays"
         yield " " * widest + "".join(f"{letter:>4}" for letter in letters.values())
         for setting in settings:
-            cells = (by_place.get((setting, system), {}).get(plays) for system in systems)
-            shown = "".join(f"{two_figures(float(e.value)) if e else '-':>4}" for e in cells)
-            yield f"{', '.join(setting):{widest}}{shown}"
+            line = f"{', '.join(setting):{widest}}"
+            for system in systems:
+                estimate = by_place.get((setting, system), {}).get(plays)
+                line += f"{two_figures(float(estimate.value)) if estimate else '-':>4}"
+            yield line
 
 
 def draw(analysis: Analysis) -> Figures:
@@ -101,16 +102,16 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures as f  # matplotlib takes its time
 
     cases = analysis.cases
-    systems = list(dict.fromkeys(case.system for case in cases))
-    games = list(dict.fromkeys(case.setting[:1] for case in cases))
-    rests = list(dict.fromkeys(case.setting[1:] for case in cases))
+    systems = distinct(case.system for case in cases)
+    games = distinct(case.setting[:1] for case in cases)
+    rests = distinct(case.setting[1:] for case in cases)
     plays = sorted({count for case in cases for count in case.values})
-    looks: dict[Any, dict[str, str]] = {}
+    looks = {}
     for (i, rest), count in product(enumerate(rests), plays):
         colour = f.look(i)["color"]
         face = colour if count == plays[-1] else "white"
         looks[rest, count] = {"color": colour, "marker": f.marker(i), "markerfacecolor": face}
-    places = {look: APART * (i - (len(looks) - 1) / 2) for i, look in enumerate(looks)}
+    places = dict(zip(looks, f.beside(len(looks)), strict=True))
     each = 2.3, 0.5 + 0.24 * len(systems)
     figure, panels = f.grid(len(games), COLUMNS, each, (1.8, 0.9), sharex=True, sharey=True)
     for axes, game in zip(panels.flat, games, strict=False):

@@ -24,7 +24,7 @@ from ...results.statistics import Array, Estimate, bootstrap, exactly, rate
 from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ..scaling import NUMBERS, measure
-from ..study import check_evaluated
+from ..study import check_evaluated, distinct
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -83,11 +83,13 @@ def analyse(results: Results) -> Analysis:
     decision of the whole team.
     """
     conditions = results.of_phase("evaluation")
-    sizes, cases = Sizes.of(results, conditions), []
+    sizes = Sizes.of(results, conditions)
+    cases = []
     apart = (VALUE_OF, *sizes.keys)
     for condition, robots in sizes.counts.items():
         columns = results.columns.get(condition, {"name": condition})
-        hierarchy, value_of = label_but(columns, apart), str(columns.get(VALUE_OF, ""))
+        hierarchy = label_but(columns, apart)
+        value_of = str(columns.get(VALUE_OF, ""))
         numbers = results.numbers(condition)
         values = estimates(
             results, condition, "evaluation", numbers["decision_median"], numbers["messages"]
@@ -98,7 +100,7 @@ def analyse(results: Results) -> Analysis:
 
 def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str) -> Analysis:
     """Compare cases with those of the reference hierarchy; of the first one if it is missing."""
-    whose = list(dict.fromkeys(case.value_of for case in cases))
+    whose = distinct(case.value_of for case in cases)
     cases = sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of)))
     table = [Summary(c.label, len(results.seeds(c.condition)), c.values) for c in cases]
     if not cases:
@@ -153,15 +155,16 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures  # matplotlib takes its time
 
     cases = analysis.cases
-    hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
-    whose = list(dict.fromkeys(case.value_of for case in cases))
+    hierarchies = distinct(case.hierarchy for case in cases)
+    whose = distinct(case.value_of for case in cases)
     size = (max(5.6, 0.6 + 2.8 * len(whose)), 5.2)
     figure, panels = figures.panels(2, len(whose), size, sharex=True, sharey="row")
     for column, value_of in zip(panels.T, whose, strict=True):
         for index, hierarchy in enumerate(hierarchies):
             own = [c for c in cases if (c.hierarchy, c.value_of) == (hierarchy, value_of)]
             for axes, title in zip(column, (EVALUATED, DECIDING), strict=True):
-                robots, values = [c.robots for c in own], [c.values[title] for c in own]
+                robots = [case.robots for case in own]
+                values = [case.values[title] for case in own]
                 if own:
                     figures.draw_line(axes, robots, values, index, len(hierarchies))
         column[0].set_title(f"value of: {value_of}" if value_of else "", loc="left")

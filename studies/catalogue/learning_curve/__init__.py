@@ -31,10 +31,10 @@ COLUMNS = 2
 def check(spec: Spec) -> None:
     """Raise `SpecError` if something is to fail after the last episode of training."""
     for condition in spec.conditions():
-        for failure in getattr(condition.settings.scenario, "failures", ()):
-            if failure.episode >= spec.episodes:
+        for onset in condition.settings.scenario.onsets:
+            if onset >= spec.episodes:
                 raise SpecError(
-                    f"scenario.failures: one begins in episode {failure.episode}, allowed 0 to "
+                    f"scenario.failures: one begins in episode {onset}, allowed 0 to "
                     f"{spec.episodes - 1} of {spec.episodes} episodes "
                     f"(condition {condition.label!r})"
                 )
@@ -74,7 +74,8 @@ def curves_of(measure: Measure, training: Mapping[str, Array]) -> dict[str, Esti
 
 def analyse(results: Results) -> Analysis:
     """Estimate the table and what the curves need; seeds are the unit of sampling."""
-    conditions, table = results.of_phase("training"), []
+    conditions = results.of_phase("training")
+    table = []
     measures = results.measures or EPISODES[1:]  # foreign ones may have the return alone
     for condition in conditions:
         estimates: dict[str, Estimate] = {}

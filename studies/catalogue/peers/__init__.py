@@ -39,12 +39,15 @@ def stops(episodes: int) -> list[int]:
 def measure(trial: Trial) -> TrialResult:
     """Train, with evaluations on the way; imported by name in workers."""
     session = Session.compiled(trial)
-    done, seconds, usage = 0, 0.0, {}
+    done = 0
+    seconds = 0.0
+    usage = {}
     for count in (*stops(trial.episodes), trial.episodes):
         begin = process_time()
         session.train(count - done, done)
         seconds += process_time() - begin
-        done, usage[f"{CPU}{count}"] = count, seconds
+        done = count
+        usage[f"{CPU}{count}"] = seconds
         if count < trial.episodes:
             with session.team.drawing_apart():
                 session.evaluate(phase=f"{AFTER}{count}")
@@ -67,36 +70,36 @@ class LearningCourse(NamedTuple):
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("evaluation")
-    table, courses = [], []
+    table = []
+    courses = []
     for condition in conditions:
         steps = results.values(condition, "steps").astype(float)
         numbers = results.numbers(condition)
+        episodes = steps.shape[1]
         earlier = {
-            int(phase.removeprefix(AFTER)): results.success(condition, phase)
+            int(phase.removeprefix(AFTER)): rate(results.success(condition, phase))
             for phase in results.phases
             if phase.startswith(AFTER) and results.has(condition, phase)
         }
-        before = dict(sorted(earlier.items()))
-        every = {**before, steps.shape[1]: results.success(condition, "evaluation")}
-        cpu = [numbers.get(f"{CPU}{count}") for count in every]
-        estimates = {f"success, {count}": rate(s) for count, s in before.items()}
+        success = dict(sorted(earlier.items()))
+        estimates = {f"success, {count}": estimate for count, estimate in success.items()}
         estimates |= evaluated(results, condition)
         estimates["decisions"] = bootstrap(steps.sum(axis=1), bounds=NOT_NEGATIVE)
-        if cpu[-1] is not None:
-            estimates["CPU [s]"] = bootstrap(cpu[-1], bounds=NOT_NEGATIVE)
+        if f"{CPU}{episodes}" in numbers:
+            estimates["CPU [s]"] = bootstrap(numbers[f"{CPU}{episodes}"], bounds=NOT_NEGATIVE)
         table.append(Summary(condition, len(steps), estimates))
+        success[episodes] = estimates[EVALUATED]
+        decisions = [steps[:, :count].sum(axis=1).mean() for count in success]
+        seconds = [np.mean(numbers.get(f"{CPU}{count}", np.nan)) for count in success]
         courses.append(
             LearningCourse(
-                condition,
-                np.array([steps[:, :count].sum(axis=1).mean() for count in every]),
-                np.array([np.nan if s is None else float(np.mean(s)) for s in cpu]),
-                stacked([rate(success) for success in every.values()]),
+                condition, np.array(decisions), np.array(seconds), stacked([*success.values()])
             )
         )
     if not courses:
         return Analysis(())
-    success = [results.means(condition, "evaluation") for condition in conditions]
-    pairs = [(c, EVALUATED, own, success[0]) for c, own in zip(conditions, success, strict=True)]
+    means = [results.means(condition, "evaluation") for condition in conditions]
+    pairs = [(c, EVALUATED, own, means[0]) for c, own in zip(conditions, means, strict=True)]
     compared, lines = judged({EVALUATED: pairs[1:]}, conditions[0])
     notes = ("success, N: when evaluated after N episodes of training.", *lines)
     return Analysis(tuple(table), notes, courses, compared)

@@ -14,7 +14,6 @@ it succeeds when evaluated, and after how many decisions; and of a decision of a
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from ...results.statistics import NOT_NEGATIVE, bootstrap
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..study import check_evaluated, check_rule_bases
+from ..study import check_evaluated, check_rule_bases, distinct, system_of
 
 COUNTS = ("messages", "formula", "counted")
 """Numbers of whole trials that the table shows as they are."""
@@ -45,8 +44,6 @@ PANELS = {
 LEAST = {"ms": 0.01, "memory [kB]": 0.01, "counted": 1.0}
 """Where logarithmic axes begin; below, they are linear and hold 0."""
 MOST_TICKS = 5
-APART = 0.2
-"""How far the points of one system stand apart, in rows."""
 
 
 def check(spec: Spec) -> None:
@@ -71,7 +68,7 @@ def measure(trial: Trial) -> TrialResult:
         "formula": float(tried * n_rules),
         "counted": counted / len(session.deciding),
     }
-    period = getattr(trial.settings.scenario, "period", None)
+    period = trial.settings.scenario.period
     if period is not None:
         numbers["period"] = float(period)
     return session.finish(numbers, {"decision_median": float(np.median(session.deciding))})
@@ -79,7 +76,8 @@ def measure(trial: Trial) -> TrialResult:
 
 def analyse(results: Results) -> Analysis:
     """Estimate; 95 % intervals, seeds as the unit of sampling."""
-    table, cases = [], []
+    table = []
+    cases = []
     for condition in results.of_phase("evaluation"):
         numbers = results.numbers(condition)
         steps = results.values(condition, "steps", "evaluation").mean(axis=1)
@@ -90,20 +88,23 @@ def analyse(results: Results) -> Analysis:
         costs |= {"memory [kB]": numbers["memory"]} | {name: numbers[name] for name in COUNTS}
         values = evaluated(results, condition)
         values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
-        columns = results.columns.get(condition, {})
-        cases.append(Case(str(columns.get("name", condition)), _world(columns), values))
+        system, swept = system_of(results, condition)
+        cases.append(Case(system, name_world(swept), values))
         table.append(Summary(condition, len(steps), values))
     return Analysis(tuple(table), NOTES, cases)
 
 
-def _world(columns: Mapping[str, Any]) -> str:
+def name_world(swept: Mapping[str, object]) -> str:
     """Return what a condition differs in beside its system.
 
-    >>> _world({"name": "nested", "scenario.robots": 8, "scenario.start": ""})
-    '8 robots'
+    >>> name_world({"scenario.robots": 8, "scenario.box": "L"})
+    '8 robots, L'
     """
-    swept = {k.rpartition(".")[2]: v for k, v in columns.items() if k != "name" and v != ""}
-    return ", ".join(f"{v} {k}" if isinstance(v, int) else str(v) for k, v in swept.items())
+    words = []
+    for key, value in swept.items():
+        unit = key.rpartition(".")[2]
+        words.append(f"{value} {unit}" if isinstance(value, int) else str(value))
+    return ", ".join(words)
 
 
 def draw(analysis: Analysis) -> Figures:
@@ -116,15 +117,16 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures as f
 
     cases = analysis.cases
-    systems = list(dict.fromkeys(case.system for case in cases))
-    worlds = list(dict.fromkeys(case.setting for case in cases))
+    systems = distinct(case.system for case in cases)
+    worlds = distinct(case.setting for case in cases)
+    places = f.beside(len(worlds))
     size = (2.2 + 2.0 * len(PANELS), 1.1 + 0.26 * len(systems))
     figure, (panels,) = f.panels(1, len(PANELS), size, sharey=True)
     for axes, (name, title) in zip(panels, PANELS.items(), strict=True):
         for case in cases:
             which = worlds.index(case.setting)
             colour = f.look(which)["color"]
-            row = systems.index(case.system) + APART * (which - (len(worlds) - 1) / 2)
+            row = systems.index(case.system) + places[which]
             f.draw_row(axes, row, case.values[name], color=colour, markersize=3)
         axes.set_title(title, loc="left")
         axes.grid(axis="x", alpha=0.25)

@@ -1,8 +1,8 @@
 """The scaling study: how the number of robots bears on success, time, memory and messages.
 
 Conditions differ in the number of robots and in how joint actions are evaluated; those of a spec of
-one's own may differ in anything. Of every trial it keeps, besides the episodes: numbers that are a
-function of it, and what it took, which is not.
+one's own may differ in anything, also in the kind of agents. Of every trial it keeps, besides the
+episodes: numbers that are a function of it, and what it took, which is not.
 
 Messages of a step are counted as Section V has agents talk: every agent passes the action it has
 decided to each agent below it, so there is one message for every edge of the hierarchy's transitive
@@ -21,11 +21,10 @@ from ....core.numerics import FloatArray, pd
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, shared
 from ...results.results import Results, Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
-from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..study import check_rule_bases
+from ..study import distinct
 
 NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median")
 """What of whole trials the analysis rests on."""
@@ -46,11 +45,6 @@ MEMORY = Path("/proc/self/status")
 CLEAR = Path("/proc/self/clear_refs")
 
 
-def check(spec: Spec) -> None:
-    """Raise `SpecError` unless all agents have rule bases."""
-    check_rule_bases(spec, "whose weights and messages it counts")
-
-
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and note what it takes; imported by name in workers."""
     session = Session.compiled(trial)
@@ -69,7 +63,7 @@ def measure(trial: Trial) -> TrialResult:
         "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
         "weight_bytes": float(team.weight_bytes),
     }
-    period = getattr(trial.settings.scenario, "period", None)
+    period = trial.settings.scenario.period
     if period is not None:
         numbers["period_s"] = period
     touching: list[FloatArray] = []
@@ -158,10 +152,14 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
     values["messages"] = exactly(numbers["messages"][0])
     evaluator = label_but(results.columns.get(condition, {}), sizes.keys) or "default"
     return Point(
-        evaluator, sizes.word, sizes.counts[condition], int(numbers["agents"][0]),
+        evaluator,
+        sizes.word,
+        sizes.counts[condition],
+        int(numbers["agents"][0]),
         float(numbers["period_s"][0]) if "period_s" in numbers else None,
-        values, {t: pd.Series(costs[t], results.seeds(condition)) for t in TIMES.values()},
-    )  # fmt: skip
+        values,
+        {title: pd.Series(costs[title], results.seeds(condition)) for title in TIMES.values()},
+    )
 
 
 def _exponent_text(e: Estimate) -> str:
@@ -175,7 +173,7 @@ def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:
     A line through the logarithms is fitted for each seed that ran at all sizes.
     """
     exponents: dict[str, dict[str, Estimate]] = {}
-    for evaluator in dict.fromkeys(p.evaluator for p in points):
+    for evaluator in distinct(p.evaluator for p in points):
         own = [p for p in points if p.evaluator == evaluator]
         sizes = np.log([p.agents for p in own])
         for what, title in TIMES.items():
@@ -196,13 +194,14 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures  # matplotlib takes its time
 
     points = analysis.cases
-    evaluators = list(dict.fromkeys(p.evaluator for p in points))
+    evaluators = distinct(p.evaluator for p in points)
     figure, panels = figures.panels(2, 3, (8.4, 5.2), sharex=True)
     for axes, (name, title, scale) in zip(panels.flat, PANELS, strict=True):
         for index, evaluator in enumerate(evaluators):
             own = [p for p in points if p.evaluator == evaluator and name in p.values]
             if own:
-                robots, values = [p.robots for p in own], [p.values[name] for p in own]
+                robots = [p.robots for p in own]
+                values = [p.values[name] for p in own]
                 figures.draw_line(axes, robots, values, index, len(evaluators))
         axes.set_title(title, loc="left")
         if scale == "log":

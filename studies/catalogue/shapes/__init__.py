@@ -32,12 +32,12 @@ def analyse(results: Results) -> Analysis:
     """
     conditions = results.of_phase("evaluation")
     ratios = [(condition, ratios_of(results, condition)) for condition in conditions]
-    table, notes = [], []
+    table = []
+    notes = []
     for condition, compared in ratios:
         by_box = {d.condition: d.estimate for d in compared}
         own = 1.0 if results.success(condition, "evaluation").any() else np.nan
-        boxes = {TRAINED: "evaluation"} | results.other_evaluations(condition)
-        for box, phase in boxes.items():
+        for box, phase in ({TRAINED: "evaluation"} | results.other_evaluations(condition)).items():
             label = box if len(ratios) == 1 else f"{condition}: {box}"
             success = results.success(condition, phase)
             estimates = {"success": rate(success), "ratio": by_box.get(box, bootstrap([own]))}
@@ -50,7 +50,8 @@ def analyse(results: Results) -> Analysis:
             table.append(Summary(label, len(success), estimates))
         if compared:
             notes.append(f"\n{condition}, ratio to the box of training:")
-            for d, e in ((d, d.estimate) for d in compared):
+            for d in compared:
+                e = d.estimate
                 interval = f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
                 notes.append(f"  {d.condition}: {interval}, p = {d.p:.2g} (adjusted)")
             notes += power_lines([d.sample for d in compared])
@@ -61,11 +62,12 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
     """Return the ratios of a condition, box by box; none if it has not been evaluated."""
     if not results.has(condition, "evaluation"):
         return ()
-    base, pairs = results.success(condition, "evaluation"), []
+    base = results.success(condition, "evaluation")
+    pairs = []
     for box, phase in results.other_evaluations(condition).items():
         outcomes = results.success(condition, phase)
-        means = outcomes.mean(axis=1), base.mean(axis=1)
-        pairs.append((box, "ratio", *means, ratio(outcomes, base)))
+        estimate = ratio(outcomes, base)
+        pairs.append((box, "ratio", outcomes.mean(axis=1), base.mean(axis=1), estimate))
     return adjusted(pairs)
 
 

@@ -28,9 +28,10 @@ from ...results.results import Results
 from ...results.statistics import BLOCK, NOT_NEGATIVE, REGAINED, Array, bootstrap, rate, recovery
 from ...spec.spec import Spec
 from ...spec.tables import label_but
-from ...trials.session import Session, arrange
+from ...trials.arrangement import arrange
+from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..study import check_rule_bases
+from ..study import check_rule_bases, distinct
 
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
@@ -64,7 +65,7 @@ def measure(trial: Trial) -> TrialResult:
     kept = _keeping_weights(session)
     session.train(trial.episodes - onset, onset)
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
-    begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
+    begun = sorted(set(trial.settings.scenario.onsets) - {onset})
     later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
     return session.finish({"onset": float(onset), **later})
 
@@ -171,16 +172,16 @@ def courses_of(results: Results) -> list[Course]:
         enabled = str(columns.get(SWEPT, ""))
         fault = (label_but(columns, [SWEPT]) or "the failure") if enabled else condition
         for phase in (KEPT, "training"):
-            success, steps = (
-                results.values(condition, name).astype(float) for name in ("success", "steps")
-            )
-            if phase == KEPT:
-                success[:, onset:] = results.values(condition, "success", KEPT)
-                steps[:, onset:] = results.values(condition, "steps", KEPT)
-            adapts, seeds = ADAPTS.get((enabled, phase), phase), results.seeds(condition)
-            courses.append(Course(fault, adapts, onset, onsets, success, steps, seeds))
+            values = {}
+            for measured in ("success", "steps"):
+                values[measured] = results.values(condition, measured).astype(float)
+                if phase == KEPT:
+                    values[measured][:, onset:] = results.values(condition, measured, KEPT)
+            adapts = ADAPTS.get((enabled, phase), phase)
+            seeds = results.seeds(condition)
+            courses.append(Course(fault, adapts, onset, onsets, seeds=seeds, **values))
     order = {adapts: i for i, adapts in enumerate(ADAPTS.values())}
-    faults = list(dict.fromkeys(course.fault for course in courses))
+    faults = distinct(course.fault for course in courses)
     return sorted(courses, key=lambda c: (faults.index(c.fault), order.get(c.adapts, 0)))
 
 
@@ -218,8 +219,8 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures as f  # matplotlib takes its time
 
     courses = analysis.cases
-    faults = list(dict.fromkeys(course.fault for course in courses))
-    cases = list(dict.fromkeys(course.adapts for course in courses))
+    faults = distinct(course.fault for course in courses)
+    cases = distinct(course.adapts for course in courses)
     figure, panels = f.grid(
         len(faults), COLUMNS, (2.6, 2.1), (1.0, 1.2), least=5.6, sharex=True, sharey=True
     )
@@ -239,9 +240,8 @@ def draw(analysis: Analysis) -> Figures:
     for axes in list(panels.flat)[max(0, len(faults) - columns) : len(faults)]:
         f.as_episodes(axes)
     handles = [f.handle(case, **f.look(i)) for i, case in enumerate(cases)]
-    seeds = sorted({len(course.success) for course in courses})
-    counted = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
-    title = f"what adapts\nmeans over {counted} seeds and {SMOOTHED} episodes, 95 % bands"
+    seeds = f.count_seeds(len(course.success) for course in courses)
+    title = f"what adapts\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95 % bands"
     f.add_legend(figure, handles, title, ncols=len(cases))
     return {"wheel-failure": figure}
 

@@ -51,16 +51,16 @@ class Rails(Scenario):
     def reset(self, seed: Any, episode: int = 0) -> np.ndarray:
         rng = np.random.default_rng(seed)
         self.speeds, self.places = np.zeros(len(self.agents)), rng.uniform(-5, 5, len(self.agents))
-        return self.states()
+        return self.seen()
 
     def step(self, joint_action: np.ndarray) -> Transition:
         half, limit = np.full(len(self.agents), 0.5), np.full(len(self.agents), self.limit)
         self.speeds = self.action_set.apply(self.speeds, joint_action, half, limit)
         moved = 0.9 * self.speeds + 0.1 * self.speeds.sum()
         self.places = (self.places + moved + 5.0) % 10.0 - 5.0
-        return Transition(self.states(), 0.0, False, False, {})
+        return Transition(self.seen(), 0.0, False, False, {})
 
-    def states(self) -> np.ndarray:
+    def seen(self) -> np.ndarray:
         total = np.full(len(self.agents), self.speeds.sum())
         return np.stack([self.speeds, self.places, total], axis=1)
 
@@ -107,7 +107,7 @@ class Springs(Rails):
     def reset(self, seed: Any, episode: int = 0) -> np.ndarray:
         super().reset(seed)
         self.places *= 0.4
-        return self.states()
+        return self.seen()
 
     def step(self, joint_action: np.ndarray) -> Transition:
         before = self.places
@@ -115,7 +115,7 @@ class Springs(Rails):
         driven = 0.2 * self.speeds
         # The way is driven * (1 + 0.4 * (before + after) / 2).
         self.places = (before + driven * (1.0 + 0.2 * before)) / (1.0 - 0.2 * driven)
-        return Transition(self.states(), 0.0, False, False, {})
+        return Transition(self.seen(), 0.0, False, False, {})
 
 
 def test_what_moves_what_is_taken_from_the_middle_of_the_way() -> None:
@@ -291,7 +291,7 @@ def test_what_it_cannot_regress_is_refused() -> None:
 def test_rewards_are_not_predicted() -> None:
     team = team_of(Rails(), decision={"rule": "reward"})
     with pytest.raises(ValueError, match=r"decision.rule = 'reward': no rewards"):
-        team.check(look(Rails(), Rails().reset(0)))
+        team.check(look(Rails()))
 
 
 def test_states_by_group_are_those_of_all() -> None:

@@ -4,12 +4,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from acting import fuzzy, look
+from acting import fuzzy
 
 from nested_agents.core.adaptation.predictors import Mirror
+from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.experience import Experience
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.rules.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
@@ -63,14 +63,7 @@ def test_left_and_right_wheels_learn_the_same_function_in_the_mirror() -> None:
     agents = scenario.agents
     chain = Hierarchy(agents, list(pairwise(agents)))
     team = Team(settings, scenario, chain, np.random.SeedSequence(0))
-    states = scenario.reset(0)
-    team.begin_episode()
-    for step in range(12):
-        seen = look(scenario, states)
-        decision = team.act(seen)
-        transition = scenario.step(decision.joint_action)
-        team.learn(Experience(seen, decision, transition, last=step == 11))
-        states = transition.states
+    list(control_loop(scenario, team, episodes=1, steps=12, seed=0))
     assert fuzzy(team).learner.theta.shape[0] == 2
     rng = np.random.default_rng(0)
     variables = scenario.state_space.variables

@@ -17,11 +17,11 @@ from nested_agents.core.agents.joint import Granularity, JointPrediction, join_a
 from nested_agents.core.agents.loop import StepRecord, control_loop, policy_seed, world_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.plain import as_prediction
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
 from nested_agents.core.rules.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
@@ -173,7 +173,7 @@ def test_a_team_learns_to_push(line_world) -> None:
         target_averaging_rate=1.0,
         discount=0.9,
         exploration=BurstExploration(rate=0.5, decay=0.7, floor=0.0),
-        decision=Decision(rule="value"),
+        decision=DecisionSettings(rule="value"),
     )
     world = line_world(2, 2)
     hierarchy = Hierarchy(world.agents, list(pairwise(world.agents)))
@@ -186,7 +186,7 @@ def test_a_team_learns_to_push(line_world) -> None:
         return float(np.mean([r.transition.info["distance_m"] < 0.1 for r in test if r.last]))
 
     assert solved(settings, 10) >= 0.9
-    assert solved(FrozenSettings(decision=Decision(rule="random")), 0) <= 0.3
+    assert solved(FrozenSettings(decision=DecisionSettings(rule="random")), 0) <= 0.3
 
 
 @pytest.fixture
@@ -263,11 +263,12 @@ class Bare:
             setattr(self, name, getattr(prediction, name))
 
 
-def capabilities(prediction) -> set[str]:
+def capabilities(prediction, n: int) -> set[str]:
     """What a prediction knows beside next states."""
     tables = prediction.tables()
+    joint = np.zeros((1, n), dtype=int)
     known = {
-        "rewards": prediction.rewards(np.zeros((1, 2), dtype=int)) is not None,
+        "rewards": prediction.rewards(joint) is not None,
         "blocks": tables is not None,
         "reward_table": tables is not None and tables.rewarded,
     }
@@ -289,7 +290,8 @@ def test_predictions_can_do_what_the_scenarios_can(
         scenario = join_agents(line_world(2, 1), agents)
         scenario.reset(0)
         plain = as_prediction(Bare(scenario.scenario.predict(), *names))
-        assert capabilities(JointPrediction(plain, scenario)) == expected
+        found = JointPrediction(plain, scenario)
+        assert capabilities(found, len(scenario.agents)) == expected
 
 
 def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
@@ -354,7 +356,7 @@ def test_both_evaluators_and_a_self_model_work_on_it() -> None:
     weights = []
     for evaluator in ("exact", "sampling"):
         learner = BatchTDSettings(
-            decision=Decision(evaluator=evaluator),  # type: ignore[arg-type]
+            decision=DecisionSettings(evaluator=evaluator),  # type: ignore[arg-type]
             self_model=SelfModelSettings(enabled=True),
         )
         scenario = join_agents(BoxPushing(settings), "body")

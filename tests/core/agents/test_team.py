@@ -16,15 +16,15 @@ from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.plain import as_explorer, as_learner
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
 from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
 from nested_agents.core.hierarchy.failures import AbsentAgents, LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Experience
-from nested_agents.core.interface.scenario import carried_rows
+from nested_agents.core.interface.scenario import Members, carried_rows
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings
-from nested_agents.core.learners.learner import Decision
 from tests.scenarios.test_examples import Tank
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
@@ -383,8 +383,9 @@ def test_weights_are_not_carried_where_they_mean_nothing(
         other.state_space = StateSpace("short", other.state_space.variables[:1])
     if "action_set" in change:
         other.action_set = ActionSet(("go", "stay"), (1.0, 1.0), (1.0, 0.0), 1)
+    former, successor = (Members(w, np.arange(len(w.agents))) for w in (world, other))
     with pytest.raises(ValueError, match=said) as caught:
-        carried_rows(world, other, shared=shared)
+        carried_rows(former, successor, shared=shared)
     assert "\n" not in str(caught.value)
 
 
@@ -512,7 +513,7 @@ class StateActionValues:
 def test_a_learner_that_asks_is_given_what_was_done_where() -> None:
     """So that SARSA is a learner of a hierarchy like any other."""
     scenario = Tank(Tank.Settings(pumps=1))
-    decision = Decision().model_copy(update={"evaluator": StateActionValues.Settings()})
+    decision = DecisionSettings().model_copy(update={"evaluator": StateActionValues.Settings()})
     settings = SarsaSettings(decision=decision, discount=0.8)
     hierarchy = Hierarchy(scenario.agents, [])
     team = Team(settings, scenario, hierarchy, np.random.SeedSequence(0))

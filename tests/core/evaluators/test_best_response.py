@@ -14,7 +14,6 @@ from nested_agents.core.evaluators.enumeration import (
     SamplingSettings,
 )
 from nested_agents.core.evaluators.evaluator import (
-    Aggregation,
     DecisionProblem,
     Deliberation,
     Rule,
@@ -182,7 +181,7 @@ def test_pooled_means_are_means(order: int, membership: str) -> None:
     theta = rng.normal(size=(6, rules.n_rules))
     hierarchy = Hierarchy("abcdef", [])
     problem = DecisionProblem(rules, hierarchy, A, groups, "value", "best-response", 0.9)
-    pooling = Aggregation(problem)
+    pooling = BestResponse(problem)
     expected = np.mean([rules.values(theta[i], states[i]) for i in agents], axis=0)
     pooled, joint_actions = pooling.pooled(list(theta), agents), np.zeros((7, 6), dtype=int)
     found = pooling.mean(pooled, Remembered(states), joint_actions)

@@ -6,7 +6,7 @@ from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.learners.learner import Decision
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.topologies import build, parse
@@ -15,7 +15,7 @@ from nested_agents.topologies import build, parse
 def team_of(evaluator="exact", topology="chain", carts=3):
     scenario = LineUpSettings(carts=carts).build()
     settings = TDLambdaSettings(
-        step_size=0.1, decision=Decision(teammates="conditional", evaluator=evaluator)
+        step_size=0.1, decision=DecisionSettings(teammates="conditional", evaluator=evaluator)
     )
     hierarchy = build(parse(topology), scenario.agents)
     return scenario, Team(settings, scenario, hierarchy, policy_seed(0))

@@ -8,7 +8,7 @@ from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.learners.learner import Decision
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.learners.td import SparseCooperativeSettings
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.topologies import build, parse
@@ -19,7 +19,7 @@ KINDS = ("variable-elimination", "max-plus")
 def team_of(evaluator, topology="coordination-graph", carts=4, **decision):
     scenario = LineUpSettings(carts=carts).build()
     settings = SparseCooperativeSettings(
-        decision=Decision(**{"evaluator": evaluator, **decision}),
+        decision=DecisionSettings(**{"evaluator": evaluator, **decision}),
         exploration={"kind": "burst", "rate": 0.3},
     )
     hierarchy = build(parse(topology), scenario.agents)

@@ -59,7 +59,10 @@ def test_a_role_each_is_the_same_as_weights_of_ones_own(name: str, line_world) -
     world = line_world(carts=N, wheels=1)
     world.roles = ("left", "right", "middle")
     states, rewards = experience()
-    one, other = (learner_of(name, rows_of(world, shared=shared)) for shared in (False, True))
+    one, other = (
+        learner_of(name, rows_of(world, np.arange(len(world.agents)), shared=shared))
+        for shared in (False, True)
+    )
     for learner in (one, other):
         feed(learner, states, rewards)
         feed(learner, states[::-1], rewards)

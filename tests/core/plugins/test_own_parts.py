@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from acting import fuzzy, joint_of
+from acting import fuzzy, joint_of, look
 
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
@@ -116,7 +116,7 @@ def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:
     rewarded = np.zeros_like(fuzzy(team).learner.theta)
     for record in control_loop(world, team, episodes=2, steps=4, seed=3):
         assert record.joint_action.tolist() == [0, 0]  # the least of 0, 0, 0, 1
-        features = fuzzy(team).learner.rules.features(record.transition.states)  # type: ignore[attr-defined]
+        features = fuzzy(team).learner.plain.rules.features(record.transition.states)  # type: ignore[attr-defined]
         rewarded += 0.25 * record.transition.reward * features
     assert fuzzy(team).learner.theta == pytest.approx(rewarded, rel=0, abs=1e-15)
     assert fuzzy(team).explorer.memory.tolist() == [8, 8]
@@ -158,7 +158,7 @@ def test_rewards_that_are_not_predicted_cannot_decide(rule: str, agents, line_wo
     seen.reset(0)
     said = rf"^learner\.decision\.rule = '{rule}': no rewards are predicted, use value$"
     with pytest.raises(ValueError, match=said):
-        team.check(seen.predict())
+        team.check(look(seen))
     with pytest.raises(ValueError, match=said):
         next(control_loop(seen, team, episodes=1, steps=1, seed=0))
 

@@ -10,12 +10,36 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict, Discrete, MultiDiscrete, Text
 from gymnasium.utils import EzPickle
+from made_up_environments import (
+    Ambiguous,
+    Blind,
+    BlindUnsaid,
+    Chosen,
+    KeyedApart,
+    Lacking,
+    Late,
+    Masked,
+    MaskedBeside,
+    MixedEnd,
+    Nameless,
+    OldCart,
+    OldParallel,
+    OldParallelStart,
+    OldStartCart,
+    PaidNothing,
+    PaidTwice,
+    Truncating,
+    UndecidedCart,
+    Uninvited,
+    Unpaid,
+    Unseeing,
+)
 from pettingzoo import ParallelEnv
 
-from nested_agents.core.interface.scenario import can_draw
 from nested_agents.core.learners import check_prediction
 from nested_agents.scenarios.adapters.adapted import from_gymnasium, from_pettingzoo
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings, PettingZooSettings
+from nested_agents.scenarios.adapters.simulators import ONLY, Played
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
@@ -154,7 +178,8 @@ def test_a_limit_of_time_truncates_and_the_return_can_be_the_success() -> None:
         id="CartPole-v1", options={"max_episode_steps": 3}, success={"return": 3.0}
     )
     world = settings.build()
-    assert not hasattr(world, "predict")
+    assert not world.predicts
+    assert world.predict() is None
     world.reset(0)
     steps = [world.step(np.array([k % 2])) for k in range(3)]
     assert [s.truncated for s in steps] == [False, False, True]
@@ -205,7 +230,7 @@ def test_a_spec_of_ten_lines_runs() -> None:
 def test_an_episode_is_drawn_by_playing_it_again(tmp_path: Path) -> None:
     pytest.importorskip("pygame", reason="extra [human]")
     world = GymnasiumSettings(**PENDULUM).build()
-    assert can_draw(world)
+    assert world.draws
     world.reset(4)
     first, seed = world.measure()["joint_action"], world.constants_of_episode()["seed"]
     world.step(np.array([4]))
@@ -221,8 +246,12 @@ class Odd(Carts):
 
     def __init__(self, observed: Any = None, done: Any = None) -> None:
         super().__init__()
+        self.observed = observed
         self.observation_space = observed or self.observation_space
         self.action_space = done or self.action_space
+
+    def _seen(self) -> Any:
+        return self.observed.sample() if self.observed else super()._seen()
 
 
 class Locked(Carts):
@@ -304,6 +333,69 @@ def test_what_cannot_be_adapted_is_refused_in_one_line(make: Any, message: str) 
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("env", "message"),
+    [
+        (Blind, "observations of agent_1: o1 is nan at step 4, allowed: finite numbers"),
+        (BlindUnsaid, "observations of agent_1: o1 is nan at step 4, allowed: finite numbers"),
+        (KeyedApart, "of agent_0 keys are place, time, of agent_1 hour, place, allowed: the same"),
+        (Lacking, "observations of agent_0 at step 2: there is no 'time', which their space has"),
+        (Late, "'agent_1' observes nothing at the start, allowed: environments in which all"),
+        (Uninvited, "'agent_9' at step 1 is none of possible_agents"),
+        (Unseeing, "'agent_1' acts, and observations at step 3 do not have it"),
+        (Unpaid, "'agent_1' acts, and rewards at step 1 do not have it"),
+        (Nameless, "possible_agents is missing or empty: let __init__ set it to a list"),
+        (Ambiguous, "agents 1, 1: their names must differ"),
+        (Masked, "actions of agent_0: observations have action_mask, .* wrap it so that an"),
+        (MaskedBeside, "actions of agent_0: infos have action_mask, .* wrap it so that an"),
+        (PaidTwice, r"reward of agent_0 at step 1 of shape \(2,\), allowed: one number"),
+        (PaidNothing, "reward of agent_0 at step 3 is nan, allowed: a finite number"),
+        (OldParallel, "step returns 4 values: the old interface, .*; allowed: 5, what is obse"),
+        (OldParallelStart, "reset returns no pair of what is observed and infos: the old interf"),
+        (OldCart, "step returns 4 values: the old interface, .*; allowed: 5, what is observed"),
+        (OldStartCart, "reset returns no pair of what is observed and infos: the old interface"),
+        (UndecidedCart, "terminated at step 1 = None, allowed: true or false"),
+        (Chosen, r"observations of agent_0 at step 3: side: \[-1\] is outside of Discrete"),
+        (Truncating, r"observations of agent_0 at the start: .* are no numbers of Box\(-1, 1"),
+    ],
+)
+def test_what_an_environment_does_wrong_is_said_when_it_is_built(env: Any, message: str) -> None:
+    adapt = from_gymnasium if issubclass(env, gymnasium.Env) else from_pettingzoo
+    with pytest.raises(ValueError, match=message) as refused:
+        adapt(env)
+    assert "\n" not in str(refused.value)
+
+
+def test_steps_that_are_played_when_a_world_is_built_change_no_episode() -> None:
+    env = Carts(2, noise=0.1)
+    played = []
+    for _ in range(2):
+        world = from_gymnasium(env)
+        played.append([world.reset(4), *(world.step(np.array([1, 2])).states for _ in range(3))])
+    assert np.array_equal(*played)
+    plain = Carts(2, noise=0.1)
+    plain.reset(seed=int(np.random.SeedSequence(4).generate_state(1)[0]))
+    assert played[0][1][0, :2] == pytest.approx(plain.step(np.array([-0.5, 0.0]))[0][:2])
+
+
+def test_a_mixed_ending_truncates_once_each_has_ended() -> None:
+    world = from_pettingzoo(MixedEnd)
+    world.reset(0)
+    steps = [world.step(np.array([1, 1])) for _ in range(5)]
+    assert [step.truncated for step in steps] == [False] * 4 + [True]
+    assert not any(step.terminated for step in steps)
+
+
+def test_a_termination_may_be_the_success() -> None:
+    world = from_gymnasium(Carts(), success="terminated")
+    world.reset(0)
+    steps = [world.step(np.array([4, 4])) for _ in range(40)]
+    assert [step.info["succeeded"] for step in steps] == [step.terminated for step in steps]
+    assert any(step.terminated for step in steps)
+    world.reset(0)
+    assert world.measure()["succeeded"] is False
+
+
 @pytest.mark.parametrize("path", sorted(WORLDS.glob("*.toml")), ids=lambda path: path.stem)
 def test_specs_of_worlds_of_others(path: Path) -> None:
     spec = Spec.load(path)
@@ -317,7 +409,7 @@ def test_tables_and_discrete_observations() -> None:
     world = from_gymnasium(Odd(table), variables={"x": 0, "y": "goal1", "each": ("goal0", 1)})
     assert [v.name for v in world.state_space.variables] == ["x", "y", "each"]
     observed = {"goal": np.array([0.3, -0.4]), "odds": np.array([0, 1])}
-    states = world.states_of({"": observed})
+    states = world.states_of(Played({ONLY: observed}, {}, False, False, 0))
     assert states == pytest.approx(np.array([[0.3, -0.4, 0.3], [0.3, -0.4, -0.4]]))
     named = Dict({"height": Box(0.0, 1.0, (1,)), "side": Discrete(2)})
     names = [v.name for v in from_gymnasium(Odd(named)).state_space.variables]

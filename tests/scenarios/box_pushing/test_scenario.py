@@ -11,10 +11,9 @@ from acting import fuzzy
 from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.interface.measures import measures_of
-from nested_agents.core.interface.scenario import can_draw
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -87,7 +86,7 @@ def test_a_team_finds_out_that_a_wheel_has_seized() -> None:
     scenario = BoxPushing(BoxPushingSettings(robot="four-wheel", robots=1, failures=[failure]))
     hierarchy = build(parse("chain"), scenario.agents)
     settings = BatchTDSettings(
-        self_model=SelfModelSettings(enabled=True), decision=Decision(rule="random")
+        self_model=SelfModelSettings(enabled=True), decision=DecisionSettings(rule="random")
     )
     team = Team(settings, scenario, hierarchy, policy_seed(0))
     for _ in control_loop(scenario, team, episodes=2, steps=40, seed=0):
@@ -128,7 +127,7 @@ def test_the_role_of_an_agent_is_its_wheel() -> None:
 
 def test_it_can_be_recorded_drawn_and_predicted_exactly(tmp_path: Path) -> None:
     scenario = BoxPushing(BoxPushingSettings(action_repeat=4, belief={"load": 2.0}))
-    assert can_draw(scenario)
+    assert scenario.draws
     exact = scenario.with_exact_prediction().settings
     assert (exact.predictor, exact.prediction_horizon, exact.action_repeat) == ("exact", 4, 4)
     assert BoxPushingSettings.model_validate(exact.model_dump()) == exact

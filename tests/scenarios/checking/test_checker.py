@@ -15,7 +15,7 @@ import pytest
 from nested_agents import View, state_variable
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.interface.prediction import Blocks, Prediction
 from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
@@ -27,11 +27,10 @@ from nested_agents.scenarios.checking.checker import (
     CHECKS,
     ScenarioError,
     check_scenario,
-    faults_of_sensing,
-    predicted_steps,
 )
 from nested_agents.scenarios.checking.frames import Examination
 from nested_agents.scenarios.checking.predictions import faults_of_prediction
+from nested_agents.scenarios.checking.sensing import faults_of_sensing, predicted_steps
 from nested_agents.scenarios.line_up import (
     DISTANCE,
     LEAD,
@@ -138,7 +137,8 @@ def test_predictions_are_held_against_the_time_that_they_look_ahead() -> None:
                 places, speeds = advance(places, speeds, commands)
             return LineUpPrediction(places.T.copy())
 
-        with_exact_prediction = property()
+        def with_exact_prediction(self) -> None:
+            return None
 
     distance, lead, _ = check_scenario(lambda: Ahead(LineUpSettings()), steps=12).variables
     assert max(distance.error, lead.error) < 1e-12 < 0.05 < distance.persistence
@@ -360,7 +360,7 @@ def space(*variables: Variable, **claims: Any) -> Callable[[], Scenario]:
     return declared(state_space=StateSpace("line-up", variables or (DISTANCE, LEAD), **claims))
 
 
-class Plain:
+class Plain(Prediction):
     """The states of a line-up's prediction, and nothing else."""
 
     def __init__(self, scenario: Any, change: Callable[..., Any] | None = None) -> None:
@@ -374,7 +374,7 @@ class Plain:
 
 def inexact(change: Callable[..., Any] | None = None, **changes: Any) -> Callable[[], Scenario]:
     """Return a factory of line-ups that cannot predict exactly, their predictions changed."""
-    changes = {"with_exact_prediction": property(), "n_own": 1, "common": ()} | changes
+    changes = {"with_exact_prediction": lambda self: None, "n_own": 1, "common": ()} | changes
     own, common = changes.pop("n_own"), changes.pop("common")
 
     def changed(self: Any, *args: Any) -> None:
@@ -702,6 +702,10 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
         "predictions: states_by_group and states differ in distance of agent 0",
     ),
     "hidden state": (perceiving(stale), "equal seeds: .*seed 0 .*differ"),
+    "plain prediction": (
+        line(predict=lambda self: BarePrediction(self._states())),
+        "form: predict returns BarePrediction, must inherit Prediction, as its",
+    ),
     "no scenario": (lambda: object(), "form: object lacks agents, .*step"),  # type: ignore[dict-item,return-value]
 }
 
@@ -719,7 +723,7 @@ WARNED: dict[str, tuple[Callable[[], Scenario], str]] = {
         "distance goes more than 10 times its range beyond it",
     ),
     "rewards of something else": (
-        predicting(rewards=far_reward, blocks=property()),
+        predicting(rewards=far_reward, tables=lambda self: None),
         "reward is predicted no better than",
     ),
 }
@@ -767,7 +771,7 @@ BLIND: dict[str, Callable[[], Scenario]] = {
         rewards=lambda self, actions: (
             LineUpPrediction.rewards(self, actions) + 1e-3 * (len(actions) - 1)
         ),
-        blocks=property(),
+        tables=lambda self: None,
     ),
     "predictions a little off": inexact(lambda p, i, a: p.states(i, a) + 1e-3),
     "alike": predicting(alike=np.zeros((2, 4), dtype=int)),
@@ -797,6 +801,19 @@ def test_what_looks_wrong_is_warned_of(name: str) -> None:
 @pytest.mark.parametrize("name", BLIND)
 def test_what_the_documentation_calls_blind_is_not_noticed(name: str) -> None:
     assert not [*check_scenario(BLIND[name], steps=12).warnings()]
+
+
+@pytest.mark.parametrize("heads", [0.5, 0.9])
+def test_a_world_may_have_few_starts(heads: float) -> None:
+    """Only a coin differs between seeds."""
+
+    class Coin(Bare):
+        def reset(self, seed: Any, episode: int = 0) -> Any:
+            side = float(np.random.default_rng(seed).random() < heads)
+            self.places = np.full((2, 1), side)
+            return self.places
+
+    assert {check_scenario(Coin, seeds=(k, k + 1)).passed for k in range(4)}
 
 
 def test_what_could_not_be_checked_is_told_with_the_reason() -> None:

@@ -14,7 +14,7 @@ from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES, COMPILED, ChainView
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.trial import trials_of
 
 FAILURES = (
@@ -74,7 +74,7 @@ def test_actions_that_come_to_the_same_are_known_to_best_responses() -> None:
 
 def test_compiled_variables_are_what_their_functions_say() -> None:
     scenario = moving(6, state_space=COMPILED)
-    view = scenario.predict().seen(np.random.default_rng(3).integers(4, size=(30, 6)))
+    view = scenario.predict().view_after(np.random.default_rng(3).integers(4, size=(30, 6)))
     states = scenario._states.of_joints(view, 0, 6)[:, :, 1:]
     for column, name in enumerate(COMPILED):
         variable = CHAIN_VARIABLES.find(name)
@@ -168,7 +168,7 @@ def test_it_brings_what_learns_best_and_a_spec_has_the_last_word() -> None:
 )
 def test_what_cannot_be_is_refused_in_one_line(table: dict[str, object], said: str) -> None:
     with pytest.raises(SpecError, match=said) as refused:
-        check(Spec.of({"scenario": {"kind": "kinematic-chain", **table}}))
+        check_conditions(Spec.of({"scenario": {"kind": "kinematic-chain", **table}}))
     assert "\n" not in str(refused.value)
 
 

@@ -75,7 +75,7 @@ def test_other_variables_are_asked_one_by_one():
     settings = KinematicChainSettings(joints=3, state_space=("bearing", "distance"))
     scenario = settings.build()
     scenario.reset(0)
-    rules = Team(
+    team = Team(
         BatchTDSettings(decision=DECISION), scenario, Hierarchy(scenario.agents, []), policy_seed(0)
-    ).learner.rules
-    assert scenario.predict().best_responses(rules) is None
+    )
+    assert scenario.predict().best_responses(fuzzy(team).learner.rules) is None

@@ -70,13 +70,13 @@ def test_payoffs_of_ones_own_must_be_square():
 def test_it_keeps_the_promises_of_a_scenario(name, observed):
     game = MatrixGameSettings(game=name, observed=observed).build()
     assert isinstance(game, Scenario)
-    assert hasattr(game, "run_episode")
     check_scenario(game_of(name, observed), steps=8)
-    assert hasattr(game.predict(), "rewards")
+    assert game.predict().rewards(np.zeros((1, len(game.agents)), dtype=int)) is not None
     game.reset(0)
     joint = np.array([2, 1, 0])[: len(game.agents)]
     entered = game.step(joint).states
     prediction = game.predict()
+    assert prediction.rewards(joint[None]).shape == (1,)
     for i in range(len(game.agents)):
         assert (prediction.states(i, joint[None])[0] == entered[i]).all()
 

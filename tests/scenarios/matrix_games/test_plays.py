@@ -8,9 +8,9 @@ from acting import fuzzy
 
 from nested_agents.core.agents.loop import control_loop, world_seed
 from nested_agents.core.decision.exploration import BoltzmannExploration, PaperExploration
-from nested_agents.scenarios.matrix_games.plays import parts_of
+from nested_agents.scenarios.matrix_games.plays import parts_of, whole_episode
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.trials.session import arrange
+from nested_agents.studies.trials.arrangement import arrange
 
 PLAYS = 40
 FULL = {"joint": 2, "own": 1, "above": 2}
@@ -68,14 +68,13 @@ def test_a_compiled_episode_is_the_control_loops(case, exploration):
         rewards, optimal = zip(
             *((r.transition.reward, r.transition.info["optimal"]) for r in records), strict=True
         )
-        summary = game.run_episode(team, world_seed(3, episode), episode, PLAYS, learn=learn)
+        seed = world_seed(3, episode)
+        summary = whole_episode(game, team, seed, episode, PLAYS, learn=learn)
         assert summary.steps == PLAYS
         assert summary.return_ == pytest.approx(sum(rewards))
         assert summary.measures["optimal_plays"] == pytest.approx(np.mean(optimal))
         assert summary.measures["success"] == optimal[-1]
-    assert dataclasses.asdict(fuzzy(team).evaluator.counts) == dataclasses.asdict(
-        reference.evaluator.counts
-    )
+    assert dataclasses.asdict(team.counts) == dataclasses.asdict(reference.counts)
     arrays, expected = team.arrays(), reference.arrays()
     assert arrays.keys() == expected.keys()
     for name in arrays.keys() - {"learner.trace", "learner.reach"}:  # of no effect: discount 0
@@ -101,6 +100,6 @@ def test_a_compiled_episode_is_the_control_loops(case, exploration):
 def test_what_the_kernel_does_not_know_is_left_to_the_control_loop(changes):
     condition = settings("td-lambda", "joint", "chain", "best-response", **changes)
     _, game, team = arrange(condition, 0)
-    assert parts_of(game, team, learn=True) is None
-    assert game.run_episode(team, world_seed(0, 0), 0, 5, learn=True) is None
+    assert parts_of(game, fuzzy(team), learn=True) is None
+    assert whole_episode(game, team, world_seed(0, 0), 0, 5, learn=True) is None
     assert len(list(control_loop(game, team, episodes=1, steps=5, seed=0))) == 5

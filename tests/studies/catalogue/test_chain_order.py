@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import chain_order as chain_order
 from nested_agents.studies.catalogue.chain_order import analyse, draw
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.results.analysis import Analysis, Difference
 from nested_agents.studies.spec.spec import Spec
 
-STUDIES = Path(chain_order.__file__).parent
+OWN = Path(chain_order.__file__).parent
 ORDERS = ["chain:" + ",".join(order) for order in permutations(("r1.a", "r1.b", "r2.a"))]
 
 
@@ -94,9 +95,12 @@ def test_the_figure_is_drawn(tmp_path: Path) -> None:
     assert draw(analyse(NOTHING)) == {}
 
 
-@pytest.mark.parametrize(("name", "orders"), [("chain_order", 24), ("chain_order_8", 4)])
-def test_the_specs_hold_distinct_orders_of_at_least_twenty_seeds(name: str, orders: int) -> None:
-    spec = Spec.load(STUDIES / f"{name}.toml")
+@pytest.mark.parametrize(
+    ("path", "orders"),
+    [(OWN / "chain_order.toml", 24), (SPECS / "chain_order" / "chain_order_8.toml", 4)],
+)
+def test_the_specs_hold_distinct_orders_of_at_least_twenty_seeds(path: Path, orders: int) -> None:
+    spec = Spec.load(path)
     assert len(spec.conditions()) == orders
     assert len(spec.seeds) >= 20
 

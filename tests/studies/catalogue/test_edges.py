@@ -5,10 +5,11 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, SEEDS, Arrays, shapes
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import edges as module
 from nested_agents.studies.catalogue.edges import TRAINED, analyse, check, draw, measure
 from nested_agents.studies.catalogue.hierarchies import DECIDING
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -46,7 +47,7 @@ def test_every_hierarchy_is_compared_with_that_of_training() -> None:
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(made_up().frames())), tmp_path)
     assert [path.name for path in paths] == ["differences.png", "differences.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 def test_the_legend_fits_a_narrow_figure() -> None:
@@ -115,8 +116,8 @@ def test_the_same_team_acts_as_if_it_had_been_built_under_the_other_hierarchy() 
 
 
 def test_the_specs_can_be_run() -> None:
-    folder = Path(module.__file__).parent
-    for path in sorted(folder.glob("*.toml")):
+    own = Path(module.__file__).parent / "edges.toml"
+    for path in (own, *sorted((SPECS / "edges").glob("*.toml"))):
         spec = Spec.load(path)
         check(spec)
         assert len(spec.seeds) >= 5

@@ -3,9 +3,10 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, SEEDS, Arrays, games
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import fit as module
 from nested_agents.studies.catalogue.fit import analyse, check, draw, measure
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -39,12 +40,15 @@ def test_edges_are_compared_with_none_in_their_game() -> None:
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(made_up().frames())), tmp_path)
     assert [path.name for path in paths] == ["fit.png", "fit.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.toml")))
-def test_every_spec_can_be_run(name: str) -> None:
-    check(Spec.load(FOLDER / f"{name}.toml"))
+PATHS = [FOLDER / "fit.toml", *sorted((SPECS / "fit").glob("*.toml"))]
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+def test_every_spec_can_be_run(path: Path) -> None:
+    check(Spec.load(path))
 
 
 def test_a_study_without_a_condition_of_no_edges_is_refused() -> None:

@@ -6,7 +6,7 @@ from made_up_results import NOTHING, Arrays
 
 from nested_agents.studies.catalogue import games as module
 from nested_agents.studies.catalogue.games import AFTER_ONE, analyse, check, draw, measure
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -46,7 +46,7 @@ def test_systems_stand_side_by_side(tmp_path: Path) -> None:
     assert max(map(len, notes.splitlines())) <= 80
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["games.png", "games.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 def test_without_evaluation_it_is_refused() -> None:

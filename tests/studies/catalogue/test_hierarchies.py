@@ -8,7 +8,7 @@ from made_up_results import NOTHING, hierarchies
 
 from nested_agents.studies.catalogue import hierarchies as module
 from nested_agents.studies.catalogue.hierarchies import analyse, check, draw, measure
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
@@ -16,7 +16,7 @@ from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.power import seeds_needed
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check as measures_of
+from nested_agents.studies.trials.arrangement import check_conditions as measures_of
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers import runner
 
@@ -126,7 +126,7 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
         assert len(figure.axes) == 2 * columns
     paths = save({"hierarchies": figure}, tmp_path)
     assert all(path.stat().st_size > 0 for path in paths)
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(

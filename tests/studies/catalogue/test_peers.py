@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import peers as module
-from nested_agents.studies.catalogue import wheel_failure
 from nested_agents.studies.catalogue.peers import analyse, check, draw, measure, stops
-from nested_agents.studies.catalogue.study import drawn, load_study
+from nested_agents.studies.catalogue.study import draw_figures, load_study
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 
-SPECS = sorted(Path(wheel_failure.__file__).parents[1].glob("peers/*.toml"))
+PATHS = [Path(module.__file__).parent / "peers.toml", *sorted((SPECS / "peers").glob("*.toml"))]
 SEEDS = 10
 
 
@@ -60,7 +60,7 @@ def test_success_against_experience_and_time(tmp_path: Path) -> None:
     assert max(len(line) for note in analysis.notes for line in note.splitlines()) <= 80
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["peers.png", "peers.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 def test_evaluations_on_the_way_leave_no_trace() -> None:
@@ -86,12 +86,12 @@ def test_studies_of_rule_bases_refuse_peers_before_they_begin(study: str, tmp_pa
     path = tmp_path / "spec.toml"
     path.write_text(f'study = "{study}"\n[learner]\nkind = "ppo"\n')
     with pytest.raises(SpecError, match=rf"'ppo': {study} needs agents with rule bases") as raised:
-        load_study(study).check(Spec.load(path))  # type: ignore[attr-defined]
+        load_study(study).check(Spec.load(path))
     assert "allowed batch-td, " in str(raised.value)
     assert "ippo" not in str(raised.value)
     assert "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 def test_specs(path: Path) -> None:
     assert all(c.settings.learner.kind for c in Spec.load(path).conditions())

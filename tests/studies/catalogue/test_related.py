@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import related as module
 from nested_agents.studies.catalogue.related import analyse, check, draw, measure
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
 
-CATALOGUE = Path(module.__file__).parent
 CHANGES = ["seeds=2", "episodes=1", "steps=20", "evaluation=1"]
 
 
@@ -21,7 +21,7 @@ CHANGES = ["seeds=2", "episodes=1", "steps=20", "evaluation=1"]
 def results() -> Results:
     """All systems on the climbing game, two seeds of a few plays."""
     found = Arrays()
-    for trial in trials_of(Spec.load(CATALOGUE / "climbing.toml", CHANGES)):
+    for trial in trials_of(Spec.load(SPECS / "related" / "climbing.toml", CHANGES)):
         result, name = measure(trial), trial.condition
         (last,) = (row for row in result.rows if row.phase == "evaluation")
         for kept, values in (
@@ -60,12 +60,12 @@ def test_it_is_tabulated_and_drawn(results: Results, tmp_path: Path) -> None:
     assert list(analysis.table[0].estimates)[:3] == ["evaluation success", "decisions", "ms"]
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["related.png", "related.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize("name", ["climbing", "arms", "boxes"])
 def test_its_specs_have_the_systems_of_the_paper(name: str) -> None:
-    names = {c.columns["name"] for c in Spec.load(CATALOGUE / f"{name}.toml").conditions()}
+    names = {c.columns["name"] for c in Spec.load(SPECS / "related" / f"{name}.toml").conditions()}
     assert names >= {
         "nested", "independent", "joint-action learners", "variable elimination", "max-plus",
         "value decomposition", "single agent", "frozen",

@@ -1,14 +1,17 @@
 from pathlib import Path
+from typing import Any
 
 import pytest
 from made_up_results import NOTHING, Arrays, scaling
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures, load_study
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import arrange, check, run_trial
+from nested_agents.studies.trials.arrangement import arrange, check_conditions
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SIZES = {2: 0.9, 8: 0.9, 64: 0.5}
@@ -82,7 +85,7 @@ def test_the_figure_has_a_line_of_messages_by_topology() -> None:
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(scaling(SIZES).frames())), tmp_path)
     assert [path.name for path in paths] == ["scaling.png", "scaling.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(("topology", "count"), [("chain", 6), ("star", 3), ("independent", 0)])
@@ -104,12 +107,64 @@ def test_a_trial_is_measured_without_being_changed() -> None:
     assert result.usage["process_bytes"] > 0
 
 
+SHORT = {"rollout": 4, "batch_size": 4, "epochs": 1, "hidden": [8]}
+
+
+@pytest.mark.parametrize(
+    ("learner", "agents", "expected"),
+    [
+        ({}, "actuator", {"messages": 1, "joint_actions": 8}),
+        ({"kind": "hierarchy-ppo", **SHORT}, "actuator", {"messages": 1, "joint_actions": 8}),
+        ({"kind": "mappo", **SHORT}, "actuator", {"messages": 0, "joint_actions": 8}),
+        ({"kind": "ppo", **SHORT}, "actuator", {"messages": 0, "joint_actions": 8}),
+        ({"kind": "dqn", "hidden": [8]}, "team", {"messages": 0, "agents": 1}),
+    ],
+)
+def test_agents_of_every_kind_are_counted(
+    learner: dict[str, Any], agents: str, expected: dict[str, float]
+) -> None:
+    if "hidden" in learner:
+        pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    table = {
+        "study": "scaling",
+        "seeds": [7],
+        "episodes": 1,
+        "steps": 6,
+        "evaluation": 1,
+        "scenario": {"kind": "line-up", "carts": 2},
+        "agents": agents,
+        "learner": learner,
+        "preset": "default" if learner else "fitted-q",
+    }
+    spec = Spec.of(table)
+    load_study("scaling").check(spec)
+    (trial,) = trials_of(spec)
+    result = measure(trial)
+    assert result.rows == run_trial(trial).rows
+    assert {name: result.numbers[name] for name in expected} == expected
+    assert 0 < result.numbers["weight_bytes"] <= result.numbers["team_bytes"]
+
+
+def test_weights_of_networks_by_hand() -> None:
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    table = {
+        "scenario": {"kind": "line-up", "carts": 2},
+        "learner": {"kind": "hierarchy-ppo", "critic": "own", **SHORT},
+    }
+    (condition,) = Spec.of(table).conditions()
+    told, own, hidden, actions = 4, 4, 8, 4
+    actor = hidden * (told + own + 1) + actions * (hidden + 1)
+    critic = hidden * (own + 1) + hidden + 1
+    assert arrange(condition.settings, 0).team.weight_bytes == 4 * (actor + critic)
+
+
 def test_the_spec_reaches_from_2_to_64_robots() -> None:
-    folder = Path(module.__file__).parent
-    specs = [Spec.load(folder / f"{name}.toml") for name in ("costs", "scaling", "crowds")]
+    own = Path(module.__file__).parent / "scaling.toml"
+    paths = (SPECS / "scaling" / "costs.toml", own, SPECS / "scaling" / "crowds.toml")
+    specs = list(map(Spec.load, paths))
     for reached, sizes in ((specs[:1], {2, 4, 8, 16}), (specs[1:], {2, 4, 8, 16, 32, 64})):
         conditions = [condition for spec in reached for condition in spec.conditions()]
         assert sizes <= {c.settings.scenario.robots for c in conditions}
     spec = specs[0]
     small = spec.model_copy(update={"overrides": spec.overrides[:1]})
-    check(small)
+    check_conditions(small)

@@ -6,8 +6,9 @@ import pytest
 from acting import fuzzy
 from made_up_results import NOTHING, wheel_failure
 
+from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import wheel_failure as module
-from nested_agents.studies.catalogue.study import drawn
+from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.catalogue.wheel_failure import (
     AT_END,
     KEPT,
@@ -108,7 +109,7 @@ def test_twins_are_found_by_what_is_swept(columns: dict, faults: list | None) ->
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(wheel_failure(ENDS).frames())), tmp_path)
     assert [path.name for path in paths] == ["wheel-failure.png", "wheel-failure.svg"]
-    assert drawn(module, analyse(NOTHING)) == {}
+    assert draw_figures(module, analyse(NOTHING)) == {}
 
 
 def test_training_goes_through_the_failure_and_a_copy_keeps_its_weights() -> None:
@@ -166,13 +167,13 @@ def test_the_spec_can_be_run_and_crosses_faults_with_self_models() -> None:
     labels = [condition.label for condition in spec.conditions()]
     assert len(spec.seeds) >= 20
     assert "4 wheels, seized, enabled=true" in labels
-    others = Spec.load(Path(module.__file__).parent / "wheel_faults.toml")
+    others = Spec.load(SPECS / "wheel_failure" / "wheel_faults.toml")
     check(others)
     assert "2 wheels, seized, enabled=false" in [c.label for c in others.conditions()]
 
 
 def test_large_teams_lose_more_and_more_wheels_of_different_robots() -> None:
-    spec = Spec.load(Path(module.__file__).parent / "failures_of_large_teams.toml")
+    spec = Spec.load(SPECS / "wheel_failure" / "failures_of_large_teams.toml")
     check(spec)
     lost = []
     for condition in spec.conditions():

@@ -18,7 +18,7 @@ from made_up_commands import Command, finish, heeding_interrupts, run_here, wait
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import commands
-from nested_agents.studies.cli.main import COMMANDS, main
+from nested_agents.studies.cli.main import COMMANDS, PUBLISHED, main
 from nested_agents.studies.presentation import figures
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE
@@ -70,7 +70,8 @@ def test_every_command_has_a_module_and_a_line_of_help(capsys, monkeypatch):
     listed = [line.split()[0] for line in lines if line]
     assert listed[: len(COMMANDS)] == list(COMMANDS)
     modules = {path.stem for path in Path(commands.__file__).parent.glob("*.py")}
-    assert modules - {"__init__"} == {module for module, _ in COMMANDS.values()}
+    places = {f".commands.{module}" for module in modules - {"__init__"}}
+    assert places | {PUBLISHED} == {place for place, _ in COMMANDS.values()}
 
 
 def test_version(capsys):

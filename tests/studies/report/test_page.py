@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents import studies
+from nested_agents.results import SPECS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.report.page import brief, page
 from nested_agents.studies.spec.spec import Spec
@@ -120,12 +121,13 @@ def test_what_the_user_can_mend(arguments, complaint, finished, tmp_path, capsys
     assert list(tmp_path.iterdir()) == []
 
 
-SPECS = sorted((Path(studies.__file__).parent / "catalogue").rglob("*.toml"), reverse=True)
-ONE_EACH = {path.parent.name: path for path in SPECS}
+CATALOGUE = sorted((Path(studies.__file__).parent / "catalogue").rglob("*.toml"), reverse=True)
+PATHS = [*CATALOGUE, *sorted(SPECS.rglob("*.toml"), reverse=True)]
+ONE_EACH = {path.parent.name: path for path in CATALOGUE}
 
 
-@pytest.mark.parametrize("path", SPECS, ids=[path.stem for path in SPECS])
-def test_every_spec_of_the_catalogue_is_read(path):
+@pytest.mark.parametrize("path", PATHS, ids=[path.stem for path in PATHS])
+def test_every_committed_spec_is_read(path):
     assert trials_of(Spec.load(path, ["seeds=1"]))
 
 

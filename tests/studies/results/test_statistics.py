@@ -1,5 +1,6 @@
 """Estimates with intervals and permutation tests, against exact enumeration and SciPy."""
 
+import tracemalloc
 from fractions import Fraction
 from itertools import permutations, product
 
@@ -10,7 +11,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from nested_agents.studies.results.statistics import (
+    BITS,
+    EXACT,
     _drawn,
+    _flips,
     _tail,
     bootstrap,
     friedman,
@@ -253,3 +257,24 @@ def test_drawn_sign_flips_are_near_all_of_them() -> None:
 def test_holm_by_hand() -> None:
     np.testing.assert_allclose(holm([0.01, 0.02, 0.03, 0.005]), [0.03, 0.04, 0.04, 0.02])
     assert holm([0.6, 0.7]).tolist() == [1.0, 1.0]
+
+
+@pytest.mark.parametrize("n", [3, 10, 11, 16, 17, 37])
+def test_signs_are_those_that_are_drawn_at_once(n: int) -> None:
+    if 2**n <= EXACT:
+        expected = np.array(list(product((0, 1), repeat=n)))[:, ::-1]
+    else:
+        expected = 1 - np.random.default_rng(3).integers(0, 2, size=(EXACT, n))
+    numbers = _flips(n, EXACT, 3)
+    signs = [part[:, None] >> np.arange(BITS) & 1 for part in numbers]
+    assert np.array_equal(np.concatenate(signs, axis=1)[:, :n], expected)
+
+
+def test_a_test_of_many_seeds_takes_little_memory() -> None:
+    values = np.random.default_rng(0).normal(size=(2, 1200))
+    tracemalloc.start()
+    p = paired_permutation(*values)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert p == 0.75361  # as when all signs were drawn at once
+    assert peak < 60e6

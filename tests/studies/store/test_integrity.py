@@ -3,16 +3,21 @@ import random
 import re
 import shutil
 import sqlite3
+from dataclasses import replace
+from pathlib import Path
 
 import made_up
 import pytest
 
+from nested_agents.studies.api.study import load
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.checksums import trial_checksums
 from nested_agents.studies.store.database import DATABASE, SPEC_FILE
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.keeping import pending
+from nested_agents.studies.store.writer import locked
+from nested_agents.studies.trials.keeping import noted_of, pending
 from nested_agents.studies.workers.runner import save
 
 
@@ -321,6 +326,66 @@ def test_everything_that_was_kept_is_checked(study, capsys):
             assert (status, err.count("\n")) == (2, 1) or command == "status"
 
 
+INVENTED = {
+    "trials": "INSERT INTO trials SELECT 'x', condition, 99, state, error, recording_sha256, code "
+    "FROM trials WHERE identity = ?",
+    "episodes": "INSERT INTO episodes SELECT 'x', phase, episode, steps, success, stopped_at_goal, "
+    'final_distance_m, final_orientation_rad, contact_fraction, "return" '
+    "FROM episodes WHERE identity = ?",
+    "seconds": "INSERT INTO seconds SELECT 'x', decision, physics, sensors, learning, total "
+    "FROM seconds WHERE identity = ?",
+    "numbers": "INSERT INTO numbers SELECT 'x', phase, 1.0, 1 FROM episodes "
+    "WHERE identity = ? AND episode = 0",
+}
+"""What adds rows of a trial that nobody ran, of the values of one that was."""
+
+
+@pytest.mark.parametrize("tables", [*([table] for table in INVENTED), [*INVENTED]])
+def test_rows_that_no_run_wrote_are_told_and_never_counted(study, sound, tables, capsys):
+    for table in tables:
+        change(study, INVENTED[table], made_up.TRIALS[3].identity)
+    name = "frozen, seed 99" if "trials" in tables else "trial x"
+    for command in ("results", "table", "compare", "export", "report", "status", "watch --once"):
+        first, *options = command.split()
+        assert main([first, str(study), *options]) == 2, command
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert f"{study / DATABASE}: is damaged: it holds rows that no run wrote: {name}" in err
+        assert err.count("\n") == 1
+    with pytest.raises(SpecError, match="no run wrote"):
+        load(study)
+    (note,), ran = finish(study)
+    assert ran == 0
+    assert f"no run wrote: {name}; kept as {DATABASE}.damaged-1, 6 trials taken over" in note
+    assert content(study) == content(sound)
+
+
+def test_a_trial_that_is_not_planned_is_told_and_not_taken_over(study, sound):
+    for table in ("trials", "episodes", "seconds"):
+        change(study, INVENTED[table], made_up.TRIALS[3].identity)
+    with sqlite3.connect(study / DATABASE) as db:
+        db.executemany("INSERT INTO checksums VALUES (?, ?)", trial_checksums(db, "x"))
+        db.execute("UPDATE ledger SET trials = 7")
+    db.close()
+    with pytest.raises(SpecError, match="not of this study: frozen, seed 99"), Store.open(study):
+        pass
+    (note,), ran = finish(study)
+    assert ("6 trials taken over" in note, ran) == (True, 0)
+    assert content(study) == content(sound)
+
+
+def test_trials_that_a_new_plan_lacks_are_set_aside_and_not_counted(study):
+    # As another version of Python, in which the same file has another syntax tree.
+    planned = [trial.planned._replace(identity=f"new{i}") for i, trial in enumerate(made_up.TRIALS)]
+    kept = made_up.TRIALS[0].planned
+    notes = replace(noted_of(made_up.SPEC, made_up.MEASURES), planned=[kept, *planned[1:]])
+    with locked(study), Store.create(study, notes, {}, None) as store:
+        assert store.counts() == {"done": 1, "failed": 0}
+        (note,) = store.notes
+    assert "holds trials that are not of this study any more: " in note
+    assert f"(and of 4 more); kept as {DATABASE}.damaged-1, 1 trials taken over" in note
+
+
 def test_a_study_without_a_ledger_is_mended(study, sound):
     change(study, "DROP TABLE ledger")
     with pytest.raises(SpecError, match="is damaged"), Store.open(study):
@@ -353,3 +418,20 @@ def test_a_study_of_a_newer_version_is_refused_and_left_as_it_is(study, capsys):
         assert "holds results of version 99" in capsys.readouterr().err
     assert (study / DATABASE).read_bytes() == before
     assert not list(study.glob("*.damaged-*"))
+
+
+def test_a_study_of_version_0_3_0_is_read_as_before(tmp_path, capsys):
+    dump = Path(__file__).with_name("version_0_3_0.sql").read_text(encoding="utf-8")
+    with sqlite3.connect(tmp_path / DATABASE) as db:
+        db.executescript(dump)
+    db.close()
+    with Store.open(tmp_path) as store:
+        store.verify()
+        assert store.counts() == {"done": 4, "failed": 0}
+        assert len(list(store.episodes()[1])) == 4 * 3
+    assert main(["results", str(tmp_path), "--format", "csv"]) == 0
+    first = capsys.readouterr().out.splitlines()[1]
+    assert first == (
+        "default,default,0,training,0,6,0,0.9644814481842697,0.8611634842064431,"
+        "-0.009279672728450386"
+    )

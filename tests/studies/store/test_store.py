@@ -8,8 +8,7 @@ import pytest
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec import spec as spec_module
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store import database, durable
-from nested_agents.studies.store import store as store_module
+from nested_agents.studies.store import database, durable, writer
 from nested_agents.studies.store.database import DATABASE, RESULTS_VERSION, SPEC_FILE
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending, spec_of
@@ -141,7 +140,8 @@ def test_seeds_may_be_added(finished):
         ({"seeds": 2}, "seeds = [0, 1, 2] there, [0, 1] here"),
         ({"learner": {"discount": 0.5}}, "learner.discount = 0.97 there, 0.5 here (and 1 more)"),
         ({"sweep": {"preset": ["default"]}}, "conditions = ['default', 'frozen'] there"),
-        ({"sweep": {"learner.kind": ["batch-td", "frozen"]}}, "conditions"),
+        ({"sweep": {"preset": ["default"]}}, "['default'] here, by sweep.preset = ['default', 'f"),
+        ({"sweep": {"learner.kind": ["batch-td", "frozen"]}}, "here, by sweep.learner.kind = abs"),
         ({"evaluation": 3, "steps": 6}, "steps = 5 there, 6 here (and 1 more)"),
     ],
 )
@@ -177,16 +177,17 @@ def test_two_writers_at_a_time_are_refused(finished):
 
 
 def test_another_study_that_came_first_is_not_overwritten(tmp_path, monkeypatch):
-    take, other = store_module._take, made_up.SPEC.model_copy(update={"steps": 99})
+    take = writer._take
+    other = made_up.SPEC.model_copy(update={"steps": 99})
 
     def late(lock, directory):
         with monkeypatch.context() as patch:
-            patch.setattr(store_module, "_take", take)
+            patch.setattr(writer, "_take", take)
             with made_up.opened(directory, other):
                 pass
         take(lock, directory)
 
-    monkeypatch.setattr(store_module, "_take", late)
+    monkeypatch.setattr(writer, "_take", late)
     with (
         pytest.raises(SpecError, match="holds another study"),
         made_up.opened(tmp_path),
@@ -197,9 +198,9 @@ def test_another_study_that_came_first_is_not_overwritten(tmp_path, monkeypatch)
 
 
 def test_one_reads_one_state_while_another_writes(finished):
-    with made_up.opened(finished) as writer:
+    with made_up.opened(finished) as store:
         with Store.open(finished) as reader:
-            writer.fail(made_up.TRIALS[0], "Traceback")
+            store.fail(made_up.TRIALS[0], "Traceback")
             assert reader.counts() == {"done": 6, "failed": 0}
             assert len(list(reader.episodes()[1])) == 6 * (4 + 2)
         with Store.open(finished) as reader:

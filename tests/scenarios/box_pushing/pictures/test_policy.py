@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from acting import fuzzy
+from acting import fuzzy, joint_of
 
 from nested_agents.scenarios.box_pushing.pictures.policy import Field
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.trials.session import arrange
+from nested_agents.studies.trials.arrangement import arrange
 
 
 @pytest.mark.parametrize(("slope", "to_the_box"), [(-1.0, True), (1.0, False)])
@@ -16,7 +16,10 @@ def test_a_team_that_likes_the_box_drives_to_it(slope, to_the_box):
     fuzzy(team).learner.theta[:, begin : begin + partitions[gap].size] = slope * np.array(
         partitions[gap].centres
     )
-    fields = scenario.show_policy(team).fields
+    fields = scenario.show_policy(
+        lambda prediction: joint_of(team, scenario, explore=False, imagined=prediction),
+        scenario.predict,
+    ).fields
     assert len(fields) == 2
     for field in fields:
         far = np.hypot(*field.points[:, :2].T) > 0.25

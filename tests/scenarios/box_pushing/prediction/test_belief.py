@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from acting import fuzzy
+from acting import fuzzy, look
 from pydantic import ValidationError
 
 from benchmarks.scripted.controller import ScriptedController
@@ -10,8 +10,10 @@ from nested_agents.core.adaptation.calibration import CalibrationSettings
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import DecisionSettings
+from nested_agents.core.interface.experience import Decision, Experience
+from nested_agents.core.interface.plain import as_scenario
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.learners.learner import Decision
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import (
@@ -37,7 +39,7 @@ def scenario(**table):
 
 def calibrating(world, agents="actuator"):
     settings = BatchTDSettings(
-        calibration=CalibrationSettings(enabled=True), decision=Decision(rule="random")
+        calibration=CalibrationSettings(enabled=True), decision=DecisionSettings(rule="random")
     )
     seen = join_agents(world, agents)
     return seen, Team(settings, seen, build("chain", seen.agents), policy_seed(0))
@@ -103,16 +105,18 @@ def test_the_least_gap_between_robots():
 def test_wrong_constants_are_found_out_by_pushing(believed):
     world = scenario(start="easy", belief={"soft": SOFT, "stiff": STIFF}[believed])
     _, team = calibrating(world)
+    foresight = fuzzy(team).foresight
     controller = ScriptedController(world)
     errors = []
     for seed in range(6):
         world.reset(seed)
         for _ in range(14):
             joint = controller.act(world.measure())
-            prediction = team.predict(world)
+            prediction = foresight.predict(look(world))
             transition = world.step(joint)
-            team.adapt(prediction, joint, transition)
-            errors.append(fuzzy(team).foresight.calibration.constants - RIGHT[believed])
+            decision = Decision(joint, ())
+            foresight.learn(Experience(look(world), decision, transition, False), prediction)
+            errors.append(foresight.calibration.constants - RIGHT[believed])
             if transition.terminated:
                 break
     # After 80 decisions of which three quarters push. A wrong start was off by 1.4, 1.4 and 0.7.
@@ -134,7 +138,7 @@ def test_the_twist_of_the_box_is_not_measured_when_robots_touch():
 
 def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
     (world, team), (_, other) = (calibrating(scenario(start="easy"), "body") for _ in "ab")
-    assert world.constants == CONSTANTS
+    assert world.embodiment().constants == CONSTANTS
     for _ in control_loop(world, team, episodes=1, steps=30, seed=0):
         pass
     assert fuzzy(team).foresight.calibration.constants.any()
@@ -145,7 +149,8 @@ def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
 
 
 def test_robots_of_other_scenarios_have_no_constants(line_world):
-    assert not hasattr(join_agents(line_world(2, 2), "body"), "constants")
+    joined = join_agents(as_scenario(line_world(2, 2)), "body")
+    assert joined.embodiment() is None
 
 
 @pytest.mark.parametrize("predictor", ["rigid", "static", "exact"])

@@ -4,8 +4,6 @@ from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from nested_agents.core.interface.spaces import Variable
 from nested_agents.core.numerics import FloatArray, wrap
@@ -14,15 +12,13 @@ from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES, View
 from nested_agents.scenarios.box_pushing.states.state_spaces import (
-    COMPILED,
     STATE_SPACES,
     BoxStateSpace,
-    angle_of,
-    listed,
+    build_space,
     state_space_for,
 )
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.state_variables import StateVariable, find_variable, sensed
+from nested_agents.scenarios.state_variables import StateVariable, sense
 
 GOAL = np.array([1.0, 0.0, 0.0])
 SQUARE = BOXES["square"].outline
@@ -35,7 +31,7 @@ def view(robots, box, gaps) -> View:
 
 
 VARIABLES = tuple(STATE_VARIABLES.built_in)
-EVERY = listed("every", *VARIABLES)
+EVERY = build_space("every", *VARIABLES)
 
 
 @pytest.mark.parametrize("name", STATE_SPACES)
@@ -44,13 +40,13 @@ def test_functions_fill_the_space_they_describe(name: str) -> None:
     poses = np.random.default_rng(0).uniform(-1, 1, (5, 2, 3))
     seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, ORIGIN, 1.0, SQUARE, 0.08)
     assert spec.own(poses[:, 0], poses[:, 0, 0], GOAL).shape == (5, spec.space.n_own)
-    assert spec.sensed(seen, [1])[0].shape == (5, spec.space.n_variables - spec.space.n_own)
+    assert spec.sense(seen, [1])[0].shape == (5, spec.space.n_variables - spec.space.n_own)
 
 
 def test_relational_variables_by_hand() -> None:
     # The box 1 m before the goal, robot 1 straight behind it, robot 2 on its left, facing it.
     situation = view([[-0.2, 0.0, 0.1], [0.0, 0.2, -pi / 2]], [0.0, 0.0, 0.3], [0.06, 0.08])
-    first = dict(zip(VARIABLES, EVERY.sensed(situation, [0])[0][0], strict=True))
+    first = dict(zip(VARIABLES, EVERY.sense(situation, [0])[0][0], strict=True))
     assert (first["gap"], first["others_gap"], first["box_distance"]) == (0.06, 0.08, 1.0)
     assert first["box_bearing"] == pytest.approx(-0.1)
     assert first["side"] == pytest.approx(0.0)
@@ -59,7 +55,7 @@ def test_relational_variables_by_hand() -> None:
     assert first["cross_track_error"] == pytest.approx(-np.sqrt(0.5))
     assert first["approach"] == pytest.approx(0.01)  # 3 cm in three periods
     assert first["box_turn"] == first["bend"] == pytest.approx(0.3)  # straight ahead
-    second = dict(zip(VARIABLES, EVERY.sensed(situation, [1])[0][0], strict=True))
+    second = dict(zip(VARIABLES, EVERY.sense(situation, [1])[0][0], strict=True))
     assert second["box_bearing"] == pytest.approx(0.0)
     assert second["side"] == pytest.approx(-pi / 2)
 
@@ -70,10 +66,10 @@ def test_variables_of_crowds_by_hand() -> None:
     left = np.array([-turn[1], turn[0]])
     low = -0.1 * turn - 0.08 * left
     situation = view([[*low, 0.1], [0.0, 0.9, -pi / 2]], [0.0, 0.0, 0.3], [0.0, 0.77])
-    first = dict(zip(VARIABLES, EVERY.sensed(situation, [0])[0][0], strict=True))
+    first = dict(zip(VARIABLES, EVERY.sense(situation, [0])[0][0], strict=True))
     assert first["face_bearing"] == pytest.approx(0.2)
     assert first["others_away"] == 1.0
-    second = dict(zip(VARIABLES, EVERY.sensed(situation, [1])[0][0], strict=True))
+    second = dict(zip(VARIABLES, EVERY.sense(situation, [1])[0][0], strict=True))
     assert second["others_away"] == 0.0
     # Nearly all of the push is that of the robot in contact.
     alone = np.arctan2(*-low[::-1])
@@ -88,7 +84,7 @@ def test_common_variables_are_the_same_for_all_robots() -> None:
     seen = View(
         poses, poses[:, 0].copy(), rng.normal(size=(20, 5)), GOAL, ORIGIN, 3.0, SQUARE, 0.08
     )
-    blocks = dict(enumerate(EVERY.sensed(seen, [r])[0] for r in range(5)))
+    blocks = dict(enumerate(EVERY.sense(seen, [r])[0] for r in range(5)))
     for column, name in enumerate(VARIABLES):
         alike = all((blocks[r][:, column] == blocks[0][:, column]).all() for r in range(5))
         assert alike == (name in EVERY.space.common), name
@@ -96,24 +92,24 @@ def test_common_variables_are_the_same_for_all_robots() -> None:
 
 def test_a_push_away_from_the_goal_misses_it_by_the_whole_distance() -> None:
     situation = view([[0.2, 0.1, 0.0]], [0.0, 0.0, 0.0], [0.06])
-    assert EVERY.sensed(situation, [0])[0][0][VARIABLES.index("cross_track_error")] == -1.0
+    assert EVERY.sense(situation, [0])[0][0][VARIABLES.index("cross_track_error")] == -1.0
 
 
 def test_the_arc_to_the_goal_pose_bends_twice_as_far_as_the_course() -> None:
     # 45 degrees to the left of the way to the goal: an arc begins at right angles to it.
     situation = view([[0.0, 0.0, 0.0]], [0.0, 1.0, -pi / 2], [0.06])
-    assert EVERY.sensed(situation, [0])[0][0][VARIABLES.index("bend")] == pytest.approx(0.0)
+    assert EVERY.sense(situation, [0])[0][0][VARIABLES.index("bend")] == pytest.approx(0.0)
 
 
 def test_a_single_robot_has_no_others() -> None:
-    shared = EVERY.sensed(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])[0][0]
+    shared = EVERY.sense(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])[0][0]
     assert shared[3] == shared[0] == 0.06
 
 
 def test_equation_1_by_hand() -> None:
     own = STATE_SPACES["paper"].own(np.array([[1.0, -2.0, pi]]), np.array([0.05]), GOAL)[0]
     np.testing.assert_allclose(own, [-pi, -pi / 2, 2.0, 0.05], atol=1e-12)
-    shared = STATE_SPACES["paper"].sensed(view([[0, 0, 0]], [1.0, 1.0, 0.2], [0.1]), [0])[0][0]
+    shared = STATE_SPACES["paper"].sense(view([[0, 0, 0]], [1.0, 1.0, 0.2], [0.1]), [0])[0][0]
     np.testing.assert_allclose(shared, [0.2, -pi / 2 - 0.2, 1.0], atol=1e-12)
 
 
@@ -122,8 +118,8 @@ def test_mirrored_worlds_have_mirrored_angles() -> None:
     robots, box = rng.uniform(-1, 1, (2, 3)), rng.uniform(-0.5, 0.5, 3)
     flip = np.array([1.0, -1.0, -1.0])
     for robot in (0, 1):
-        seen = EVERY.sensed(view(robots, box, [0.1, 0.2]), [robot])[0][0]
-        mirrored = EVERY.sensed(view(robots * flip, box * flip, [0.1, 0.2]), [robot])[0][0]
+        seen = EVERY.sense(view(robots, box, [0.1, 0.2]), [robot])[0][0]
+        mirrored = EVERY.sense(view(robots * flip, box * flip, [0.1, 0.2]), [robot])[0][0]
         signs = [
             -1 if described.low < 0 and described.name != "approach" else 1
             for described in EVERY.space.shared
@@ -164,31 +160,6 @@ def test_a_fast_robot_gets_them() -> None:
     assert states[:, 0].max() == 0.26
 
 
-@pytest.mark.parametrize("robots", [1, 2, 5])
-@pytest.mark.parametrize(
-    "names",
-    [VARIABLES, ("cross_track_error",), ("bend", "gap"), ("face_bearing", "others_away")],
-)
-@pytest.mark.parametrize("box", ["square", "L", "circle"])
-def test_compiled_blocks_are_those_of_the_definition(
-    box: str, names: tuple[str, ...], robots: int
-) -> None:
-    rng = np.random.default_rng(robots)
-    seen = View(
-        rng.normal(size=(100, robots, 3)) * [1, 1, 9], rng.normal(size=(100, 3)) * [1, 1, 9],
-        rng.normal(size=(100, robots)), rng.normal(size=3), rng.normal(size=3),
-        3.0, BOXES[box].outline, BOXES[box].friction_radius,
-    )  # fmt: skip
-    space, wanted = listed("some", *names), list(range(robots))[::-1]
-    expected = np.array([space.sensed(seen, [r])[0] for r in wanted])
-    np.testing.assert_allclose(space.shared_of(seen, wanted), expected, rtol=0, atol=1e-12)
-
-
-@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
-def test_angles_are_exact_to_the_last_bits(x: float, y: float) -> None:
-    assert angle_of(x, y) == pytest.approx(np.arctan2(y + 0.0, x + 0.0), rel=0, abs=1e-15)
-
-
 @pytest.mark.parametrize(
     ("names", "complaint"),
     [
@@ -210,11 +181,6 @@ def test_a_state_space_may_be_listed() -> None:
         "cross_track_error",
     ]
     assert scenario.reset(0).shape == (4, 3)
-
-
-def test_columns_are_those_of_names_that_the_kernel_knows() -> None:
-    assert set(COMPILED) == set(STATE_VARIABLES.built_in)
-    assert all(find_variable(STATE_VARIABLES, name).variable.name == name for name in COMPILED)
 
 
 MINE = """
@@ -277,7 +243,7 @@ def test_all_robots_sense_what_each_does_alone(space: BoxStateSpace) -> None:
     poses, gaps = rng.normal(size=(1, 4, 3)), np.abs(rng.normal(size=(1, 4)))
     seen = View(poses, poses[:, 0] + 0.3, gaps, GOAL, ORIGIN, 1.0, SQUARE, 0.08)
     np.testing.assert_array_equal(
-        space.sensed(seen, range(4)), [space.sensed(seen, [r])[0] for r in range(4)]
+        space.sense(seen, range(4)), [space.sense(seen, [r])[0] for r in range(4)]
     )
 
 
@@ -292,7 +258,7 @@ def test_what_is_common_is_sensed_once() -> None:
         return StateVariable(Variable(name, "m", 0.0, 1.0), function, common)
 
     seen = view([[-0.2, 0, 0], [0.2, 0, 0]], [0, 0, 0], [0.06, 0.1])
-    sensed([counted("same", True), counted("own", False)], seen, [0, 1])
+    sense([counted("same", True), counted("own", False)], seen, [0, 1])
     assert asked == [("same", 0), ("own", 0), ("own", 1)]
 
 
@@ -305,9 +271,9 @@ def gap(view, robot):
     return view.box
 """
     with Sources(texts={"mine.py": text}).active():
-        space = listed("own", "mine.py:gap")
+        space = build_space("own", "mine.py:gap")
     with pytest.raises(ValueError, match="state variable 'gap': shape"):
-        space.sensed(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])
+        space.sense(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])
 
 
 @pytest.mark.parametrize(
@@ -332,10 +298,10 @@ def wrong(view, robot):
     return {returned}
 """
     with Sources(texts={"wrong.py": text}).active():
-        space = listed("own", "gap", "wrong.py:wrong")
+        space = build_space("own", "gap", "wrong.py:wrong")
     poses = np.random.default_rng(0).normal(size=(5, 2, 3))
     seen = View(poses, poses[:, 0].copy(), np.abs(poses[:, :, 0]), GOAL, ORIGIN, 1.0, SQUARE, 0.08)
-    for compute in (lambda: space.sensed(seen, [0])[0], lambda: space.shared_of(seen, [0, 1])):
+    for compute in (lambda: space.sense(seen, [0])[0], lambda: space.shared_of(seen, [0, 1])):
         with pytest.raises(ValueError, match=complaint) as error:
             compute()
         assert "\n" not in str(error.value)

@@ -19,7 +19,7 @@ from nested_agents.scenarios.box_pushing.world.boxes import (
     AREA,
     BOXES,
     BoxSpec,
-    _merged,
+    _merge,
     box_for,
     growth,
     moments,
@@ -56,7 +56,7 @@ def greedy(polygon: Polygon) -> list[np.ndarray]:
         merged = False
         for i, j in combinations(range(len(pieces)), 2):
             shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
-            union = _merged(pieces[i], pieces[j]) if len(shared) >= 2 else None
+            union = _merge(pieces[i], pieces[j]) if len(shared) >= 2 else None
             if union is not None:
                 pieces[i] = union
                 del pieces[j]

@@ -5,7 +5,8 @@ import pytest
 
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES, BoxSpec, box_for
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
-from nested_agents.scenarios.box_pushing.world.world import CLEARANCE, STARTS, World, place
+from nested_agents.scenarios.box_pushing.world.starts import CLEARANCE, STARTS, place
+from nested_agents.scenarios.box_pushing.world.world import World
 
 ROBOT = ROBOTS["e-puck"]
 

@@ -10,7 +10,8 @@ from nested_agents.scenarios.box_pushing.world import world as world_module
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES, box_for
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, compliance, nominal_effect
 from nested_agents.scenarios.box_pushing.world.settings import CONTROL_PERIOD
-from nested_agents.scenarios.box_pushing.world.world import World, place
+from nested_agents.scenarios.box_pushing.world.starts import place
+from nested_agents.scenarios.box_pushing.world.world import World
 
 E_PUCK = ROBOTS["e-puck"]
 FULL = 0.13

@@ -1,0 +1,174 @@
+"""Commands on published results: claims of a paper, and entries of the benchmark push-n."""
+
+import json
+from pathlib import Path
+from typing import get_args
+
+import click
+
+from ..core.plugins.words import closest
+from ..studies import catalogue
+from ..studies.api.running import run as run_study
+from ..studies.cli import options
+from ..studies.cli.display import (
+    Form,
+    in_form,
+    print_data,
+    print_table,
+    print_text,
+    print_wrapped,
+)
+from ..studies.errors import SpecError
+from ..studies.presentation.progress import Terminal, say
+from ..studies.presentation.tables import tabulate
+from ..studies.results import published
+from ..studies.store import durable
+from . import QUICK, ROWS
+from .claims import OWN, PAPERS, Format, judge, print_claims, studies_of
+from .push_n import SIZES, Entry, Given, committed_entries, load_entry, run_spec, table_of
+
+CATALOGUE = Path(catalogue.__file__).parent
+"""Where the specs of the studies are, one folder for each."""
+
+
+@click.command()
+@options.out(
+    "Run the studies that the claims rest on, each in a directory of its own below this one; "
+    "what has been run before is read."
+)
+@options.flag(
+    "--quick", "Small versions of the studies: six minutes on two cores, and wide intervals."
+)
+@click.option(
+    "--of",
+    default=OWN,
+    metavar="PAPER",
+    help="Whose claims: this paper's, or those of action-dependency-graphs (arXiv 2506.00797).",
+)
+@options.jobs
+@options.formats("table", "json", "markdown")
+def claims(out: Path | None, quick: bool, of: str, jobs: int | None, form: Format) -> int:
+    """Print one table: each claim of a paper, its measure, the result, the verdict.
+
+    Without --out the table is made from the results that are committed in the repository.
+    """
+    if of not in PAPERS:
+        raise SpecError(f"--of = {of!r}: {closest(of, PAPERS)}")
+    if out is not None:
+        results = _run(out, of, quick=quick, jobs=jobs)
+    elif quick or jobs is not None:
+        raise SpecError(
+            f"{'--quick' if quick else '--jobs'}: needs --out, where to run the studies"
+        )
+    else:
+        results = published.read(ROWS, studies_of(of))
+    for study, of_study in results.items():
+        if of_study.note:
+            say(f"{study}: {of_study.note}")
+    print_claims(judge({study: p.results for study, p in results.items()}, of), form)
+    return 0
+
+
+def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, published.Published]:
+    """Run the studies of the claims, or what is left of them; return the results by study."""
+    results = {}
+    for study in studies_of(of):
+        name = study.replace("-", "_")
+        folder = QUICK if quick else CATALOGUE / name
+        ran = run_study(folder / f"{name}.toml", out / study, jobs=jobs, observer=Terminal())
+        if ran.failed:
+            raise SpecError(
+                f"{out / study}: {len(ran.failed)} trials failed: nested-agents status "
+                f"{out / study}"
+            )
+        results[study] = published.loads(published.dumps(ran.outline, ran.results))
+    return results
+
+
+entries = click.argument("entries", type=options.PATH, metavar="ENTRY.json...", nargs=-1)
+sizes = [str(robots) for robots in SIZES]
+
+
+@click.group(no_args_is_help=False)
+def benchmark() -> None:
+    """Teams of 2 to 64 robots in fixed worlds: enter a learner, compare it with others."""
+
+
+@benchmark.command()
+@click.argument("spec", type=options.PATH, metavar="SPEC.toml")
+@options.out("Where to keep the study.", required=True)
+@click.option(
+    "--robots",
+    type=click.Choice(sizes),
+    multiple=True,
+    default=sizes[:3],
+    help="How many.",
+)
+@click.option("--seeds", type=click.IntRange(5), default=5, metavar="N", help="From seed 0 on.")
+@click.option("--name", metavar="TEXT", required=True, help="What tables call the entry.")
+@click.option("--about", metavar="TEXT", required=True, help="How it learns, in a line.")
+@click.option(
+    "--given",
+    type=click.Choice(get_args(Given)),
+    default="predictor",
+    help="What it is given of the world.",
+)
+@options.jobs
+def run(
+    spec: Path,
+    out: Path,
+    robots: tuple[str, ...],
+    seeds: int,
+    name: str,
+    about: str,
+    given: Given,
+    jobs: int | None,
+) -> int:
+    """Train and evaluate a spec by the rules.
+
+    It has one condition. Its entry is DIR/entry.json; the same command again goes on with what is
+    missing.
+    """
+    teams = run_spec(spec, out, list(dict.fromkeys(map(int, robots))), seeds, jobs)
+    entry = Entry(name=name, about=about, given=given, teams=teams)
+    text = entry.model_dump_json(indent=1)
+    durable.write(out / "entry.json", f"{text}\n".encode())
+    print_text(out / "entry.json")
+    return 0
+
+
+@benchmark.command()
+@entries
+@click.option("--schema", is_flag=True, help="Print the JSON schema of entries.")
+def check(entries: tuple[Path, ...], schema: bool) -> int:
+    """Check the rules that a file can show."""
+    if schema:
+        print_text(json.dumps(Entry.model_json_schema(), indent=1))
+    for path in entries:
+        entry = load_entry(path)
+        teams = ", ".join(f"{t.robots} robots x {len(t.success)} seeds" for t in entry.teams)
+        print_text(f"passed  {path}: {entry.name}, {teams}")
+    return 0
+
+
+@benchmark.command()
+@entries
+@click.option(
+    "--measure",
+    type=click.Choice(["success", "decisions"]),
+    default="success",
+    help="In evaluation, or of training.",
+)
+@options.form
+def table(entries: tuple[Path, ...], measure: str, form: Form) -> int:
+    """Print entries by number of robots: the committed ones, then others."""
+    compared = [*committed_entries(), *map(load_entry, entries)]
+    estimates = tabulate(table_of(compared, measure))
+    if form != "table":
+        print_data(in_form(estimates, form))
+        return 0
+    print_table(estimates)
+    print_text("")
+    for entry in compared:
+        print_wrapped(f"{entry.name}: {entry.about}; is given {entry.given}")
+    return 0

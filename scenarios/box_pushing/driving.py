@@ -1,0 +1,191 @@
+"""How a robot gets to a place by itself, around the box and clear of the other robots.
+
+Scripted controllers and options (Sutton, Precup and Singh 1999) are made of this; agents that learn
+do without. A robot searches over short sequences of its own actions. A decision costs at most
+`LONGEST_SEARCH` sequences; those that come to the same wheel speeds are followed once, and of the
+other robots only those within reach count.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from math import log, pi
+
+import numpy as np
+
+from ...core.numerics import BoolArray, FloatArray, IntArray, njit, wrap
+from .prediction.predictors import push_model
+from .scenario import BoxPushing
+from .world.geometry import surface
+from .world.robots import nominal_effect
+from .world.settings import RobotSettings
+
+CLEARANCE = 0.006
+"""Least gap [m] to box and other robots on the way to a slot."""
+LONGEST_SEARCH = 5000
+"""Action sequences tried per robot and decision, those that come to the same included."""
+
+
+class Drivers:
+    """What each robot of a team can do by itself.
+
+    Parameters
+    ----------
+    scenario
+        What is in the world, and what robots can do in a decision period.
+
+    Attributes
+    ----------
+    model
+        What is believed of the world.
+    seconds
+        The decision period [s].
+    choices
+        ``(k, w)`` the robot actions, the same of every robot.
+    wheels
+        Per robot: where its wheels stand among those of all.
+    """
+
+    def __init__(self, scenario: BoxPushing) -> None:
+        self.robot = scenario.robot
+        self.box = scenario.box
+        self.actions = scenario.action_set
+        self.model = push_model("push", list(scenario.world.robots), self.box)
+        self.increment = scenario.settings.speed_increment
+        self.seconds = scenario.settings.period
+        self.choices = _robot_actions(self.robot, len(self.actions))
+        self.wheels = [slice(group[0], group[-1] + 1) for group in scenario.groups]
+        self._effect = nominal_effect(self.robot)
+
+    def next(self, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k robot actions.
+
+        `speeds` is ``(m, w)``.
+        """
+        limit = np.full(speeds.shape[-1], self.robot.max_speed)
+        after = self.actions.apply(
+            speeds[:, None], self.choices[None], self.increment * limit, limit
+        )
+        return after, after @ self._effect[:, :-1].T + self._effect[:, -1]
+
+    def rest(self, robot: int, speeds: FloatArray) -> int:
+        """Return the robot action after which a robot's wheels are slowest."""
+        after, _ = self.next(speeds[self.wheels[robot]][None])
+        return int(np.abs(after[0]).sum(axis=1).argmin())
+
+    def drive(
+        self,
+        robot: int,
+        robots: FloatArray,
+        box: FloatArray,
+        speeds: FloatArray,
+        target: FloatArray,
+    ) -> int:
+        """Return the robot action that leads a robot towards a pose ``(3,)``.
+
+        `robots` ``(M, 3)`` and `box` ``(3,)`` are present poses, `speeds` ``(n,)`` those of all
+        wheels.
+        """
+        now = speeds[self.wheels[robot]][None]
+        depth = int(log(LONGEST_SEARCH) / log(len(self.choices)))
+        span = self.robot.radius + self.robot.radius + CLEARANCE
+        within = span + depth * self.seconds * self.robot.max_speed
+        near = np.hypot(*(robots[:, :2] - robots[robot, :2]).T) < within
+        near[robot] = False
+        others = robots[near, :2]
+        poses = robots[robot][None]
+        cost = np.zeros(1)
+        first = np.zeros(1, dtype=np.int64)
+        for level in range(depth):
+            after, twists = self.next(now)
+            row, option = np.nonzero(_distinct(after))
+            poses = poses[row]
+            cost = cost[row]
+            first = first[row] if level else option
+            now = after[row, option]
+            twists = twists[row, option]
+            for _ in range(2):
+                poses = move(poses, twists, self.seconds / 2)
+                apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
+                cost = cost + 10.0 * np.maximum(span - apart, 0.0).sum(axis=1)
+                path = paths(
+                    poses,
+                    target[:2],
+                    box,
+                    self.model.edges,
+                    self.model.rounding,
+                    self.robot.radius + CLEARANCE,
+                    self.box.reach,
+                )
+                turn = np.abs(wrap(poses[:, 2] - target[2]))
+                left = path + 0.06 * turn * np.exp(-path / 0.05)
+                cost = cost + 0.1 * left
+        return int(first[(cost + left).argmin()])
+
+
+def _distinct(speeds: FloatArray) -> BoolArray:
+    """Return which of ``(m, k, w)`` wheel speeds no earlier option gives, ``(m, k)``."""
+    by_wheel = np.ascontiguousarray(speeds.transpose(2, 0, 1))  # not to reduce along a short axis
+    same = (by_wheel[..., None] == by_wheel[:, :, None]).all(axis=0)
+    first: BoolArray = same.argmax(axis=2) == np.arange(speeds.shape[1])
+    return first
+
+
+def _robot_actions(robot: RobotSettings, n_actions: int) -> IntArray:
+    """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
+    sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
+    groups = sorted(set(sides))
+    rows = product(range(n_actions), repeat=len(groups))
+    return np.array([[row[groups.index(side)] for side in sides] for row in rows])
+
+
+def move(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:
+    """Return poses ``(m, 3)`` after moving with constant body twists ``(m, 3)``."""
+    turn = twists[:, 2] * seconds
+    middle = poses[:, 2] + turn / 2
+    chord = seconds * np.sinc(turn / (2 * pi))
+    cosine = np.cos(middle)
+    sine = np.sin(middle)
+    x = poses[:, 0] + chord * (cosine * twists[:, 0] - sine * twists[:, 1])
+    y = poses[:, 1] + chord * (sine * twists[:, 0] + cosine * twists[:, 1])
+    return np.stack([x, y, poses[:, 2] + turn], axis=1)
+
+
+@njit(cache=True)
+def paths(
+    poses: FloatArray,
+    target: FloatArray,
+    box: FloatArray,
+    edges: FloatArray,
+    rounding: float,
+    margin: float,
+    reach: float,
+) -> FloatArray:
+    """Return about how far ``(m,)`` it is from poses to a target, around the box.
+
+    Straight if all of the way keeps `margin` from the box, else along a circle around it. Standing
+    too close to the box is penalised.
+    """
+    out = np.empty(len(poses))
+    cos_, sin_ = np.cos(box[2]), np.sin(box[2])
+    tx, ty = target[0] - box[0], target[1] - box[1]
+    ring = reach + margin + 0.01
+    for i in range(len(poses)):
+        x, y = poses[i, 0] - box[0], poses[i, 1] - box[1]
+        here = surface(edges, rounding, cos_ * x + sin_ * y, cos_ * y - sin_ * x)[0]
+        near = max(margin - here, 0.0)
+        blocked = False
+        for k in range(1, 9):
+            px, py = x + (tx - x) * k / 8, y + (ty - y) * k / 8
+            gap = surface(edges, rounding, cos_ * px + sin_ * py, cos_ * py - sin_ * px)[0]
+            if gap < min(margin, here):
+                blocked = True
+                break
+        if blocked:
+            rho = np.sqrt(x * x + y * y)
+            turn = np.arctan2(x * ty - y * tx, x * tx + y * ty)
+            out[i] = ring * abs(turn) + abs(rho - ring) + abs(np.sqrt(tx * tx + ty * ty) - ring)
+        else:
+            out[i] = np.sqrt((tx - x) ** 2 + (ty - y) ** 2)
+        out[i] += 20.0 * near
+    return out

@@ -1,0 +1,307 @@
+"""Other settings of a spec, drawn at random and tried on seeds of their own.
+
+They are conditions of one ordinary study, so what has run is kept and never run again. By
+successive halving (Jamieson and Talwalkar 2016) all of them are tried on two seeds, the better half
+on four, and so on: seeds are spent on what may be best. All meet the same worlds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import reduce
+from itertools import starmap
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from ...core.numerics import pd
+from ...core.plugins.words import show
+from ..errors import SpecError
+from ..presentation.progress import Terminal, count
+from ..results.results import Results, read
+from ..spec.spec import Spec
+from ..spec.tables import TomlTable, dumps, nested, overlay
+from ..store import durable
+from ..trials.arrangement import check_conditions
+from ..trials.trial import Trial, trials_of
+from ..workers.runner import Backend, Observer
+from .running import run_study
+from .study import StudyResults, load
+
+FIRST_SEED = 10_000
+"""The smallest seed to tune on: those below it are for reports."""
+GIVEN = "given"
+"""The configuration of the spec itself."""
+CONTROLS: dict[str, TomlTable] = {
+    name: {"preset": name, "learner": {"kind": "frozen", "decision": {"rule": rule}}}
+    for name, rule in (("frozen", "value"), ("planner", "reward"))
+}
+"""What the best is compared with, as overrides of a spec."""
+USUAL: dict[str, tuple[object, ...]] = {
+    "learner.weights": ("own", "role"),
+    "learner.decision.value_of": ("own", "below", "team"),
+    "learner.decision.rule": ("value", "reward-and-value"),
+    "learner.rule_base.order": (1, 2),
+    "learner.rule_base.memberships": (5, 9),
+    "learner.discount": (0.5, 0.9, 0.97),
+    "learner.predictor.horizon": (1, 3),
+    "scenario.prediction_horizon": (12, 24, 48),
+    "learner.ridge": (0.1, 1.0, 10.0, 100.0),
+    "learner.exploration.rate": (0.1, 0.3, 0.6),
+}
+"""What is tried of a spec without a table ``[tune]``, where its learner and scenario have it."""
+BEST_FILE = "best.toml"
+TABLE_FILE = "configurations.csv"
+DRAWS = 50
+"""Draws for every configuration wanted, before those found are taken for all there are."""
+
+Point = Mapping[str, object]
+"""Values by dotted key."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What tuning found."""
+
+    best: Spec
+    """The spec with the best configuration, and its own seeds."""
+    changes: Point
+    """What that configuration lays over the spec; empty if the spec is not bettered."""
+    study: StudyResults
+    """The finalists and the controls, on all seeds."""
+    configurations: pd.DataFrame
+    """Best first: the name of each configuration, on how many seeds it was tried, its
+    mean evaluation success (or nothing) and return, and its values."""
+
+    def __str__(self) -> str:
+        return "\n".join([str(self.study.table(self.columns)), "", *self.lines])
+
+    __repr__ = __str__
+
+    @property
+    def columns(self) -> list[str]:
+        """The columns of the finalists' table that are of evaluation."""
+        return [title for title in self.study.table().titles if "evaluation" in title]
+
+    @property
+    def lines(self) -> list[str]:
+        """What was found, in lines."""
+        name, success = self.configurations.loc[0, ["name", "success"]]
+        lines = [f"Best of {len(self.configurations)} configurations: {name}"]
+        lines += [f"  {key} = {show(value)}" for key, value in self.changes.items()]
+        if success == 0.0:
+            lines.append("None of them reaches the goal in evaluation: they are ranked by return.")
+        return [
+            *lines,
+            "Its success on these seeds is flattered, as it was chosen by it.",
+            "The spec's own seeds tell how good it is.",
+        ]
+
+
+def tune(
+    spec: Spec | Mapping[str, object] | str | PathLike[str],
+    out: str | PathLike[str],
+    *,
+    trials: int = 20,
+    seeds: int = 16,
+    first_seed: int = FIRST_SEED,
+    draw: int = 0,
+    jobs: int | None = None,
+    backend: Backend = "loky",
+    address: str | None = None,
+    accept_code: bool = False,
+    progress: bool = True,
+) -> Tuning:
+    """Look for a better configuration of a spec; the same call again continues.
+
+    Parameters
+    ----------
+    spec
+        A `Spec` of one condition, a table, or the path of a TOML file. Its table ``[tune]`` has
+        lists of values by dotted key; without it, `USUAL` ones are tried.
+    out
+        Where the study of all configurations is kept, beside ``best.toml``, the spec of the best,
+        and ``configurations.csv``.
+    trials
+        Configurations to try, the spec's own among them.
+    seeds
+        On which the last ones are compared, from `first_seed` on.
+    first_seed
+        10,000 or more.
+    draw
+        Seed of the draw of configurations.
+    jobs, backend, address, accept_code
+        As those of `nested_agents.run`.
+    progress
+        Whether to show how it goes.
+
+    Raises
+    ------
+    SpecError
+        If there is nothing to tune, or it cannot be run; one line says why.
+    """
+    out = Path(out)
+    spec = Spec.read(spec, study=out)
+    _check_request(spec, trials, seeds, first_seed, draw)
+    points = _sample(spec, trials, draw)
+    study = _study(spec, points, range(first_seed, first_seed + seeds))
+    everything = trials_of(study)
+    planned = dict[str, Trial]()
+    observer = Terminal() if progress else Observer()
+    names = list(points)
+    for n_configurations, n_seeds in rungs(len(points), seeds):
+        names = names[:n_configurations]
+        wanted = {*names, GIVEN}
+        if n_seeds == seeds:
+            wanted |= CONTROLS.keys()
+        planned |= {
+            trial.identity: trial
+            for trial in everything
+            if trial.condition in wanted and trial.seed < first_seed + n_seeds
+        }
+        with run_study(
+            study,
+            out,
+            jobs=jobs,
+            backend=backend,
+            address=address,
+            accept_code=accept_code,
+            observer=observer,
+            chosen=list(planned.values()),
+        ) as store:
+            results = read(store)
+        observer.note(f"compared {count(len(names), 'configuration')} on {count(n_seeds, 'seed')}")
+        table = _table(results, points, range(first_seed, first_seed + n_seeds))
+        names = [name for name in table["name"] if name in names]
+    best = points[table["name"].iloc[0]]
+    tuned = _laid(spec, best)
+    durable.write(out / BEST_FILE, dumps(tuned.table()).encode())
+    durable.write(out / TABLE_FILE, table.to_csv(index=False).encode())
+    finalists = load(out).where(f"condition in {[GIVEN, *names, *CONTROLS]}")
+    return Tuning(tuned, best, finalists, table)
+
+
+def rungs(configurations: int, seeds: int) -> Iterator[tuple[int, int]]:
+    """Yield how many configurations are tried on how many seeds, halving the ones, doubling these.
+
+    Examples
+    --------
+    >>> list(rungs(20, 16)), list(rungs(3, 5))
+    ([(20, 2), (10, 4), (5, 8), (3, 16)], [(3, 2), (2, 4), (2, 5)])
+    """
+    n = 2
+    while n < seeds:
+        yield configurations, n
+        configurations, n = max(2, (configurations + 1) // 2), 2 * n
+    yield configurations, seeds
+
+
+def _check_request(spec: Spec, trials: int, seeds: int, first_seed: int, draw: int) -> None:
+    """Refuse numbers out of range, and specs that have nothing to tune or to compare."""
+    numbers = {
+        "trials": (trials, range(2, 10_001)),
+        "seeds": (seeds, range(2, 10_001)),
+        "first-seed": (first_seed, range(FIRST_SEED, 10**9)),
+        "draw": (draw, range(10**9)),
+    }
+    for name, (value, allowed) in numbers.items():
+        if value not in allowed:
+            raise SpecError(f"--{name} {value}: allowed {allowed[0]:,} to {allowed[-1]:,}")
+    if spec.sweep or spec.overrides:
+        raise SpecError("sweep, overrides: must be absent, tune takes a spec of one condition")
+    if spec.evaluation < 1:
+        raise SpecError("evaluation = 0: tune compares evaluation success, needs 1 or more")
+    if shared := sorted(set(spec.seeds) & set(range(first_seed, first_seed + seeds))):
+        raise SpecError(
+            f"seeds: {shared[0]} would be tuned on and reported; --first-seed tunes on others"
+        )
+
+
+def _over(table: TomlTable, point: Point) -> TomlTable:
+    """Return a table with values laid over it."""
+    return reduce(overlay, starmap(nested, point.items()), table)
+
+
+def _laid(spec: Spec, point: Point) -> Spec:
+    """Return a spec with values laid over it, and nothing left to tune."""
+    table = {key: value for key, value in spec.table().items() if key != "tune"}
+    return Spec.of(_over(table, point), spec.sources)
+
+
+def _content(spec: Spec) -> str:
+    """Return what the only condition of a spec consists of, if it can be built."""
+    check_conditions(spec)
+    return spec.conditions()[0].settings.canonical()
+
+
+def _space(spec: Spec) -> dict[str, Sequence[object]]:
+    """Return the values to draw from by key: the spec's own, or the usual ones that it may have."""
+    if spec.tune:
+        for key, values in spec.tune.items():
+            for value in values:
+                _laid(spec, {key: value})  # refuses what no configuration can have
+        return dict(spec.tune)
+    with spec.sources.active():
+        scenario = spec.conditions()[0].settings.scenario.build()
+    usual = dict(USUAL)
+    if len({*scenario.roles}) == len(scenario.agents):
+        del usual["learner.weights"]  # nobody shares a role
+    possible = dict[str, Sequence[object]]()
+    for key, values in usual.items():
+        for value in values:
+            with suppress(SpecError):
+                _content(_laid(spec, {key: value}))
+                possible[key] = [*possible.get(key, ()), value]
+    return possible
+
+
+def _sample(spec: Spec, trials: int, draw: int) -> dict[str, Point]:
+    """Return distinct configurations that can be built, by name; the spec's own is the first."""
+    space = _space(spec)
+    rng = np.random.default_rng(draw)
+    problem = "all are the spec's own"
+    points: dict[str, Point] = {_content(spec): {}}
+    tried = set[str]()
+    for _ in range(DRAWS * trials):
+        point = {key: values[int(rng.integers(len(values)))] for key, values in space.items()}
+        if len(points) < trials and repr(point) not in tried:
+            tried.add(repr(point))
+            try:
+                points.setdefault(_content(_laid(spec, point)), point)
+            except SpecError as error:
+                problem = str(error)
+    if len(points) == 1:
+        raise SpecError(f"tune: there is nothing to try: {problem}")
+    return {f"c{i:02}" if i else GIVEN: point for i, point in enumerate(points.values())}
+
+
+def _study(spec: Spec, points: Mapping[str, Point], seeds: Iterable[int]) -> Spec:
+    """Return the study of all configurations and of the controls that the scenario allows."""
+    left_out = ("tune", "evaluations", "keep_teams")
+    base = {key: value for key, value in spec.table().items() if key not in left_out}
+    base |= {"study": "learning-curve", "seeds": list(seeds)}
+    overrides = [_over({"name": name}, point) for name, point in points.items()]
+    for name, table in CONTROLS.items():
+        control = {"name": name, **table}
+        with suppress(SpecError):  # if no rewards are predicted
+            check_conditions(Spec.of({**base, "overrides": [control]}, spec.sources))
+            overrides.append(control)
+    return Spec.of({**base, "overrides": overrides}, spec.sources)
+
+
+def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) -> pd.DataFrame:
+    """Return the data frame of all configurations: those of most of the seeds first, then by score.
+
+    The score is the mean evaluation success, 0 where it is not measured, then the return.
+    """
+    episodes = results.episodes.query("phase == 'evaluation' and seed in @seeds")
+    by_name = episodes.groupby("condition")
+    means = by_name[["success", "return"]].mean().astype(float).fillna({"success": 0.0})
+    means.insert(0, "seeds", by_name["seed"].nunique())
+    lines = pd.DataFrame({"name": list(points)}).join(means, on="name").fillna({"seeds": 0})
+    values = pd.DataFrame(list(points.values()), dtype=object)
+    table = lines.astype({"seeds": int}).join(values).astype(object)
+    return table.sort_values(list(means), ascending=False, ignore_index=True)

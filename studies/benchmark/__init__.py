@@ -1,1 +1,0 @@
-"""The benchmark push-n: its entries, and how learners are entered."""

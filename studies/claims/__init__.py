@@ -1,1 +1,0 @@
-"""The claims of the paper, and the verdicts on them."""

@@ -1,0 +1,154 @@
+"""Values of a JSON file of somebody else, each with the key under which it stands.
+
+What a value is asked to be, it is; or `ValueError` names the key, the value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator
+from itertools import chain
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.plugins.words import show
+
+MOST_WHOLE = 2**53
+"""Up to here a float holds every whole number."""
+LARGEST = {"i": MOST_WHOLE, "u": MOST_WHOLE, "f": np.finfo(float).max}
+"""The largest value of an array, by the kind of its numbers."""
+
+
+class JsonValue(NamedTuple):
+    """A value with its key.
+
+    Examples
+    --------
+    >>> value = parse('{"runs": [{"steps": 3}, {"steps": "3"}]}')
+    >>> first, second = value.child("runs").items()
+    >>> first.child("steps").whole()
+    3
+    >>> second.child("steps").whole()
+    Traceback (most recent call last):
+    ...
+    ValueError: runs[1].steps = '3': must be a whole number from 0 to 9007199254740992
+    """
+
+    content: Any
+    """As `json` reads it."""
+    key: str = ""
+    """Where it stands in the file; empty for the whole of it."""
+
+    def refusal(self, allowed: str) -> ValueError:
+        """Return the error that says what it is, and what is allowed."""
+        return ValueError(f"{self.key or 'the file'} = {show(self.content)}: must be {allowed}")
+
+    def table(self) -> dict[str, JsonValue]:
+        """Return its values by name."""
+        if not isinstance(self.content, dict):
+            raise self.refusal("a table")
+        before = f"{self.key}." if self.key else ""
+        return {name: JsonValue(own, f"{before}{name}") for name, own in self.content.items()}
+
+    def child(self, name: str) -> JsonValue:
+        """Return its value of a name that it must have."""
+        own = self.table()
+        if name not in own:
+            raise ValueError(f"{self.key + '.' if self.key else ''}{name}: is missing")
+        return own[name]
+
+    def items(self) -> list[JsonValue]:
+        """Return its values one by one."""
+        if not isinstance(self.content, list):
+            raise self.refusal("a list")
+        return [JsonValue(own, f"{self.key}[{i}]") for i, own in enumerate(self.content)]
+
+    def text(self, allowed: Iterable[str] = ()) -> str:
+        """Return the text that it is, one of those `allowed` if there are such."""
+        known = list(allowed)
+        if not isinstance(self.content, str):
+            raise self.refusal("text")
+        if known and self.content not in known:
+            raise self.refusal(f"one of {', '.join(known)}")
+        return self.content
+
+    def flag(self) -> bool:
+        """Return whether it is true."""
+        if not isinstance(self.content, bool):
+            raise self.refusal("true or false")
+        return self.content
+
+    def whole(self, least: int = 0, most: int = MOST_WHOLE) -> int:
+        """Return the whole number that it is."""
+        content = self.content
+        is_whole = isinstance(content, int) and not isinstance(content, bool)
+        if not is_whole or not least <= content <= most:
+            raise self.refusal(f"a whole number from {least} to {most}")
+        return int(content)
+
+    def number(self) -> float:
+        """Return the finite number that it is; a whole one as it is."""
+        content = self.content
+        if isinstance(content, bool) or not isinstance(content, int | float):
+            raise self.refusal("a finite number")
+        if (isinstance(content, int) and abs(content) > MOST_WHOLE) or not math.isfinite(content):
+            raise self.refusal("a finite number")
+        return content
+
+    def array(self, dimensions: int) -> NDArray[Any]:
+        """Return lists in lists of finite numbers, rows of equal length, as an array."""
+        rows = self.content
+        flat = [rows]
+        for _ in range(dimensions):
+            if not all(isinstance(part, list) for part in flat):
+                self._refuse_part(dimensions)
+            flat = list(chain.from_iterable(flat))
+        if not set(map(type, flat)) <= {int, float}:
+            self._refuse_part(dimensions)
+        try:
+            array = np.array(rows)
+        except ValueError:
+            raise self.refusal("rows of equal length") from None
+        # A whole number beyond those of a machine makes an array of objects.
+        if array.dtype == object or not (abs(array) <= LARGEST[array.dtype.kind]).all():
+            self._refuse_part(dimensions)
+        return array
+
+    def _refuse_part(self, dimensions: int) -> NoReturn:
+        """Name the first of the values in lists in lists that is no finite number."""
+        values = [self]
+        for _ in range(dimensions):
+            values = [item for value in values for item in value.items()]
+        for value in values:
+            value.number()
+        raise self.refusal("finite numbers")
+
+
+def parse(text: str) -> JsonValue:
+    """Return what a text of JSON says.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        If it is no JSON, or a table has a key twice.
+    """
+    return JsonValue(json.loads(text, object_pairs_hook=_table))
+
+
+def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        names = _repeated(name for name, _ in pairs)
+        raise ValueError(f"{next(names)}: stands twice in a table")
+    return table
+
+
+def _repeated(names: Iterable[str]) -> Iterator[str]:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            yield name
+        seen.add(name)

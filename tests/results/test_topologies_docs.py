@@ -1,0 +1,127 @@
+"""docs/topologies.md holds the tables that the committed results give."""
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from published_tables import print_table
+
+import nested_agents as na
+from nested_agents.results import ROWS
+from nested_agents.studies.catalogue.chain_order import equivalence
+from nested_agents.studies.presentation.tables import Cell
+from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.statistics import two_figures
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "topologies.md"
+EDGES = ("evaluation success", "decisions to goal", "decision [ms]", "messages")
+
+
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("hierarchies", ("evaluation success", "decision [ms]", "messages")),
+        ("edges", EDGES),
+    ],
+)
+def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    table = print_table(name, columns, capsys)
+    assert table in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: put in\n{table}"
+
+
+EVALUATED_AS = (
+    "as trained", "told only", "considered only", "considered only, private plans",
+    "considered only, common plan", "neither",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["edges-hierarchies", "edges-arms", "edges-games"])
+def test_tables_with_a_column_for_each_evaluation(name: str, capsys) -> None:
+    lines = print_table(name, ["evaluation success"], capsys).splitlines()[2:]
+    success = {label: value for label, _, value in (line[2:-2].split(" | ") for line in lines)}
+    rows = [label.removesuffix(", neither") for label in success if label.endswith(", neither")]
+    for row in rows:
+        line = " | ".join([row, *(success[f"{row}, {how}"] for how in EVALUATED_AS)])
+        assert f"| {line} |" in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+
+
+def test_the_table_of_classes_of_edges(capsys) -> None:
+    columns = ("evaluation success", "decisions to goal", "messages")
+    for line in print_table("edges-classes", columns, capsys).splitlines()[2:]:
+        label, _, *values = line[2:-2].split(" | ")
+        row = " | ".join([label.removeprefix("default, "), *values])
+        assert f"| {row} |" in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {row}"
+
+
+def test_the_tables_of_broken_hierarchies(capsys) -> None:
+    lines = print_table("edges-broken", ["evaluation success"], capsys).splitlines()[2:]
+    success = {label: value for label, _, value in (line[2:-2].split(" | ") for line in lines)}
+    others = (
+        "as trained", "lost .9, common plan", "delayed by 1", "noisy .3", "leader silent",
+        "leader absent",
+    )  # fmt: skip
+    for trained in ("chain", "tree:2", "teams"):
+        rows = [[trained, *(success[f"{trained}, {other}"] for other in others)]]
+        for read in ("maintain", "last", "plan"):
+            lost = [success[f"{trained}, lost {p}, {read}"] for p in ("0", ".3", ".6", ".9")]
+            rows.append([f"{trained}, {read}", *lost])
+        for row in rows:
+            line = f"| {' | '.join(row)} |"
+            assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+
+
+@pytest.mark.parametrize(
+    ("names", "task"),
+    [
+        (("orders-boxes",), "boxes, 2 robots"),
+        (("orders-arm", "orders-arm-ppo"), "arm of 4 joints"),
+        (("orders-game", "orders-game-ppo"), "climbing, 3 agents"),
+        (("orders-line", "orders-line-ppo"), "game on a line, 8 agents"),
+        (("orders-line-again",), "the same, seeds 40 to 79"),
+    ],
+)
+def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
+    for name in names:
+        for group in contrasts(na.load(ROWS / f"{name}.json").results, by="topology").groups:
+            rates = [line.estimates["success"].value for line in group.table]
+            learner, orders, verdict, ends = re.findall(
+                r"(.+), (\d+) orders, within 0.1: (.+) \((.+)\)", equivalence(group)
+            )[0]
+            rates = f"{two_figures(min(rates))} to {two_figures(max(rates))}"
+            cells = task, learner, orders, str(group.table[0].seeds), rates, ends, verdict
+            line = f"| {' | '.join(cells)} |"
+            assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+
+
+def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
+    fitted, ppo = (
+        contrasts(na.load(ROWS / f"orders-line{own}.json").results, by="topology").table
+        for own in ("", "-ppo")
+    )
+    for own, other in zip(fitted, ppo, strict=True):
+        order = re.findall(r"agent(\d)", own.condition) or "12345678"
+        order = order[::-1] if own.condition.endswith("reversed") else order
+        heard = sum(abs(int(a) - int(b)) == 1 for a, b in pairwise(order))
+        rates = [Cell.of(line.estimates["success"]).bracketed(" ") for line in (own, other)]
+        line = f"| {' '.join(order)} | {heard} | {' | '.join(rates)} |"
+        assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+
+
+@pytest.mark.slow
+def test_kept_teams_are_evaluated_again_as_it_says(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    studies = PAGE.with_name("studies.md").read_text(encoding="utf-8")
+    pages = PAGE.read_text(encoding="utf-8") + studies.replace("out/mine", "out/kept")
+    blocks = re.findall(r"```python\n(.*?)```", pages, re.DOTALL)
+    (again,) = [block for block in blocks if "na.reevaluate" in block]
+    (acting,) = [block for block in blocks if "study.team" in block]
+    small = {"seeds=4": "seeds=2", "episodes=6": "episodes=1", "steps=150": "steps=6"}
+    for large, less in small.items():
+        again = again.replace(large, less)
+    exec(again, {"__name__": "__main__"})
+    assert re.findall(r"^(\S.*?)  ", capsys.readouterr().out, re.MULTILINE) == [
+        "chain", "tree:2", "{told = 'none'}",
+    ]  # fmt: skip
+    exec(acting, {"na": na})
+    assert capsys.readouterr().out.startswith("[")
