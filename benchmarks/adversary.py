@@ -6,7 +6,7 @@ Campaigns, each drawn from a seed:
   continues, and what it ends with must be equal byte by byte. Trials run in the process of the
   command and take no time, so that a hundred kills do not take an hour; `benchmarks.crashes` kills
   real workers;
-- *kills of others*: export, report, retry and watch are killed. What they have written is whole or
+- *kills of others*: export, report and retry are killed. What they have written is whole or
   not there; the study is as it was, or the same command goes on, with the same end;
 - *flips*: one bit of one file of a finished study is flipped. Commands that read, and Python that
   loads a trained team, must give what they gave before, or name the file; a run must end with the
@@ -54,8 +54,9 @@ from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store import durable
 from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.store.store import LOCK, Store
+from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
-from nested_agents.studies.trials.session import check, run_trial
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.runner import Outcome, RunTrial, save
 
@@ -70,7 +71,7 @@ TEAM = "na.load(...).team()"
 """No command: what a user reads in Python."""
 LINES = (
     "results --format csv", "status", "table --format csv", "compare", "compare --statistics",
-    "watch --once", "report", "export", TEAM,
+    "report", "export", TEAM,
 )  # fmt: skip
 """The commands that read."""
 SLOW, BLOCKED = 10.0, 60.0
@@ -83,7 +84,7 @@ Answer = tuple[int, str, str]
 @cache
 def _run_once() -> tuple[tuple[Measure, ...], tuple[Trial, ...], dict[str, TrialResult]]:
     """Return what the study measures, its trials, and by identity what they measured."""
-    measures, trials = check(SPEC), trials_of(SPEC)
+    measures, trials = check_conditions(SPEC), trials_of(SPEC)
     return measures, trials, {trial.identity: run_trial(trial) for trial in trials}
 
 
@@ -250,11 +251,10 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
         """Return a command on a fresh copy of the study, which it writes beside."""
         shutil.copytree(failed if name == "retry" else adversary.sound, place / "study")
         out = ["--out", str(place / "page.html" if name == "report" else place / "out")]
-        options = {"watch": ["--once"], "retry": []}
-        return [name, str(place / "study"), *options.get(name, out)]
+        return [name, str(place / "study"), *([] if name == "retry" else out)]
 
     whole: dict[str, tuple[float, dict[str, bytes]]] = {}
-    for name in ("export", "report", "retry", "watch"):
+    for name in ("export", "report", "retry"):
         command, begin = line(name, folder / "whole" / name), time.monotonic()
         assert _wait(_child(command)) == 0, name
         whole[name] = time.monotonic() - begin, _written(folder / "whole" / name)
@@ -593,7 +593,7 @@ def main() -> int:
     durable.os.fsync = lambda _: None  # type: ignore[attr-defined]  # no power fails here
     campaigns: dict[str, Callable[[random.Random, Path], Counter[str]]] = {
         "kill -9": lambda rng, folder: kills(options.kills, rng, folder),
-        "kill -9 of export, report, retry, watch": lambda rng, folder: kills_of_others(
+        "kill -9 of export, report, retry": lambda rng, folder: kills_of_others(
             options.others, rng, folder
         ),
         "flipped bits": lambda rng, folder: flips(options.flips, rng, folder),
@@ -611,7 +611,7 @@ def main() -> int:
     if not options.flips:
         del campaigns["flipped bits"], campaigns["files cut short, folders in their place"]
     if not options.others:
-        del campaigns["kill -9 of export, report, retry, watch"]
+        del campaigns["kill -9 of export, report, retry"]
     if not options.scenarios:
         del campaigns["scenarios that misbehave"]
     if not options.hostile:

@@ -98,7 +98,7 @@ STUDIES: dict[str, tuple[int, Mapping[str, Any]]] = {
     ),
 }  # fmt: skip
 PLAN = (
-    "import sys; from nested_agents.studies.api.running import plan; "
+    "import sys; from nested_agents.studies.api.planning import plan; "
     "print(*plan(sys.argv[1], jobs=int(sys.argv[2])).seconds)"
 )
 

@@ -80,11 +80,12 @@ MODULES = {
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.running", "api.alternatives", "api.recovery",
+        "api.study", "api.comparison", "api.replay", "api.running", "api.planning",
+        "api.tuning", "api.reevaluation", "api.recovery",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.power", "results.contrasts", "results.published", "catalogue.study",
-        "cost.cost", "cost.table",
+        "results.power", "results.contrasts", "results.aggregates", "results.published",
+        "catalogue.study", "cost.cost", "cost.table",
     )),
     "results": ("What has been published, and what is said of it.", (
         "claims", "measures", "push_n",

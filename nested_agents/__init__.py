@@ -15,8 +15,8 @@ Two e-Pucks, their four wheels in a chain, learning by the default settings:
 [0, 1, 2]
 """
 
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 __version__: str
@@ -79,15 +79,15 @@ _PLACES = {
     "greatest": ("core.numerics", "greatest"),
     "load": ("studies.api.study", "load"),
     "parse_topology": ("topologies", "parse"),
-    "plan": ("studies.api.running", "plan"),
+    "plan": ("studies.api.planning", "plan"),
     "policy_seed": ("core.agents.loop", "policy_seed"),
     "power": ("studies.results.power", "power"),
     "rate": ("studies.results.statistics", "rate"),
-    "reevaluate": ("studies.api.alternatives", "reevaluate"),
-    "run": ("studies.api.study", "run"),
+    "reevaluate": ("studies.api.reevaluation", "reevaluate"),
+    "run": ("studies.api.running", "run"),
     "run_trial": ("studies.trials.session", "run_trial"),
     "seeds_for": ("studies.results.power", "seeds_for"),
-    "tune": ("studies.api.alternatives", "tune"),
+    "tune": ("studies.api.tuning", "tune"),
     "state_variable": ("scenarios.state_variables", "state_variable"),
 }
 
@@ -102,7 +102,7 @@ def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, attribute = _PLACES[name]
-    return getattr(import_module(f".{module}", __name__), attribute)
+    return resolve_name(f"{__name__}.{module}:{attribute}")
 
 
 def __dir__() -> list[str]:

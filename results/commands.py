@@ -8,9 +8,16 @@ import click
 
 from ..core.plugins.settings import closest
 from ..studies import catalogue
-from ..studies.api.study import run as run_study
+from ..studies.api.running import run as run_study
 from ..studies.cli import options
-from ..studies.cli.display import print_table, print_wrapped
+from ..studies.cli.display import (
+    Form,
+    in_form,
+    print_data,
+    print_table,
+    print_text,
+    print_wrapped,
+)
 from ..studies.errors import SpecError
 from ..studies.presentation.progress import Terminal, say
 from ..studies.presentation.tables import tabulate
@@ -79,9 +86,7 @@ def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, publ
 
 
 entries = click.argument("entries", type=options.PATH, metavar="ENTRY.json...", nargs=-1)
-sizes = click.Choice([str(robots) for robots in SIZES])
-given = click.Choice(get_args(Given))
-measures = click.Choice(["success", "decisions"])
+sizes = [str(robots) for robots in SIZES]
 
 
 @click.group(no_args_is_help=False)
@@ -92,11 +97,22 @@ def benchmark() -> None:
 @benchmark.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.out("Where to keep the study.", required=True)
-@click.option("--robots", type=sizes, multiple=True, default=["2", "4", "8"], help="How many.")
+@click.option(
+    "--robots",
+    type=click.Choice(sizes),
+    multiple=True,
+    default=sizes[:3],
+    help="How many.",
+)
 @click.option("--seeds", type=click.IntRange(5), default=5, metavar="N", help="From seed 0 on.")
 @click.option("--name", metavar="TEXT", required=True, help="What tables call the entry.")
 @click.option("--about", metavar="TEXT", required=True, help="How it learns, in a line.")
-@click.option("--given", type=given, default="predictor", help="What it is given of the world.")
+@click.option(
+    "--given",
+    type=click.Choice(get_args(Given)),
+    default="predictor",
+    help="What it is given of the world.",
+)
 @options.jobs
 def run(
     spec: Path,
@@ -105,7 +121,7 @@ def run(
     seeds: int,
     name: str,
     about: str,
-    given: str,
+    given: Given,
     jobs: int | None,
 ) -> int:
     """Train and evaluate a spec by the rules.
@@ -117,7 +133,7 @@ def run(
     entry = Entry(name=name, about=about, given=given, teams=teams)
     text = entry.model_dump_json(indent=1)
     durable.write(out / "entry.json", f"{text}\n".encode())
-    print(out / "entry.json")
+    print_text(out / "entry.json")
     return 0
 
 
@@ -127,27 +143,32 @@ def run(
 def check(entries: tuple[Path, ...], schema: bool) -> int:
     """Check the rules that a file can show."""
     if schema:
-        print(json.dumps(Entry.model_json_schema(), indent=1))
+        print_text(json.dumps(Entry.model_json_schema(), indent=1))
     for path in entries:
         entry = load_entry(path)
         teams = ", ".join(f"{t.robots} robots x {len(t.success)} seeds" for t in entry.teams)
-        print(f"passed  {path}: {entry.name}, {teams}")
+        print_text(f"passed  {path}: {entry.name}, {teams}")
     return 0
 
 
 @benchmark.command()
 @entries
-@click.option("--measure", type=measures, default="success", help="In evaluation, or of training.")
+@click.option(
+    "--measure",
+    type=click.Choice(["success", "decisions"]),
+    default="success",
+    help="In evaluation, or of training.",
+)
 @options.form
-def table(entries: tuple[Path, ...], measure: str, form: str) -> int:
+def table(entries: tuple[Path, ...], measure: str, form: Form) -> int:
     """Print entries by number of robots: the committed ones, then others."""
     compared = [*committed_entries(), *map(load_entry, entries)]
-    printed = tabulate(table_of(compared, measure))
+    estimates = tabulate(table_of(compared, measure))
     if form != "table":
-        print(getattr(printed, form), end="")
+        print_data(in_form(estimates, form))
         return 0
-    print_table(printed)
-    print()
+    print_table(estimates)
+    print_text("")
     for entry in compared:
         print_wrapped(f"{entry.name}: {entry.about}; is given {entry.given}")
     return 0

@@ -26,7 +26,7 @@ from ..core.agents.loop import world_seed
 from ..core.numerics import FloatArray
 from ..core.plugins.settings import Settings, tuples
 from ..scenarios.box_pushing.config import BoxPushingSettings
-from ..studies.api.study import run
+from ..studies.api.running import run
 from ..studies.errors import SpecError
 from ..studies.results import published
 from ..studies.results.analysis import Summary

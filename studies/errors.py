@@ -1,5 +1,6 @@
 """What is wrong with something that the user can mend, in one line to act on."""
 
+import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from decimal import Decimal
@@ -17,9 +18,30 @@ class SpecError(ValueError):
         line = " ".join(message.split())
         if len(line) > LONGEST:
             line = f"{line[: LONGEST // 2]} ... {line[-LONGEST // 4 :]}"
-        # A terminal obeys control characters, and cannot write half of a surrogate pair.
-        shown = (c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
-        super().__init__("".join(shown))
+        super().__init__(printable(line))
+
+
+def printable(text: str) -> str:
+    r"""Return text in which what a terminal obeys is written out: nothing of it is an order.
+
+    These are control characters, such as those of colours and of the cursor, but for line feeds and
+    tabs; marks that reverse the direction of writing; and halves of surrogate pairs, which cannot
+    be written.
+
+    Examples
+    --------
+    >>> print(printable("plain\N{NO-BREAK SPACE}text, \x1b[31mred, \u202edesrever\r"))
+    plain\xa0text, \x1b[31mred, \u202edesrever\r
+    """
+    if text.isprintable():
+        return text
+    return "".join(map(_written_out, text))
+
+
+def _written_out(character: str) -> str:
+    if character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs":
+        return character
+    return character.encode("unicode_escape").decode("ascii")
 
 
 @contextmanager

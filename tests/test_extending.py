@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation
-from nested_agents.studies.api.study import run
+from nested_agents.studies.api.running import run
 from nested_agents.studies.cli.main import main
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "extending.md"

@@ -19,6 +19,7 @@ from ..evaluators.evaluator import (
     DecisionProblem,
     Deliberation,
     Evaluator,
+    ValueOf,
     concerned,
 )
 from ..hierarchy.hierarchy import Hierarchy
@@ -145,6 +146,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         decision = settings.decision
         if decision.rule == "random":
             return None
+        members = set(self.members.tolist())
+        first = next(agent for agent in self.hierarchy.order if agent in members)
         problem = DecisionProblem(
             rules=self.rules,
             hierarchy=self.hierarchy,
@@ -157,19 +160,25 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             unseen=decision.unseen,
             plan=decision.plan,
             handed_down=self.hierarchy.told == "ancestors" and not placement.messages_fail,
+            first=first,
         )
-        own = set(self.members.tolist())
-        for agent in own if decision.rule != "reward" else ():
-            others = set(concerned(self.hierarchy, decision.value_of)[agent].tolist()) - own
-            if others:
-                raise ValueError(
-                    f"learner.decision.value_of = {decision.value_of!r}: values of "
-                    f"{self.hierarchy.agents[min(others)]!r} are not known to "
-                    f"{self.hierarchy.agents[agent]!r}, who is of another part; use 'own'"
-                )
+        if decision.rule != "reward" and not placement.is_whole:
+            self._check_values(decision.value_of)
         if isinstance(self.learner, Evaluator):
             return self.learner
         return as_evaluator(decision.evaluator.build(problem))
+
+    def _check_values(self, value_of: ValueOf) -> None:
+        """Refuse to decide by values of agents of other parts, whose weights nobody knows."""
+        own = set(self.members.tolist())
+        agents = self.hierarchy.agents
+        whose = concerned(self.hierarchy, value_of)
+        for agent in own:
+            for other in sorted(set(whose[agent].tolist()) - own):
+                raise ValueError(
+                    f"learner.decision.value_of = {value_of!r}: values of {agents[other]!r} are "
+                    f"not known to {agents[agent]!r}, who is of another part; use 'own'"
+                )
 
     @property
     def counts(self) -> Counts:

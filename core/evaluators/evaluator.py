@@ -126,6 +126,8 @@ class DecisionProblem:
     """Who makes a plan."""
     handed_down: bool = True
     """Whether all that is told arrives, so that a plan may be told, too."""
+    first: int | None = None
+    """Who of those agents decides first; none: the first of the hierarchy."""
 
 
 class EvaluatorSettings(PartSettings):
@@ -202,8 +204,8 @@ class Aggregation(Evaluator):
     def begins(self, deliberation: Deliberation) -> bool:
         """Return whether a decision of the team begins with this one's; it is asked of each."""
         before, self._prediction = self._prediction, deliberation.prediction
-        first = deliberation.agent == self.hierarchy.order[0]
-        return first or before is not deliberation.prediction
+        first = self.hierarchy.order[0] if self.problem.first is None else self.problem.first
+        return deliberation.agent == first or before is not deliberation.prediction
 
     def count(self, agent: int, joint_actions: int) -> None:
         """Note that joint actions have been tried: valued by each agent concerned, or rewarded."""

@@ -34,7 +34,7 @@ from ..plugins.registry import Plugged
 from ..plugins.settings import Positive
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
-from .batch import BatchTD, Function, add_gram, row_values, solver
+from .batch import BatchTD, Earlier, Function, add_gram, row_values, solver
 from .learner import LearnerSettings
 
 NOBODY = "nobody"
@@ -189,10 +189,14 @@ class FittedQ(BatchTD, Evaluator):
         taken, strengths = self._active[row][0][new], self._active[row][1][new]
         self._gram[row] *= kept
         self._weights[row] = np.append(kept * self._weights[row], known[new])
-        for action, gram in enumerate(self._gram[row]):
-            weights = known[new] * (taken[:, 0] % self._n_actions == action)
-            add_gram(gram, taken // self._n_actions, strengths, weights)
+        self._add(row, taken, strengths, known[new])
         return self._gram[row], np.append(self._weights[row], np.zeros(len(known) - end))
+
+    def _add(self, row: int, taken: IntArray, strengths: FloatArray, weights: FloatArray) -> None:
+        """Add phi phi' of weighted decisions to the sums of a row, each to that of its action."""
+        for action, gram in enumerate(self._gram[row]):
+            of_action = weights * (taken[:, 0] % self._n_actions == action)
+            add_gram(gram, taken // self._n_actions, strengths, of_action)
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights, all experience, and its sums."""
@@ -209,17 +213,67 @@ class FittedQ(BatchTD, Evaluator):
     def continue_from(self, former: Self, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way.
 
+        Agents may be told by another number of others: see `carried_weights` and `_with_told`.
+
         Raises
         ------
         ValueError
-            If the agents are told by another number of others; one line.
+            If the values of the others are no sum of these rules; one line.
         """
-        if former.rules.n_rules != self.rules.n_rules:
-            fewer = len(self.rules.partitions) - len(former.rules.partitions)
-            raise ValueError(
-                f"topology: an agent is told by {abs(fewer)} {'more' if fewer > 0 else 'fewer'} "
-                "others than when it learned what to make of it; allowed: as many"
-            )
         super().continue_from(former, rows)
-        self._gram = former._gram[rows]
         self._weights = [former._weights[row].copy() for row in rows]
+        if former.rules.n_rules == self.rules.n_rules:
+            self._gram = former._gram[rows]
+            return
+        self.theta = carried_weights(former.rules, self.rules, self.theta)
+        self._earlier = [
+            earlier._replace(states=self._with_told(earlier)) for earlier in self._earlier
+        ]
+        for row, earlier in enumerate(self._earlier):
+            held = len(self._weights[row])
+            taken, strengths = self._active_of(earlier.states[:held])
+            self._add(row, taken, strengths, self._weights[row])
+
+    def _with_told(self, earlier: Earlier) -> FloatArray:
+        """Return decisions as they are known here: told by fewer others, or by nobody else."""
+        states = earlier.states
+        missing = max(len(self.rules.partitions) - states.shape[1], 0)
+        known = states[:, : len(self.rules.partitions) - 1 - missing]
+        nobody = np.full((len(states), missing), float(self._n_actions))
+        return np.hstack([known, nobody, states[:, -1:]])
+
+
+def carried_weights(former: RuleBase, rules: RuleBase, theta: FloatArray) -> FloatArray:
+    """Return the weights ``(k, n_rules)`` by which rules have the values of others ``(k, n)``.
+
+    Variables are the same, but for the last of those that are told. Where rules are of one that
+    there was not, it says nothing. One that there is no more is told ``nobody``.
+
+    Raises
+    ------
+    ValueError
+        If a product of variables that is left is none of these rules.
+    """
+    shared = min(len(former.partitions), len(rules.partitions)) - 1
+    own = len(rules.partitions) - 1
+    blocks = np.split(theta, np.cumsum(former.sizes)[:-1], axis=1)
+    shapes = [[rules.partitions[j].size for j in term] for term in rules.terms]
+    carried = [np.zeros((len(theta), *shape), theta.dtype) for shape in shapes]
+    for term, block in zip(former.terms, blocks, strict=True):
+        *known, _ = term
+        tensor = block.reshape(len(theta), *(former.partitions[j].size for j in term))
+        tensor = tensor[(..., *(slice(None) if j < shared else -1 for j in known), slice(None))]
+        kept = [j for j in known if j < shared] + [own]
+        into = [k for k, other in enumerate(rules.terms) if set(kept) <= set(other)]
+        if not into:
+            raise ValueError(
+                "learner.rule_base: an agent is told by fewer others than when it learned, and "
+                "has no rules over what is left of its products"
+            )
+        place = next((k for k in into if len(rules.terms[k]) == len(kept)), into[0])
+        wide = [
+            size if j in kept else 1
+            for j, size in zip(rules.terms[place], shapes[place], strict=True)
+        ]
+        carried[place] += tensor.reshape(len(theta), *wide)
+    return np.concatenate([block.reshape(len(theta), -1) for block in carried], axis=1)

@@ -10,13 +10,15 @@ from gymnasium.spaces import Discrete
 from stable_baselines3 import DQN
 
 from ..hierarchy.turns import Turn
-from ..interface.agents import Agents, Memory, Placement
+from ..interface.agents import Agents, Counts, Memory, Placement
 from ..interface.experience import Experience, Observation
+from ..interface.scenario import Scenario
 from ..numerics import AnyArray, FloatArray, IntArray, set_words, words_of
 from .inputs import Inputs, RewardScale
 from .settings import DQNSettings
 from .training import (
     Layers,
+    bytes_of,
     drawing_from,
     moments_of,
     prepare,
@@ -56,14 +58,15 @@ class DeepQ(Agents[ValueInputs]):
 
     def __init__(self, settings: DQNSettings, placement: Placement) -> None:
         scenario = placement.scenario
-        if len(scenario.agents) > 1:
+        if len(placement.members) > 1:
             raise ValueError(
-                f"learner.kind = 'dqn': acts for one agent, there are {len(scenario.agents)}; "
+                f"learner.kind = 'dqn': acts for one agent, there are {len(placement.members)}; "
                 "use agents = 'team'"
             )
         self.rng = np.random.Generator(np.random.PCG64(placement.seed))
         self._settings = settings
         self._scenario = scenario
+        self._members = placement.members
         self._inputs = Inputs(scenario)
         self._n_actions = len(scenario.action_set)
         model = DQN(
@@ -80,6 +83,7 @@ class DeepQ(Agents[ValueInputs]):
         prepare(model, self._inputs.n_joint, Discrete(self._n_actions), 1, self.rng)
         self._model = model
         self._decisions = 0
+        self._counts = Counts()
         self._q = Layers([model.q_net], lambda sums: np.maximum(sums, 0.0))
         self._rewards = RewardScale(settings.discount, 1)
 
@@ -90,6 +94,16 @@ class DeepQ(Agents[ValueInputs]):
         share = min(1.0, self._decisions / s.exploration_decisions)
         return s.exploration_begin + share * (s.exploration_end - s.exploration_begin)
 
+    @property
+    def counts(self) -> Counts:
+        """What it has evaluated so far: all its actions, unless one was drawn."""
+        return self._counts
+
+    @property
+    def weight_bytes(self) -> int:
+        """How much memory the weights of the network and its target take."""
+        return bytes_of(self._model.policy)
+
     def perceive(self, seen: Observation, *, explore: bool) -> ValueInputs:
         """Return all states."""
         return ValueInputs(self._inputs.joint(seen.present)[None].astype(np.float32), explore)
@@ -98,15 +112,18 @@ class DeepQ(Agents[ValueInputs]):
         """Return the action ``(1,)`` of the greatest value, or a random one."""
         if inputs.explore and self.rng.random() < self.exploration_rate:
             return np.array([int(self.rng.integers(self._n_actions))])
+        self._counts.joint_actions += self._n_actions
         return np.array([int(self._q(inputs.seen).argmax())])
 
     def learn(self, experience: Experience, inputs: ValueInputs) -> None:
         """Keep the step; update the network and its target when they are due."""
         transition = experience.transition
         entered = self._inputs.joint(transition.states)[None].astype(np.float32)
-        reward = self._rewards.scaled(np.array([np.mean(transition.reward)]))
+        own = np.asarray(transition.reward)
+        own = own[self._members] if own.ndim else own
+        reward = self._rewards.scaled(np.array([np.mean(own)]))
         done = np.array([float(transition.terminated)])
-        action = experience.decision.joint_action[None]
+        action = experience.decision.joint_action[self._members][None]
         self._model.replay_buffer.add(inputs.seen, entered, action, reward, done, [{}])
         self._decisions += 1
         s = self._settings
@@ -146,6 +163,13 @@ class DeepQ(Agents[ValueInputs]):
         buffer.pos, self._decisions = map(int, replay["place"])
         set_words(self.rng, memory["generator"])
 
+    def check_world(self, scenario: Scenario) -> None:
+        """Refuse a world of other states or actions."""
+        if scenario.state_space != self._scenario.state_space:
+            raise ValueError("learner.kind = 'dqn': trained over another state space")
+        if scenario.action_set != self._scenario.action_set:
+            raise ValueError("learner.kind = 'dqn': trained with other actions")
+
     def continue_from(self, former: Self) -> None:
         """Begin with all that another one of the same inputs has learned.
 
@@ -154,8 +178,5 @@ class DeepQ(Agents[ValueInputs]):
         ValueError
             If its states or actions are others; one line.
         """
-        if former._scenario.state_space != self._scenario.state_space:
-            raise ValueError("learner.kind = 'dqn': trained over another state space")
-        if former._scenario.action_set != self._scenario.action_set:
-            raise ValueError("learner.kind = 'dqn': trained with other actions")
+        former.check_world(self._scenario)
         self.restore(former.memory())

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from gymnasium.spaces import Discrete, MultiDiscrete
 from scipy.special import logsumexp
 
+from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn
 from ..interface.agents import Agents, Counts, Memory, Placement
 from ..interface.experience import Experience, Observation
@@ -23,7 +23,7 @@ from ..interface.scenario import Scenario
 from ..numerics import AnyArray, FloatArray, IntArray, set_words, words_of
 from .inputs import Inputs
 from .settings import MultiAgentPPOSettings, PPOSettings
-from .training import ActorCritic, InputNames, under
+from .training import ActorCritic, InputNames, bytes_of, under
 
 
 @dataclass
@@ -52,6 +52,8 @@ class HierarchyPPO(Agents[PolicyInputs]):
 
     Attributes
     ----------
+    members
+        ``(k,)`` the agents for whom they decide.
     policies
         By name, policies that share no weights.
 
@@ -68,8 +70,10 @@ class HierarchyPPO(Agents[PolicyInputs]):
         self.rng = np.random.Generator(np.random.PCG64(placement.seed))
         self.settings = settings
         scenario = placement.scenario
-        hierarchy = placement.hierarchy
+        is_told = settings.uses_hierarchy
+        hierarchy = placement.hierarchy if is_told else Hierarchy(scenario.agents, [])
         self.scenario = scenario
+        self.members = placement.members
         self.inputs = Inputs(scenario, numbered=settings.numbered)
         self.shape = len(scenario.agents), len(scenario.action_set)
         if hierarchy.neighbours:
@@ -78,7 +82,7 @@ class HierarchyPPO(Agents[PolicyInputs]):
                 "each other nothing, use a topology without them"
             )
         n, n_actions = self.shape
-        heard = sorted({sender for i in range(n) for sender in hierarchy.above(i)})
+        heard = self.senders(hierarchy)
         self.width = len(heard) * n_actions
         self._told_names = [
             f"{scenario.agents[sender]} did {action}"
@@ -88,20 +92,39 @@ class HierarchyPPO(Agents[PolicyInputs]):
         self._column: IntArray = np.zeros(n, dtype=np.int64)
         self._column[heard] = n_actions * np.arange(len(heard))
         owners = {"all": ("all",) * n, "role": scenario.roles, "own": scenario.agents}
-        names, rows = np.unique(owners[settings.weights], return_inverse=True)
-        self._rows = rows
+        names, rows = np.unique(
+            np.take(owners[settings.weights], self.members), return_inverse=True
+        )
+        self._rows = np.full(n, -1)
+        self._rows[self.members] = rows
         self._n_joint = self.inputs.n_joint if settings.critic == "central" else 0
         self.policies = {
-            str(name): self.policy_of(np.flatnonzero(rows == row)) for row, name in enumerate(names)
+            str(name): self.policy_of(self.members[rows == row]) for row, name in enumerate(names)
         }
         self._actors = [policy.actor for policy in self.policies.values()]
         self._by_policy: dict[bytes, list[tuple[int, IntArray]]] = {}
         self._counts = Counts()
 
+    @staticmethod
+    def senders(hierarchy: Hierarchy) -> list[int]:
+        """Return whose actions somebody may be told, in agent order: for them there are inputs."""
+        above = (hierarchy.above(agent) for agent in range(len(hierarchy)))
+        return sorted({sender for senders in above for sender in senders})
+
+    @property
+    def acting(self) -> IntArray:
+        """Agents whose actions are kept with a step: all, each in its row."""
+        return np.arange(self.shape[0])
+
     @property
     def counts(self) -> Counts:
         """What they have evaluated so far: each its own actions."""
         return self._counts
+
+    @property
+    def weight_bytes(self) -> int:
+        """How much memory the weights of policies and critics take."""
+        return sum(bytes_of(policy.model.policy) for policy in self.policies.values())
 
     def policy_of(self, agents: IntArray) -> ActorCritic:
         """Return the policy and critic of agents that share weights."""
@@ -132,12 +155,12 @@ class HierarchyPPO(Agents[PolicyInputs]):
     def perceive(self, seen: Observation, *, explore: bool) -> PolicyInputs:
         """Return inputs of actors, and noise for all if they explore."""
         noise = self.rng.gumbel(size=self.shape) if explore else np.zeros(self.shape)
-        logits = np.empty(self.shape, np.float32)
+        logits = np.zeros(self.shape, np.float32)
         return PolicyInputs(seen.present, self.of_actors(seen.present), noise, logits)
 
     def decide(self, inputs: PolicyInputs, turn: Turn) -> IntArray:
         """Return the actions ``(k,)`` of agents whose turn it is: drawn, or the most probable."""
-        if len(turn.senders):
+        if self.width and len(turn.senders):
             inputs.seen[turn.receivers, self._column[turn.senders] + turn.actions] = 1.0
         self._counts.joint_actions += len(turn.agents) * self.shape[1]
         chosen = np.empty(len(turn.agents), np.int64)
@@ -167,8 +190,9 @@ class HierarchyPPO(Agents[PolicyInputs]):
         joint = experience.decision.joint_action
         seen = inputs.seen
         chosen = inputs.logits[np.arange(len(joint)), joint] - logsumexp(inputs.logits, axis=1)
-        actions = joint.reshape(len(seen), -1)
-        logs = chosen.reshape(len(seen), -1).sum(axis=1)
+        acting = self.acting
+        actions = joint[acting].reshape(len(seen), -1)
+        logs = chosen[acting].reshape(len(seen), -1).sum(axis=1)
         reward = np.asarray(transition.reward, dtype=float)
         is_joint = self.settings.value_of == "team"
         reward = np.broadcast_to(reward.mean() if is_joint else reward, len(seen))
@@ -194,7 +218,7 @@ class HierarchyPPO(Agents[PolicyInputs]):
         )
         return f"a team trained with {there} cannot act with {here}"
 
-    def continue_from(self, former: Self) -> None:
+    def continue_from(self, former: HierarchyPPO) -> None:
         """Begin with the weights that agents of the same settings have learned elsewhere.
 
         What an input weighs goes with its name, see `ActorCritic.continue_from`.
@@ -229,23 +253,57 @@ class HierarchyPPO(Agents[PolicyInputs]):
         ValueError
             If it is that of other agents.
         """
+        saved = {name: under(f"{name}.", memory) for name in self.policies}
+        missing = [name for name, own in saved.items() if not own]
+        if missing:
+            raise ValueError(f"team: no weights of {missing[0]!r} have been saved")
+        if sum(len(own) for own in saved.values()) < len(memory) - 1:
+            raise ValueError(f"team: more has been saved than of {', '.join(saved)}")
         for name, policy in self.policies.items():
-            own = under(f"{name}.", memory)
-            if not own:
-                raise ValueError(f"team: no weights of {name!r} have been saved")
-            policy.restore(own)
+            policy.restore(saved[name])
         set_words(self.rng, memory["generator"])
 
 
+class UnreliablyToldPPO(HierarchyPPO):
+    """The same where messages fail, so that an agent may be told by any that decided before.
+
+    Agents decide one after the other. Weights and random numbers begin as if no message failed;
+    what others tell than those of the hierarchy weighs nothing at first.
+    """
+
+    at_once = False
+
+    def __init__(self, settings: MultiAgentPPOSettings, placement: Placement) -> None:
+        super().__init__(settings, placement)
+        self.continue_from(HierarchyPPO(settings, placement))
+
+    @staticmethod
+    def senders(hierarchy: Hierarchy) -> list[int]:
+        """Return all who decide before another."""
+        return sorted(hierarchy.order[:-1])
+
+
+def hierarchy_ppo(settings: MultiAgentPPOSettings, placement: Placement) -> HierarchyPPO:
+    """Return agents in a hierarchy, whose messages may fail."""
+    kind = UnreliablyToldPPO if placement.messages_fail else HierarchyPPO
+    return kind(settings, placement)
+
+
 class CentralPPO(HierarchyPPO):
-    """One policy that sees all states, once, and acts for all agents."""
+    """One policy that sees all states, once, and acts for all its members."""
 
     def policy_of(self, agents: IntArray) -> ActorCritic:
         """Return the policy and critic of all."""
-        n, n_actions = self.shape
+        n = len(agents)
+        n_actions = self.shape[1]
         actions = Discrete(n_actions) if n == 1 else MultiDiscrete([n_actions] * n)
         widths = 0, self.inputs.n_joint, 0
         return ActorCritic(self.settings, np.arange(1), actions, widths, self.rng)
+
+    @property
+    def acting(self) -> IntArray:
+        """Agents whose actions are kept with a step: those of the policy."""
+        return self.members
 
     @property
     def input_names(self) -> InputNames:
@@ -258,10 +316,11 @@ class CentralPPO(HierarchyPPO):
         return self.inputs.joint(states)[None].astype(np.float32)
 
     def decide(self, inputs: PolicyInputs, turn: Turn) -> IntArray:
-        """Return the actions ``(n,)`` of all."""
-        logits = self._actors[0](inputs.seen).reshape(self.shape)
-        inputs.logits[:] = logits
-        return (logits + inputs.noise).argmax(axis=1)
+        """Return the actions ``(k,)`` of agents whose turn it is."""
+        logits = self._actors[0](inputs.seen).reshape(len(self.members), -1)
+        inputs.logits[self.members] = logits
+        self._counts.joint_actions += len(turn.agents) * self.shape[1]
+        return (inputs.logits + inputs.noise)[turn.agents].argmax(axis=1)
 
     def check_world(self, scenario: Scenario) -> None:
         """Refuse a world of other states, actions or agents."""

@@ -103,6 +103,7 @@ class HierarchyPPOSettings(MultiAgentPPOSettings):
     """PPO of agents in a hierarchy: each acts by its own state and the actions that it is told."""
 
     kind: Literal["hierarchy-ppo"] = "hierarchy-ppo"
+    kind_of_agents = f"{CORE}.networks.policies:hierarchy_ppo"
     uses_hierarchy: ClassVar[bool] = True
     value_of: Annotated[Literal["own", "team"], unwritten("team")] = "team"
     """Whether an agent's reward is its own, or the mean of all agents'."""

@@ -88,8 +88,23 @@ def weights_of(policy: torch.nn.Module) -> Memory:
     return {name: value.numpy().copy() for name, value in policy.state_dict().items()}
 
 
+def bytes_of(policy: torch.nn.Module) -> int:
+    """Return how much memory the weights of a network take."""
+    return sum(array.nbytes for array in weights_of(policy).values())
+
+
 def set_weights(policy: torch.nn.Module, weights: Mapping[str, AnyArray]) -> None:
-    """Set all weights of a network, in place."""
+    """Set all weights of a network, in place.
+
+    Raises
+    ------
+    ValueError
+        If they are those of another network; one line.
+    """
+    for name, own in weights_of(policy).items():
+        saved = weights[name].shape if name in weights else "missing"
+        if saved != own.shape:
+            raise ValueError(f"team: saved weights {name}: {saved}, this team's: {own.shape}")
     policy.load_state_dict({name: torch.as_tensor(array) for name, array in weights.items()})
 
 

@@ -286,9 +286,19 @@ class ScenarioSettings(PartSettings):
         return {}
 
     @property
+    def period(self) -> float | None:
+        """Seconds of a decision, if it has a duration."""
+        return None
+
+    @property
+    def onsets(self) -> tuple[int, ...]:
+        """Episodes in which its ``failures``, if it has any, begin."""
+        return tuple(failure.episode for failure in dict(self).get("failures", ()))
+
+    @property
     def onset(self) -> int | None:
-        """Episode in which the first of the ``failures``, if it has any, begins; none: never."""
-        return min((failure.episode for failure in getattr(self, "failures", ())), default=None)
+        """Episode in which the first of them begins; none: never."""
+        return min(self.onsets, default=None)
 
 
 def tuples(value: Any) -> Any:

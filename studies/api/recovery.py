@@ -11,23 +11,66 @@ fault. A seed that does not recover counts with all the episodes that were run: 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, NamedTuple
+from functools import cached_property, partial
+from typing import Any, NamedTuple, Protocol, TypeAlias, TypedDict, Unpack, runtime_checkable
 
 import numpy as np
 
 from ...core.numerics import FloatArray
-from ...scenarios.faults.wrappers import ActuatorFault, FaultyEnv, FaultyParallelEnv
+from ...scenarios.faults.wrappers import (
+    ActuatorFault,
+    Commands,
+    FaultyEnv,
+    FaultyParallelEnv,
+    Mechanism,
+)
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
 from ..results.statistics import BLOCK, NOT_NEGATIVE, REGAINED, bootstrap, rate, recovery
 
-Policy = Callable[[Any], Any]
-"""What may act: a function of an observation, or of observations by agent, that returns the action.
+Data: TypeAlias = Any
+"""An observation, action or space of Gymnasium, whose types are the environment's own; by agent of
+a parallel environment."""
+Environment: TypeAlias = Any
+"""Of Gymnasium, or of PettingZoo's parallel kind."""
 
-A model of stable-baselines3 will do, whose ``predict`` is asked without exploration. Whoever has
-``begin(seed)`` is called when a run begins, with or without faults; whoever has ``observe`` gets
-reward, observation, terminated and truncated after every step, and may learn."""
+
+@runtime_checkable
+class Model(Protocol):
+    """A trained model, as those of stable-baselines3; it is asked without exploration."""
+
+    def predict(self, observation: Data, *, deterministic: bool) -> tuple[Data, object]:
+        """Return an action, and a state that is not used."""
+
+
+@runtime_checkable
+class Begins(Protocol):
+    """What is told when a run begins, with or without faults."""
+
+    def begin(self, seed: int) -> None:
+        """Start the random numbers of a run."""
+
+
+@runtime_checkable
+class Observes(Protocol):
+    """What sees every step, and may learn."""
+
+    def observe(self, reward: Data, observation: Data, terminated: Data, truncated: Data) -> None:
+        """Take in what a step led to."""
+
+
+Policy: TypeAlias = Model | Begins | Observes | Callable[[Data], Data]
+"""What may act: a model, or a function of an observation, or of observations by agent, that returns
+the action. It may be one that `Begins` or `Observes`, too."""
+
+
+class Wrapping(TypedDict, total=False):
+    """Further arguments of `FaultyEnv`."""
+
+    commands: Commands
+    rest: Data
+    mechanism: Mechanism
+    inform: bool
 
 
 class RandomPolicy:
@@ -39,7 +82,7 @@ class RandomPolicy:
         The action space; by agent for a parallel environment.
     """
 
-    def __init__(self, space: Any) -> None:
+    def __init__(self, space: Data) -> None:
         self.space = space
 
     def begin(self, seed: int) -> None:
@@ -48,7 +91,7 @@ class RandomPolicy:
         for i, space in enumerate(spaces):
             space.seed(seed + i)
 
-    def __call__(self, observation: Any) -> Any:
+    def __call__(self, observation: Data) -> Data:
         """Return an action, or one of every agent that observes."""
         if isinstance(self.space, Mapping):
             return {agent: self.space[agent].sample() for agent in observation}
@@ -119,14 +162,14 @@ class RecoveryTable:
 
 
 def recovery_table(
-    make: Callable[[], Any],
-    policies: Mapping[str, Any],
+    make: Callable[[], Environment],
+    policies: Mapping[str, Policy],
     faults: Mapping[str, Sequence[ActuatorFault]],
     *,
     seeds: int | Sequence[int] = 5,
     episodes: int = 20,
     steps: int = 1000,
-    **wrapping: Any,
+    **wrapping: Unpack[Wrapping],
 ) -> RecoveryTable:
     """Run policies through schedules of faults, paired with the same runs without.
 
@@ -150,7 +193,7 @@ def recovery_table(
     Raises
     ------
     ValueError
-        If there are no seeds or too few episodes, or as `FaultyEnv` does.
+        If there are no seeds or too few episodes, a policy cannot act, or as `FaultyEnv` does.
     """
     run = range(seeds) if isinstance(seeds, int) else seeds
     if len(run) == 0:
@@ -173,47 +216,52 @@ def recovery_table(
 
 
 def returns(
-    make: Callable[[], Any],
-    policy: Any,
+    make: Callable[[], Environment],
+    policy: Policy,
     faults: Sequence[ActuatorFault],
     seed: int,
     episodes: int,
     steps: int,
-    **wrapping: Any,
+    **wrapping: Unpack[Wrapping],
 ) -> FloatArray:
     """Return the returns ``(episodes,)`` of one run; see `recovery_table`."""
-    made = make()
-    is_parallel = hasattr(made, "possible_agents")
-    env: Any = (FaultyParallelEnv if is_parallel else FaultyEnv)(made, faults, **wrapping)
-    act = policy if not hasattr(policy, "predict") else _predicting(policy)
-    observe = getattr(policy, "observe", None)
-    if hasattr(policy, "begin"):
+    bare = make()
+    is_parallel = hasattr(bare, "possible_agents")
+    wrap: Callable[..., Environment] = FaultyParallelEnv if is_parallel else FaultyEnv
+    env = wrap(bare, faults, **wrapping)
+    act = _function_of(policy)
+    if isinstance(policy, Begins):
         policy.begin(seed)
     totals = np.zeros(episodes)
     for episode, world in enumerate(np.random.SeedSequence(seed).generate_state(episodes)):
-        seen, _ = env.reset(seed=int(world), options={"fault_episode": episode})
+        observation, _ = env.reset(seed=int(world), options={"fault_episode": episode})
         for _ in range(steps):
-            seen, reward, terminated, truncated, _ = env.step(act(seen))
-            if observe is not None:
-                observe(reward, seen, terminated, truncated)
+            observation, reward, terminated, truncated, _ = env.step(act(observation))
+            if isinstance(policy, Observes):
+                policy.observe(reward, observation, terminated, truncated)
             if is_parallel:
                 totals[episode] += sum(reward.values()) / len(env.possible_agents)
-                over = not env.agents
+                is_over = not env.agents
             else:
                 totals[episode] += float(reward)
-                over = terminated or truncated
-            if over:
+                is_over = terminated or truncated
+            if is_over:
                 break
     env.close()
     return totals
 
 
-def _predicting(model: Any) -> Callable[[Any], Any]:
-    """Return a model of stable-baselines3 as a function; of observations by agent, each apart."""
+def _function_of(policy: Policy) -> Callable[[Data], Data]:
+    if isinstance(policy, Model):
+        return partial(_predict, policy)
+    if callable(policy):
+        return policy
+    raise ValueError(f"policy = {policy!r:.60}: must be a function, or have a method predict")
 
-    def act(seen: Any) -> Any:
-        if isinstance(seen, Mapping):
-            return {agent: act(one) for agent, one in seen.items()}
-        return model.predict(seen, deterministic=True)[0]
 
-    return act
+def _predict(model: Model, observation: Data) -> Data:
+    """Return the action of a model; of observations by agent, those of each apart."""
+    if isinstance(observation, Mapping):
+        return {agent: _predict(model, own) for agent, own in observation.items()}
+    action, _ = model.predict(observation, deterministic=True)
+    return action

@@ -1,10 +1,11 @@
-"""A study in Python: run it or load it, then ask, compare, draw, replay and report.
+"""A study in Python: load its results, then ask, compare, draw, replay and report.
 
 Everything is computed when it is asked for, from what the study's directory holds.
 
 Examples
 --------
 >>> import tempfile
+>>> from nested_agents.studies.api.running import run
 >>> out = tempfile.mkdtemp()
 >>> spec = {"seeds": 2, "episodes": 1, "steps": 2, "evaluation": 1, "preset": "random"}
 >>> study = run(spec, out, jobs=1, progress=False)
@@ -14,115 +15,37 @@ Examples
 
 from __future__ import annotations
 
-import base64
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from ...core.agents.team import Team
 from ...core.interface.measures import SUCCESS
-from ...core.interface.scenario import Scenario
 from ...core.numerics import pd
 from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources
-from ..catalogue.study import analyse_as, draw_figures, load_study
+from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
-from ..presentation.progress import Terminal, count
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import published
-from ..results.analysis import Difference
-from ..results.contrasts import Aggregates, Contrasts, aggregate, contrasts
+from ..results.contrasts import contrasts
 from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
 from ..results.results import Results, chosen, read, together
 from ..spec.outline import StudyOutline, other_spec, sources_of
+from ..spec.tables import TomlTable
 from ..store import durable
 from ..store.store import Store
-from ..workers.runner import Backend, Observer
+from .comparison import Comparison
+from .replay import Replay, draw_episode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..spec.spec import Spec
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Conditions compared by one measure; printed or shown by a notebook, table and verdicts."""
-
-    contrasts: Contrasts
-    """The analysis."""
-
-    @cached_property
-    def table(self) -> SummaryTable:
-        """Estimates and differences, in all forms."""
-        return tabulate(self.contrasts.table)
-
-    @property
-    def differences(self) -> tuple[Difference, ...]:
-        """Every difference with its interval, and p raw and adjusted."""
-        return self.contrasts.differences
-
-    @property
-    def verdicts(self) -> tuple[str, ...]:
-        """What was found, and what could have been detected, line by line."""
-        return self.contrasts.notes
-
-    @cached_property
-    def statistics(self) -> Aggregates:
-        """Interquartile means, probabilities of improvement and performance profiles.
-
-        Raises
-        ------
-        SpecError
-            If no two conditions have two seeds each.
-        """
-        return aggregate(self.contrasts)
-
-    @cached_property
-    def aggregated(self) -> SummaryTable:
-        """The table of `statistics`, in all forms."""
-        return tabulate(self.statistics.table)
-
-    def figure(self) -> Figure:
-        """Return performance profiles, and the interquartile mean by episode of training."""
-        from ..presentation.figures import draw_profiles  # matplotlib takes its time
-
-        return draw_profiles(self.statistics)
-
-    def __str__(self) -> str:
-        return "\n".join([str(self.table), "", *self.verdicts])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        lines = "\n".join(map(escape, self.verdicts))
-        return f"{self.table.html}<pre>{lines}</pre>"
-
-
-MOST_BYTES = 20_000_000
-"""Of an animation that a notebook is given."""
-
-
-class Replay(NamedTuple):
-    """An animation."""
-
-    path: Path
-    """Where it is."""
-    title: str
-    """Condition, seed and episode."""
-
-    def _repr_html_(self) -> str:
-        content = self.path.read_bytes()
-        if self.path.suffix != ".gif" or len(content) > MOST_BYTES:
-            return f"{self.title}: {self.path}"
-        encoded = base64.b64encode(content).decode("ascii")
-        return f"<img alt='{self.title}' src='data:image/gif;base64,{encoded}'>"
-
+    from ...core.agents.team import Team
+    from ...core.interface.scenario import Scenario
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -144,9 +67,23 @@ class StudyResults:
     remarks: tuple[str, ...] = ()
     """What must be said of the results, in lines."""
     _sources: Sources = field(default_factory=Sources, repr=False)
-    _settings: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    _settings: Mapping[str, TomlTable] = field(default_factory=dict, repr=False)
     _directories: tuple[Path, ...] = ()
     _is_whole: bool = True
+
+    @classmethod
+    def of(cls, store: Store) -> StudyResults:
+        """Return the results of an open study."""
+        remark = other_spec(store)
+        return cls(
+            outline=StudyOutline.kept(store),
+            results=read(store),
+            failed=tuple(store.failed()),
+            remarks=() if remark is None else (remark,),
+            _sources=sources_of(store),
+            _settings=store.settings(),
+            _directories=(store.directory,),
+        )
 
     @property
     def conditions(self) -> tuple[str, ...]:
@@ -182,7 +119,7 @@ class StudyResults:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the study says of its results, verdicts and their power, line by line."""
-        return tuple(getattr(self.analysis, "notes", ()))
+        return notes_of(self.analysis)
 
     @property
     def unlearned(self) -> tuple[str, ...]:
@@ -193,14 +130,20 @@ class StudyResults:
         evaluations = self.results.episodes.query("phase == 'evaluation'")
         columns = ["condition", SUCCESS.name, "return"]
         means = evaluations.reindex(columns=columns).groupby("condition").mean()
-        frozen, others = dict[str, Any](), list[tuple[str, str]]()
-        for c in means.index.intersection(list(self._settings), sort=False):
-            learner, scenario = (self._settings[c][name] for name in ("learner", "scenario"))
+        frozen = dict[str, pd.Series]()
+        learning = list[tuple[str, str]]()
+        for condition in means.index.intersection(list(self._settings), sort=False):
+            learner = self._settings[condition]["learner"]
+            scenario = repr(self._settings[condition]["scenario"])
             if learner["kind"] != "frozen":
-                others.append((c, repr(scenario)))
+                learning.append((condition, scenario))
             elif learner["decision"]["rule"] == "value":
-                frozen[repr(scenario)] = means.loc[c]
-        return tuple(c for c, s in others if s in frozen and (means.loc[c] <= frozen[s]).all())
+                frozen[scenario] = means.loc[condition]
+        return tuple(
+            condition
+            for condition, scenario in learning
+            if scenario in frozen and (means.loc[condition] <= frozen[scenario]).all()
+        )
 
     @property
     def power(self) -> tuple[str, ...]:
@@ -231,7 +174,7 @@ class StudyResults:
         ----------
         by
             A swept key, or the last part of it: conditions that agree in all others are compared.
-            None: all conditions with the first.
+            None, or ``condition``: all conditions with the first.
         measure
             A measure of episodes, ``steps``, ``return`` or a number of whole trials, by name.
         phase
@@ -244,7 +187,8 @@ class StudyResults:
         SpecError
             If there is no such key, measure, phase or reference.
         """
-        return Comparison(contrasts(self.results, measure, phase, by, reference))
+        key = None if by == "condition" else by
+        return Comparison(contrasts(self.results, measure, phase, key, reference))
 
     def where(self, choice: str) -> StudyResults:
         """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `chosen`."""
@@ -308,25 +252,7 @@ class StudyResults:
         SpecError
             If there is no such trial or recording, or its scenario does not draw.
         """
-        from ..trials.keeping import finished_trial
-
-        with Store.open(self.directory) as store:
-            trial = finished_trial(store, condition, seed)
-            recorded = list(trial.recorded.values())
-            if episode == "first" and episode not in recorded:
-                episode = "last"  # of one episode
-            if episode not in recorded:
-                raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
-            scenario = trial.world()
-            if not scenario.draws:
-                raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
-            kept = self.directory / "replay" / f"{trial.identity[:8]}-{episode}.gif"
-            where = kept if path is None else Path(path)
-            if path is None:
-                kept.parent.mkdir(exist_ok=True)
-            if path is not None or not kept.exists():
-                scenario.animate(store.recording(trial.identity, episode), where)
-        return Replay(where, f"{trial.condition}, seed {trial.seed}, {episode} episode")
+        return draw_episode(self.directory, condition, seed, episode, path)
 
     def team(self, condition: str | None = None, seed: int | None = None) -> tuple[Scenario, Team]:
         """Return the world of a trial, and the team that was trained in it, ready to act.
@@ -368,15 +294,15 @@ class StudyResults:
 
         if not self._is_whole:
             raise SpecError("report: is of a whole study, not of a part of it or of another one")
-        where = self.directory / "report.html" if path is None else Path(path)
-        if where.is_dir() or not where.name:
-            raise SpecError(f"--out {where}: is a directory")
-        if where.suffix not in (".html", ".htm"):
-            raise SpecError(f"--out {where}: suffix must be .html or .htm")
-        if not where.parent.is_dir():
-            raise SpecError(f"--out {where}: there is no directory {where.parent}")
-        durable.write(where, page(self.directory).encode())
-        return where
+        file = self.directory / "report.html" if path is None else Path(path)
+        if file.is_dir() or not file.name:
+            raise SpecError(f"--out {file}: is a directory")
+        if file.suffix not in (".html", ".htm"):
+            raise SpecError(f"--out {file}: suffix must be .html or .htm")
+        if not file.parent.is_dir():
+            raise SpecError(f"--out {file}: there is no directory {file.parent}")
+        durable.write(file, page(self.directory).encode())
+        return file
 
     @property
     def directory(self) -> Path:
@@ -397,63 +323,7 @@ class StudyResults:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return f"<h4>{self.outline.study}</h4>{self.table().html}"
-
-
-def run(
-    spec: Spec | Mapping[str, Any] | Place,
-    out: Place,
-    *,
-    jobs: int | None = None,
-    backend: Backend = "loky",
-    address: str | None = None,
-    retry_failed: bool = False,
-    accept_code: bool = False,
-    progress: bool = True,
-    observer: Observer | None = None,
-) -> StudyResults:
-    """Run what is left of a study and return its results; the same call again continues it.
-
-    Parameters
-    ----------
-    spec
-        A `Spec`, a table as TOML has it, which may hold objects, or the path of a TOML file.
-    out
-        Where the study is kept; made if it does not exist. Every trial is kept the moment it
-        finishes.
-    jobs, backend, address, retry_failed, accept_code
-        As those of `nested_agents.studies.api.running.run_study`.
-    progress
-        Whether to show how it goes.
-    observer
-        Who is notified of progress instead, see `nested_agents.studies.workers.runner.Observer`.
-
-    Warns
-    -----
-    UserWarning
-        If trials failed; ``study.failed`` has their tracebacks.
-
-    Raises
-    ------
-    SpecError
-        If the study cannot be run or continued; one line says why.
-    """
-    from ..spec.spec import Spec
-    from .running import run_study
-
-    out = Path(out)
-    spec = Spec.read(spec, study=out)
-    listener = observer or (Terminal() if progress else Observer())
-    with run_study(
-        spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
-        accept_code=accept_code, observer=listener,
-    ) as store:  # fmt: skip
-        study = _of(store)
-    if study.failed and observer is None:
-        warnings.warn(
-            f"{count(len(study.failed), 'trial')} failed: study.failed says why", stacklevel=2
-        )
-    return study
+        return f"<h4>{escape(self.outline.study)}</h4>{self.table().html}"
 
 
 def load(*places: Place) -> StudyResults:
@@ -475,44 +345,51 @@ def load(*places: Place) -> StudyResults:
     if not places:
         raise SpecError("load: needs a directory at least")
     paths = [Path(place) for place in places]
-    resolved = [path.resolve() for path in paths]
-    twice = next((p for i, p in enumerate(paths) if resolved[i] in resolved[:i]), None)
-    if twice is not None:
-        raise SpecError(f"{twice}: is named more than once")
-    loaded = [_loaded(path) for path in paths]
-    if len(loaded) == 1:
-        return loaded[0]
-    names = [path.name for path in paths]
-    names = names if len(set(names)) == len(names) else list(map(str, paths))
-    results, labels = together(
-        [(n, s.results) for n, s in zip(names, loaded, strict=True)],
-        [study._settings for study in loaded],
-    )
-    settings, failed = dict[str, Any](), []
-    for study, new in zip(loaded, labels, strict=True):
-        settings |= {new[condition]: own for condition, own in study._settings.items()}
-        failed += [(new[condition], seed, error) for condition, seed, error in study.failed]
-    outline = loaded[0].outline._replace(columns=results.columns)
-    return StudyResults(
-        outline, results, tuple(failed), tuple(r for s in loaded for r in s.remarks),
-        loaded[0]._sources, settings, tuple(d for s in loaded for d in s._directories),
-        _is_whole=False,
-    )  # fmt: skip
+    _check_distinct(paths)
+    loaded = [_load_one(path) for path in paths]
+    return loaded[0] if len(loaded) == 1 else _merge(paths, loaded)
 
 
-def _loaded(path: Path) -> StudyResults:
+def _check_distinct(paths: Sequence[Path]) -> None:
+    """Refuse paths of which two are the same place."""
+    known = set[Path]()
+    for path in paths:
+        if path.resolve() in known:
+            raise SpecError(f"{path}: is named more than once")
+        known.add(path.resolve())
+
+
+def _load_one(path: Path) -> StudyResults:
     if path.is_file():
         kept = published.load(path)
         remarks = (f"{path}: {kept.note}",) if kept.note else ()
         return StudyResults(kept.outline, kept.results, (), remarks)
     with Store.open(path) as store:
         store.verify()
-        return _of(store)
+        return StudyResults.of(store)
 
 
-def _of(store: Store) -> StudyResults:
-    outline, remark = StudyOutline.kept(store), other_spec(store)
+def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResults:
+    """Return the results of several studies as those of one."""
+    names = [path.name for path in paths]
+    if len(set(names)) < len(names):
+        names = list(map(str, paths))
+    results, labels = together(
+        [(name, study.results) for name, study in zip(names, studies, strict=True)],
+        [study._settings for study in studies],
+    )
+    settings = dict[str, TomlTable]()
+    failed = list[tuple[str, int, str]]()
+    for study, new in zip(studies, labels, strict=True):
+        settings |= {new[condition]: own for condition, own in study._settings.items()}
+        failed += [(new[condition], seed, error) for condition, seed, error in study.failed]
     return StudyResults(
-        outline, read(store), tuple(store.failed()), (remark,) if remark else (),
-        sources_of(store), store.settings(), (store.directory,),
-    )  # fmt: skip
+        outline=studies[0].outline._replace(columns=results.columns),
+        results=results,
+        failed=tuple(failed),
+        remarks=tuple(remark for study in studies for remark in study.remarks),
+        _sources=studies[0]._sources,
+        _settings=settings,
+        _directories=tuple(path for study in studies for path in study._directories),
+        _is_whole=False,
+    )

@@ -78,6 +78,11 @@ def load_study(name: str) -> Study:
     return Study(**offered)
 
 
+def notes_of(analysis: Any) -> tuple[str, ...]:
+    """Return what an analysis says in words, line by line; one of your own may say nothing."""
+    return tuple(getattr(analysis, "notes", ()))
+
+
 def measure(trial: Trial) -> TrialResult:
     """Run a trial that is measured by its episodes alone."""
     from ..trials.session import run_trial  # who only reads results needs nothing that learns

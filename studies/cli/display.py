@@ -1,4 +1,8 @@
-"""What the user sees of a study on the terminal: its table, and where figures and rows are."""
+"""What the user sees on the terminal: everything that a command prints goes through here.
+
+Labels, tracebacks and titles may be anybody's, from a spec, a database or a published file. What a
+terminal would obey in them is written out, see `printable`.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +11,39 @@ from collections.abc import Iterable, Sequence
 from shlex import quote
 from shutil import get_terminal_size
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from ..errors import printable
 
 if TYPE_CHECKING:
     from ..api.study import StudyResults
     from ..presentation.tables import SummaryTable
 
+Form: TypeAlias = Literal["table", "markdown", "latex", "csv"]
+"""How a table of estimates is printed."""
+
+
+def print_text(*texts: object, sep: str = "\n", end: str = "\n") -> None:
+    """Print texts, a line each unless `sep` says otherwise."""
+    print(*(printable(str(text)) for text in texts), sep=sep, end=end)
+
+
+def print_data(text: str) -> None:
+    """Print what other programs read: as it is, but on a terminal as `print_text` does."""
+    sys.stdout.write(printable(text) if sys.stdout.isatty() else text)
+
 
 def print_wrapped(text: str, first: str = "", indent: int = 4) -> None:
     """Print a text over the width of the terminal, after `first`; further lines are indented."""
     width = get_terminal_size().columns
-    print(fill(text, width, initial_indent=first, subsequent_indent=" " * indent))
+    print_text(fill(text, width, initial_indent=first, subsequent_indent=" " * indent))
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines; on a terminal those that are wider than it go on in the next one, indented."""
+    width = get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    for line in lines:
+        print_text(line if len(line) <= width else fill(line, width, subsequent_indent="  "))
 
 
 def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> None:
@@ -28,11 +54,17 @@ def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> Non
     print_lines(table.legend if legend is None else legend)
 
 
-def print_lines(lines: Iterable[str]) -> None:
-    """Print lines; on a terminal those that are wider than it go on in the next one, indented."""
-    width = get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
-    for line in lines:
-        print(line if len(line) <= width else fill(line, width, subsequent_indent="  "))
+def in_form(table: SummaryTable, form: Form) -> str:
+    """Return a table as text in a form."""
+    match form:
+        case "markdown":
+            return table.markdown
+        case "latex":
+            return table.latex
+        case "csv":
+            return table.csv
+        case "table":
+            return f"{table}\n"
 
 
 def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:
@@ -66,18 +98,19 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
     print_study(study)
     folder = directory / "figures"
     folder.mkdir(exist_ok=True)
-    drawn = figures.save(study.figures, folder, formats or figures.USUAL)
-    print("", *(f"figure  {path}" for path in drawn), sep="\n")
+    drawings = figures.save(study.figures, folder, formats or figures.USUAL)
+    print_text("", *(f"figure  {path}" for path in drawings))
     if study.unlearned:
         names = join_names(study.unlearned, 3)
         print_wrapped(
             f"{names}: no better than frozen weights in evaluation. What to try, and in which "
             "order: docs/not_learned.md; nested-agents tune tries it for you.",
-            "hint    ", 8,
-        )  # fmt: skip
+            first="hint    ",
+            indent=8,
+        )
     typed = quote(str(directory))
-    print(f"rows    nested-agents results {typed} --format csv")
-    print(f"report  nested-agents report {typed}")
+    print_text(f"rows    nested-agents results {typed} --format csv")
+    print_text(f"report  nested-agents report {typed}")
     if study.failed:
         say(f"{count(len(study.failed), 'trial')} failed: nested-agents status {typed}")
     return 1 if study.failed else 0

@@ -1,7 +1,4 @@
-"""Studies that a command opens: their results, how far they are, and whether they are trusted.
-
-What is said of how far a study is, in lines, is what `status` prints and `watch` shows.
-"""
+"""Studies that a command opens: their results, how far they are, and whether they are trusted."""
 
 from __future__ import annotations
 
@@ -84,10 +81,18 @@ class Progress:
     refusal: str | None
     """Why the installed code would not go on with the study, in one line; None if it would."""
 
+    @property
+    def is_going_on(self) -> bool:
+        """Whether anything is still to come: of a damaged study only if somebody runs it."""
+        is_possible = self.refusal is None and not self.damaged
+        return bool(self.running or (self.left and is_possible))
+
 
 def progress(store: Store) -> Progress:
     """Return how far the study of an open store is."""
-    trials, refusal, states = store.planned(), outdated(store), store.states()
+    trials = store.planned()
+    refusal = outdated(store)
+    states = store.states()
     now = None if refusal is not None else look(store.directory)
     begun = {} if now is None else now[1]
     pending = [trial for trial in trials if trial.identity not in states]

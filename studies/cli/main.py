@@ -7,21 +7,28 @@ click command of that name in a module of `commands`.
 
 import codecs
 import os
+import resource
 import sys
 import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from io import TextIOWrapper
 from pathlib import Path
-from typing import Any
 
 import click
 
-from ..errors import SpecError
+from ..errors import SpecError, printable
 from .options import complete
 
 PROGRAM = "nested-agents"
 IN_ASCII = "nested-agents-ascii"
 """Name of the error handler of the streams: a terminal that lacks dashes shows ``-`` for them."""
+
+REFUSING = ("strict", "surrogateescape")
+"""The error handlers that Python's streams have by locale and that raise for such characters."""
+
+LEAST_ADDRESSES = 10**9
+"""Of the process [bytes]: with less, libraries of linear algebra crash or wait for ever."""
 
 PUBLISHED = "...results.commands"
 """Module of the commands on what has been published."""
@@ -35,7 +42,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "table": (".commands.reading", "Print the results of a study: conditions against estimates."),
     "compare": (".commands.reading", "Compare conditions of one study or several, seed by seed."),
     "results": (".commands.reading", "Print what every episode of a study measured."),
-    "watch": (".commands.watch", "Watch a study while it runs: trials, curves, failures."),
     "status": (".commands.reading", "Tell how far a study is, what failed, and how long is left."),
     "retry": (".commands.running", "Run the failed trials of a study again."),
     "export": (".commands.reading", "Write what a study holds as files for other programs."),
@@ -47,7 +53,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "List the keys of a spec: type, default, what is allowed, meaning.",
     ),
     "topology": (".commands.describing", "List the topologies, or show one of them."),
-    "check": (".commands.describing", "Check that scenarios keep their promises."),
+    "check": (".commands.checking", "Check that scenarios keep their promises."),
     "cost": (".commands.describing", "Print what hierarchies cost, by formula and measured."),
     "benchmark": (PUBLISHED, "Enter a learner in the benchmark push-n, and compare entries."),
     "claims": (PUBLISHED, "Print the claims of the paper and the verdict on each."),
@@ -60,7 +66,8 @@ def load_command(name: str) -> click.Command | None:
     place = COMMANDS[name][0]
     if place == PUBLISHED and not RESULTS.is_dir():
         return None
-    command: click.Command = getattr(import_module(place, __package__), name)
+    command = vars(import_module(place, __package__))[name]
+    assert isinstance(command, click.Command)
     return command
 
 
@@ -76,6 +83,7 @@ class _Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str, click.Command, list[str]]:
+        _check_address_space()
         command = self.get_command(ctx, args[0])
         if command is None and args[0] in COMMANDS:
             raise SpecError(
@@ -111,13 +119,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     for stream in (sys.stdout, sys.stderr):
-        if getattr(stream, "errors", None) == "strict":
-            stream.reconfigure(errors=IN_ASCII)  # type: ignore[union-attr]
+        if isinstance(stream, TextIOWrapper) and stream.errors in REFUSING:
+            stream.reconfigure(errors=IN_ASCII)
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
 
 
-def _in_ascii(error: Any) -> tuple[str, int]:
+def _check_address_space() -> None:
+    """Refuse to begin what a limit of the shell would not let end."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY and limit < LEAST_ADDRESSES:
+        least = LEAST_ADDRESSES // 1024
+        raise SpecError(f"ulimit -v {limit // 1024}: must be at least {least}, or unlimited")
+
+
+def _in_ascii(error: UnicodeError) -> tuple[str, int]:
     """Return what stands for the characters that a terminal lacks, and where they end."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
     lacking = error.object[error.start : error.end]
     return "".join("-" if c in "–−" else "?" for c in lacking), error.end
 
@@ -137,6 +155,8 @@ def run_to_status(program: str, run: Callable[[], int]) -> int:
         # The reader went away, as `head` does; Python would complain again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+    except MemoryError as error:
+        message = f"not enough memory: {error}".rstrip(": ")
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         message = f"{where}{error.strerror or error}"
@@ -144,9 +164,9 @@ def run_to_status(program: str, run: Callable[[], int]) -> int:
         from ...core.plugins.sources import place
 
         if where := place(error):  # in code of a file of the user, or raised by it
-            print(f"{program}: interrupted{where}", file=sys.stderr)
+            print(printable(f"{program}: interrupted{where}"), file=sys.stderr)
         return 130
-    print(f"{program}: error: {' '.join(message.split())}", file=sys.stderr)
+    print(printable(f"{program}: error: {' '.join(message.split())}"), file=sys.stderr)
     return 2
 
 

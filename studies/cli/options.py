@@ -3,11 +3,16 @@
 An option that may be given several times takes several values at once, too: `complete`.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict
 
 import click
+
+if TYPE_CHECKING:
+    from ..workers.runner import Backend
 
 PATH = click.Path(path_type=Path)
 """A path, which need not exist."""
@@ -35,7 +40,8 @@ def complete(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:
         if isinstance(option, click.Option) and not option.is_flag
         for name in option.opts
     }
-    name, is_due = "", False
+    name = ""
+    is_due = False
     for argument in arguments:
         if argument in ("", *(f"{option}=" for option in options)):
             empty = name if is_due else argument.rstrip("=") or "an argument"
@@ -45,7 +51,8 @@ def complete(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:
         if is_due:
             is_due = False
         elif argument in options:
-            name, is_due = argument, True
+            name = argument
+            is_due = True
         elif name and options[name].multiple and _is_further(argument, options[name]):
             yield name
         else:
@@ -76,9 +83,13 @@ def flag(name: str, text: str) -> Decorator:
     return click.option(name, is_flag=True, help=text)
 
 
-def out(text: str, metavar: str = "DIR", **more: Any) -> Decorator:
+def out(
+    text: str, metavar: str = "DIR", *, required: bool = False, default: str | None = None
+) -> Decorator:
     """Return the option ``--out``, where to write."""
-    return click.option("--out", type=PATH, metavar=metavar, help=text, **more)
+    if default is None:  # given as a default, None would be a value
+        return click.option("--out", type=PATH, metavar=metavar, help=text, required=required)
+    return click.option("--out", type=PATH, metavar=metavar, help=text, default=default)
 
 
 jobs = click.option(
@@ -105,8 +116,17 @@ _accept_code = flag(
 )
 
 
+class RunOptions(TypedDict):
+    """The options of who runs trials, as `nested_agents.studies.api.running.run` takes them."""
+
+    jobs: int | None
+    backend: Backend
+    address: str | None
+    accept_code: bool
+
+
 def running(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options of who runs trials, as `nested_agents.studies.api.study.run` takes them."""
+    """Add the options of who runs trials, see `RunOptions`."""
     return jobs(_backend(_address(_accept_code(command))))
 
 

@@ -72,8 +72,10 @@ PASSES = ("fitted-q", "hierarchy-ppo")
 """Those of them that are not counted and timed."""
 MOST_OPERATIONS = 4 * 10**8
 """Rule evaluations a step beyond which nothing is measured: about a second a step."""
-LEAST_SECONDS, MOST_TIMES = 0.3, 100
-"""How long each repeat is timed at least, but no more times than that."""
+LEAST_SECONDS = 0.3
+"""How long each repeat is timed at least [s]."""
+MOST_TIMES = 100
+"""How often each repeat is timed at most."""
 LABELLED = re.compile(r"([\w -]+)=(.+)")
 """A topology with a label of one's own."""
 
@@ -115,6 +117,17 @@ class CostRow:
     measured: StepCost | None = None
     network: tuple[int, int] | None = None
     """If asked for, messages of a decision, and how many of them follow one another."""
+
+    @property
+    def by_formula(self) -> dict[str, int | Fraction | None]:
+        """What the formulas give, by name."""
+        return {
+            "nested_exact": self.nested_exact,
+            "nested_closed_form": self.nested_closed_form,
+            "nested_asymptotic": self.nested_asymptotic,
+            "single_agent": self.single_agent,
+            "ratio": self.ratio,
+        }
 
     @property
     def ratio(self) -> Fraction | None:

@@ -5,7 +5,6 @@ from decimal import Decimal
 from fractions import Fraction
 from math import log10
 from pathlib import Path
-from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -79,14 +78,28 @@ def _draw_series(all_axes: Sequence[Axes], rows: Sequence[CostRow], index: int) 
 
 
 def _draw_line(axes: Axes, line: Points, marked: Points, index: int) -> None:
-    axes.plot(*zip(*line, strict=True), **look(index), lw=1.2)
     colour = look(index)["color"]
-    axes.plot(*zip(*marked, strict=True), marker(index), color=colour, **_hollow(index))
+    size = _marker_size(index)
+    axes.plot(*zip(*line, strict=True), **look(index), lw=1.2)
+    axes.plot(
+        *zip(*marked, strict=True),
+        marker(index),
+        color=colour,
+        markerfacecolor="none",
+        markersize=size,
+    )
 
 
 def _handles(topologies: Sequence[str], measured: bool) -> list[Line2D]:
     handles = [
-        handle(text, marker=marker(i), **look(i), **_hollow(i)) for i, text in enumerate(topologies)
+        handle(
+            text,
+            marker=marker(i),
+            **look(i),
+            markerfacecolor="none",
+            markersize=_marker_size(i),
+        )
+        for i, text in enumerate(topologies)
     ]
     handles.append(handle("single agent (Eq. 23)", ls="--", color="black"))
     if measured:
@@ -95,9 +108,9 @@ def _handles(topologies: Sequence[str], measured: bool) -> list[Line2D]:
     return handles
 
 
-def _hollow(index: int) -> dict[str, Any]:
-    """Hollow and ever smaller, so that markers in one place can be distinguished."""
-    return {"markerfacecolor": "none", "markersize": max(9.0 - 1.2 * index, 3.5)}
+def _marker_size(index: int) -> float:
+    """Return ever smaller sizes, so that hollow markers in one place can be distinguished."""
+    return max(9.0 - 1.2 * index, 3.5)
 
 
 def _log10(value: int | Fraction) -> float:

@@ -6,12 +6,12 @@ farther apart, is rounded to an integer.
 
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, astuple, dataclass
 from fractions import Fraction
 from html import escape
 from itertools import product
-from typing import Any, Literal
+from typing import Literal
 
 from ...core.agents.cost import Problem, is_chain
 from ...core.numerics import pd
@@ -24,6 +24,7 @@ from .cost import (
     SINGLE_AGENT,
     WAYS,
     CostRow,
+    StepCost,
     agents_below,
     joint_actions,
     measure,
@@ -32,14 +33,8 @@ from .cost import (
 )
 
 Form = Literal["table", "json", "csv", "latex"]
-FORMULAS = (
-    ("nested_exact", "Eq. 18"),
-    ("nested_closed_form", "Eq. 19"),
-    ("nested_asymptotic", "Eq. 21"),
-    ("single_agent", "single agent"),
-    ("ratio", "ratio"),
-)
-"""Columns by name, with their heading."""
+FORMULAS = ("Eq. 18", "Eq. 19", "Eq. 21", "single agent", "ratio")
+"""Headings of `CostRow.by_formula`."""
 MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MB")
 """Headings of what was measured per step."""
 NETWORK = ("messages", "in turn", "1 ms", "10 ms", "1 ms*", "10 ms*")
@@ -80,42 +75,56 @@ def scientific(value: int | Fraction | None) -> str:
     return format_count(round(value), 10**7)
 
 
-def _record(row: CostRow) -> dict[str, Any]:
+def _record(row: CostRow) -> dict[str, object]:
     """Return a row with integers as integers; Eq. 21 is rounded to the nearest one."""
-    asymptotic = row.nested_asymptotic
-    record = {name: getattr(row, name) for name in ("agents", "topology", *dict(FORMULAS))}
-    record["nested_asymptotic"] = None if asymptotic is None else round(asymptotic)
+    record: dict[str, object] = {"agents": row.agents, "topology": row.topology}
+    record |= row.by_formula
+    if row.nested_asymptotic is not None:
+        record["nested_asymptotic"] = round(row.nested_asymptotic)
     if row.ratio is not None:
         record["ratio"] = float(row.ratio) if row.ratio < 2**53 else round(row.ratio)
     if row.network is not None:
         record["messages"], record["messages_in_turn"] = row.network
-    for what, counts in (("_formula", row.formula), ("", row.measured and row.measured.counted)):
-        if counts is not None:
-            record |= {f"{name}{what}_per_step": n for name, n in asdict(counts).items()}
-    if (cost := row.measured) is not None:
-        record |= {"deciding_s": cost.deciding, "learning_s": cost.learning}
-        record |= {"memory_bytes": cost.memory, "repeats": len(cost.repeats)}
-        record["step_s"], low, high = map(float, cost.step)
-        if len(cost.repeats) > 1:
-            record |= {"step_s_low": low, "step_s_high": high}
+    if row.formula is not None:
+        counts = asdict(row.formula)
+        record |= {f"{name}_formula_per_step": n for name, n in counts.items()}
+    if row.measured is not None:
+        record |= _measured_record(row.measured)
+    return record
+
+
+def _measured_record(cost: StepCost) -> dict[str, object]:
+    record: dict[str, object] = {f"{name}_per_step": n for name, n in asdict(cost.counted).items()}
+    record["deciding_s"] = cost.deciding
+    record["learning_s"] = cost.learning
+    record["memory_bytes"] = cost.memory
+    record["repeats"] = len(cost.repeats)
+    record["step_s"] = float(cost.step.value)
+    if len(cost.repeats) > 1:
+        record["step_s_low"] = float(cost.step.low)
+        record["step_s_high"] = float(cost.step.high)
     return record
 
 
 def _cells(rows: Sequence[CostRow]) -> dict[str, list[list[str]]]:
     """Return the cells of each table, headings first: formulas, then what of rows was asked for."""
-    return {
-        kind: [["n", "topology", *titles], *([str(r.agents), r.topology, *cells(r)] for r in rows)]
-        for kind, titles, cells in (
-            ("topology", dict(FORMULAS).values(), _formula_cells),
-            ("formula", MEASURED, _measured_cells),
-            ("network", NETWORK, _network_cells),
-        )
-        if kind == "topology" or any(getattr(row, kind) is not None for row in rows)
-    }
+    tables = {"topology": _with_headings(FORMULAS, rows, _formula_cells)}
+    if any(row.formula is not None for row in rows):
+        tables["formula"] = _with_headings(MEASURED, rows, _measured_cells)
+    if any(row.network is not None for row in rows):
+        tables["network"] = _with_headings(NETWORK, rows, _network_cells)
+    return tables
+
+
+def _with_headings(
+    titles: Sequence[str], rows: Sequence[CostRow], cells: Callable[[CostRow], list[str]]
+) -> list[list[str]]:
+    lines = [[str(row.agents), row.topology, *cells(row)] for row in rows]
+    return [["n", "topology", *titles], *lines]
 
 
 def _formula_cells(row: CostRow) -> list[str]:
-    return [scientific(getattr(row, name)) for name, _ in FORMULAS]
+    return [scientific(value) for value in row.by_formula.values()]
 
 
 def _network_cells(row: CostRow) -> list[str]:
@@ -152,7 +161,8 @@ def _measured_cells(row: CostRow) -> list[str]:
     joint = None if row.formula is None else row.formula.joint_actions
     if row.measured is None:
         return [scientific(joint), *["-"] * len(MEASURED[1:])]
-    step, ms = row.measured.step, _amount(1e3 * float(row.measured.step.value))
+    step = row.measured.step
+    ms = _amount(1e3 * float(step.value))
     if len(row.measured.repeats) > 1:
         ms += f"±{_amount(1e3 * float(step.high - step.value), 2)}"
     counts = joint, *astuple(row.measured.counted)

@@ -24,11 +24,11 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from math import degrees
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import track
 
 from ...core.adaptation.learned_predictor import LearnedPredictor
@@ -44,7 +44,7 @@ from ...core.numerics import FloatArray, IntArray
 from ...core.rules.kernels.fuzzy import Partition
 from ...core.rules.rule_base import RuleBase
 from ...scenarios.checking.predictions import apart
-from ..errors import WIDTH, SpecError, refused
+from ..errors import WIDTH, SpecError, printable, refused
 from ..store.database import STAGE, columns
 from ..store.durable import TEAM
 from ..store.store import Store
@@ -156,7 +156,8 @@ def rules_table(
 
     Variables come in the order of their mean share.
     """
-    power, lines = exponent(parts), []
+    power = exponent(parts)
+    lines = list[tuple[str, ...]]()
     for j in mean_shares(parts):
         variable, partition = variables[j], rules.partitions[j]
         shares = [percent(p.share(p.singles[j])) for p in parts]
@@ -292,6 +293,7 @@ def _policy(session: Session) -> PolicyMap | str:
 
 
 def _trained(store: Store, trial: Trial) -> tuple[Session, BodyEffects | None]:
+    """Return a session with the team of a trial, and what its bodies were believed to be."""
     arrays = store.recording(trial.identity, TEAM) if trial.keep_teams else None
     with refused(f"{store.directory}: "):  # a file that settings name may not be what it was
         session = Session(trial)
@@ -313,7 +315,7 @@ def _train(store: Store, session: Session, bodies: BodyEffects) -> None:
     model = session.team.only(FuzzyAgents).foresight.self_model
     episodes = track(
         range(trial.episodes),
-        f"training {trial.condition}, seed {trial.seed} again",
+        escape(printable(f"training {trial.condition}, seed {trial.seed} again")),
         console=Console(stderr=True),
         transient=True,
         disable=not sys.stderr.isatty(),
@@ -323,10 +325,10 @@ def _train(store: Store, session: Session, bodies: BodyEffects) -> None:
             bodies.note("before", model)
         session.train(1, episode)
     measured = [measure.name for measure in store.measures()]
-    kept = _kept(store, trial)
+    former = _kept_rows(store, trial)
     again = [row.flat(measured) for row in session.result().rows]
-    if kept != again:
-        pairs = zip(kept, again, strict=False)
+    if former != again:
+        pairs = zip(former, again, strict=False)
         other = next((ours for theirs, ours in pairs if theirs != ours), again[-1])
         stage = "" if other[0] == "training" else f" of {other[0]}"
         raise SpecError(
@@ -336,13 +338,13 @@ def _train(store: Store, session: Session, bodies: BodyEffects) -> None:
         )
 
 
-def _kept(store: Store, trial: Trial) -> list[tuple[object, ...]]:
+def _kept_rows(store: Store, trial: Trial) -> list[tuple[object, ...]]:
     """Return the training episodes of a trial as they are kept, those of a curriculum first."""
     names, every = store.episodes()
     at = [names.index(name) for name in columns(store.measures())]
     condition, seed, phase = (names.index(name) for name in ("condition", "seed", "phase"))
     own = (row for row in every if (row[condition], row[seed]) == (trial.condition, trial.seed))
-    trained = (row for row in own if row[phase] == "training" or row[phase].startswith(STAGE))
+    trained = (row for row in own if row[phase] == "training" or str(row[phase]).startswith(STAGE))
     return [tuple(row[i] for i in at) for row in trained]
 
 
@@ -354,8 +356,10 @@ def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:
     return directory / "explain" / f"{name}-seed{trial.seed}"
 
 
-EPISODES, DECISIONS = 10, 30
-"""What is played: worlds of the evaluation, and predictions of each."""
+EPISODES = 10
+"""Worlds of the evaluation that are played."""
+DECISIONS = 30
+"""Predictions that are made in each."""
 
 
 def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
@@ -376,11 +380,10 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
     if not isinstance(predictor, LearnedPredictor):
         return None
     horizon = predictor.horizon
-    neutral = scenario.action_set.neutral
-    errors: dict[str, list[Any]] = defaultdict(list)
+    errors: defaultdict[str, list[FloatArray]] = defaultdict(list)
     for episode in range(EVALUATION_WORLDS, EVALUATION_WORLDS + EPISODES):
         world = world_seed(seed, episode)
-        states, over = scenario.reset(world, episode), False
+        states = scenario.reset(world, episode)
         team.begin_world(world, episode)
         for _ in range(DECISIONS):
             joint = team.act(Observation(states, scenario), explore=False).joint_action
@@ -388,20 +391,27 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
             given = scenario.predict() if scenario.horizon == horizon else None
             if given is not None:
                 guesses["given"] = _states(given, joint)
-            held = np.full_like(joint, neutral) if scenario.state_space.n_own else joint
-            for action in [joint, *[held] * (horizon - 1)]:
-                transition = scenario.step(action)
-                over = transition.terminated or transition.truncated
-                if over:
-                    break
-            states = np.array(transition.states)
-            if over:
+            reached = _held(scenario, joint, horizon)
+            if reached is None:
                 break
+            states = reached
             for name, guess in guesses.items():
                 errors[name].append(apart(scenario, states, guess))
     index = [variable.name for variable in scenario.state_space.variables]
     roots = {name: np.sqrt(np.square(e).mean(axis=(0, 1))) for name, e in errors.items()}
     return pd.DataFrame(roots, index=index)
+
+
+def _held(scenario: Scenario, joint_action: IntArray, horizon: int) -> FloatArray | None:
+    """Return the states after a joint action and as long as it lasts; None if the episode ends."""
+    after = joint_action
+    if scenario.state_space.n_own:
+        after = np.full_like(joint_action, scenario.action_set.neutral)
+    for action in [joint_action, *[after] * (horizon - 1)]:
+        transition = scenario.step(action)
+        if transition.terminated or transition.truncated:
+            return None
+    return np.array(transition.states)
 
 
 def _states(prediction: Prediction, joint_action: IntArray) -> FloatArray:

@@ -16,6 +16,7 @@ from ..presentation import figures
 from ..presentation.figures import add_legend, look, marker
 from .team import BodyEffects, Explanation, exponent, mean_shares, percent, rules_table
 
+TEMPLATE = Path(__file__).with_name("text.txt.jinja")
 MOST_AGENTS = 8
 """Agents whose rules are printed; the file holds those of all."""
 
@@ -30,12 +31,14 @@ def text(explained: Explanation, agents: int | None = None) -> str:
     agents
         How many agents' rules to write; none: all.
     """
-    parts, variables, bodies = explained.parts, explained.variables, explained.bodies
+    parts = explained.parts
+    variables = explained.variables
+    bodies = explained.bodies
     names = explained.agents[:agents]
     shares = [f"{variables[j].name} {percent(share)}" for j, share in mean_shares(parts).items()]
     environment = jinja2.Environment(trim_blocks=True, undefined=jinja2.StrictUndefined)
     environment.filters["wrapped"] = _wrapped
-    template = environment.from_string(Path(__file__).with_name("text.txt.jinja").read_text())
+    template = environment.from_string(TEMPLATE.read_text(encoding="utf-8"))
     rendered = template.render(
         e=explained,
         has_learned=any(p.variance > 0 for p in parts),
@@ -85,7 +88,8 @@ def verdicts(bodies: BodyEffects, actuators: Sequence[str]) -> Iterator[str]:
     Its drive is the part of its effect that is along the one it was built with; a change within
     two of its standard deviations is called uncertain.
     """
-    built, last = bodies.moments["built"], bodies.moments["after"]
+    built = bodies.moments["built"]
+    last = bodies.moments["after"]
     for r, names in enumerate(by_body(bodies, actuators)):
         # A turning rate counts as the speed of an actuator that is built to turn most.
         unit = np.array([1.0, 1.0, 1.0 / max(1.0, float(np.abs(built[r][2]).max()))]) ** 2
@@ -122,48 +126,59 @@ MOST_LINES = 8
 
 def draw(explained: Explanation) -> dict[str, Figure]:
     """Return all figures that there is something for, by name."""
-    drawn: dict[str, Figure] = {}
+    drawings: dict[str, Figure] = {}
     with figures.styled():
         if any(p.variance > 0 for p in explained.parts):
             blocks = range(0, len(explained.agents), MOST_LINES)
             for number, first in enumerate(blocks, 1):
                 name = "functions" if len(blocks) == 1 else f"functions-{number}"
-                drawn[name] = _functions(explained, slice(first, first + MOST_LINES))
+                drawings[name] = _functions(explained, slice(first, first + MOST_LINES))
         if not isinstance(explained.policy, str):
-            drawn["policy"] = explained.policy.figure()
-    return drawn
+            drawings["policy"] = explained.policy.figure()
+    return drawings
 
 
 def _functions(explained: Explanation, block: slice) -> Figure:
-    d = len(explained.variables)
-    figure, panels = figures.grid(d, 4, (2.45, 2.2), (0.0, 0.7), sharey=True)
+    """Draw the functions of some agents, a panel for each variable."""
+    figure, panels = figures.grid(len(explained.variables), 4, (2.45, 2.2), (0.0, 0.7), sharey=True)
     panels = panels.ravel()
     power = exponent(explained.parts)
-    names, parts = explained.agents[block], explained.parts[block]
+    names = explained.agents[block]
+    parts = explained.parts[block]
     shares = mean_shares(parts)
-    bodies = list(dict.fromkeys(name.partition(".")[0] for name in names))
-    for j, (variable, partition) in enumerate(
-        zip(explained.variables, explained.rules.partitions, strict=True)
-    ):
-        axes, turn = panels[j], 180 / np.pi if variable.unit == "rad" else 1.0
-        ends = (variable.low, variable.high) if variable.periodic else partition.centres
-        if variable.unit == "rad":
+    styles = _styles(names)
+    for j, variable in enumerate(explained.variables):
+        axes = panels[j]
+        partition = explained.rules.partitions[j]
+        is_angle = variable.unit == "rad"
+        scale = 180 / np.pi if is_angle else 1.0
+        if is_angle:
             axes.xaxis.set_major_locator(MultipleLocator(90))
+        ends = (variable.low, variable.high) if variable.periodic else partition.centres
         x = np.union1d(np.linspace(min(ends), max(ends), 401), partition.centres)
+        centres = np.searchsorted(x, partition.centres).tolist()
         strengths = partition.strengths(x)
         for name, part in zip(names, parts, strict=True):
-            body = name.partition(".")[0]
-            member = [n for n in names if n.partition(".")[0] == body].index(name)
-            number = bodies.index(body)
-            style = look(number) | {"ls": look(member)["ls"], "marker": marker(number), "ms": 3}
-            at = np.searchsorted(x, partition.centres).tolist()
             y = 10.0**power * strengths @ part.singles[j]
-            axes.plot(turn * x, y, lw=1.4, markevery=at, label=name, **style)
+            axes.plot(scale * x, y, lw=1.4, markevery=centres, label=name, **styles[name])
         unit = {"rad": " [°]", "1": ""}.get(variable.unit, f" [{variable.unit}]")
         axes.set_title(f"{variable.name}{unit}, {percent(shares[j])}", loc="left")
         axes.axhline(0.0, color="#cccccc", lw=0.8, zorder=0)
-    scale = rf" [$\times 10^{{{-power}}}$]" if power else ""
-    figure.supylabel(f"adds to f{scale}", fontsize=9)
+    factor = rf" [$\times 10^{{{-power}}}$]" if power else ""
+    figure.supylabel(f"adds to f{factor}", fontsize=9)
     title = "markers: rules, less their mean; in the titles the share of the variance of f"
     add_legend(figure, panels[0].get_lines()[: len(names)], title)
     return figure
+
+
+def _styles(agents: Sequence[str]) -> dict[str, dict[str, object]]:
+    """Return how the line of each agent looks: colour and marker by body, dashes within it."""
+    bodies: dict[str, list[str]] = {}
+    for name in agents:
+        bodies.setdefault(name.partition(".")[0], []).append(name)
+    styles: dict[str, dict[str, object]] = {}
+    for number, members in enumerate(bodies.values()):
+        for member, name in enumerate(members):
+            dashes = look(member)["ls"]
+            styles[name] = look(number) | {"ls": dashes, "marker": marker(number), "ms": 3}
+    return styles

@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import ArrayLike
 
+from ..results.aggregates import Aggregates
 from ..results.analysis import Difference, Figures
-from ..results.contrasts import Aggregates
 from ..results.statistics import LEVEL, Estimate, stacked
 from ..store.durable import replacing
 

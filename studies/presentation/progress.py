@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import printable
 from ..spec.outline import StudyOutline
 from ..workers.runner import Observer, Outcome
 
@@ -52,7 +53,7 @@ PLAIN_SECONDS = 10.0
 
 def say(line: str) -> None:
     """Print a line on standard error."""
-    print(line, file=sys.stderr, flush=True)
+    print(printable(line), file=sys.stderr, flush=True)
 
 
 class Terminal(Observer):
@@ -67,7 +68,8 @@ class Terminal(Observer):
 
     def announce(self, spec: Spec, directory: Path, processes: int) -> None:
         """Say what is about to be run."""
-        conditions, seeds = len(spec.conditions()), len(spec.seeds)
+        conditions = len(spec.conditions())
+        seeds = len(spec.seeds)
         self.note(
             f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
             f"{StudyOutline.of(spec).lengths} of up to {count(spec.steps, 'step')}, "
@@ -114,13 +116,14 @@ def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:
         for outcome in outcomes:
             progress.advance(task)
             if outcome.error is not None:
-                progress.console.print(_failure(outcome), markup=False, highlight=False)
+                progress.console.print(printable(_failure(outcome)), markup=False, highlight=False)
 
 
 def _follow_lines(outcomes: Iterable[Outcome], total: int, done: int) -> None:
     begin = last = time.monotonic()
     for here, outcome in enumerate(outcomes, 1):
-        now, finished = time.monotonic(), done + here
+        now = time.monotonic()
+        finished = done + here
         if outcome.error is not None:
             say(_failure(outcome))
         if now - last >= PLAIN_SECONDS or finished == total:

@@ -24,7 +24,7 @@ from rich.table import Table
 from ...core.interface.measures import Measure
 from ...core.numerics import pd
 from ...core.plugins.settings import near
-from ..errors import SpecError
+from ..errors import SpecError, printable
 from ..results.analysis import Summary
 from ..results.statistics import FEW, Estimate, between, exactly, stacked, two_figures
 from .progress import count
@@ -54,7 +54,7 @@ def write_rows(
         text = io.StringIO()  # a console would end the program when its reader goes away
         console = Console(file=text, width=get_terminal_size().columns, highlight=False)
         for (condition, phase), rows in frame.groupby(["condition", "phase"], sort=False):
-            console.print(f"\n{escape(condition)}, {escape(phase)}")
+            console.print(f"\n{_literal(condition)}, {_literal(phase)}")
             console.print(_table(rows, {m.name: m for m in measures}))
         file.write(text.getvalue())
 
@@ -67,10 +67,15 @@ def _table(frame: pd.DataFrame, measures: dict[str, Measure]) -> Table:
     for name, texts in zip(shown, cells, strict=True):
         heading = measures[name].heading if name in measures else name
         least = max(map(len, [*heading.split(), *texts]))
-        table.add_column(escape(heading), justify="right", vertical="bottom", min_width=least)
+        table.add_column(_literal(heading), justify="right", vertical="bottom", min_width=least)
     for row in zip(*cells, strict=True):
         table.add_row(*row)
     return table
+
+
+def _literal(text: str) -> str:
+    """Return text as rich prints it: no markup, and nothing that a terminal obeys."""
+    return escape(printable(text))
 
 
 def _cells(column: pd.DataFrame, measure: Measure | None) -> list[str]:
@@ -94,7 +99,7 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """With what a spreadsheet's formula begins, if the spaces before it are left out."""
 
 
-def write_csv(file: TextIO, names: Iterable[str], rows: Iterable[Sequence[Any]]) -> None:
+def write_csv(file: TextIO, names: Iterable[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a header and rows; None becomes an empty cell."""
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(map(harmless, names))
@@ -108,12 +113,12 @@ def in_csv(frame: pd.DataFrame) -> str:
     return file.getvalue()
 
 
-def rows_of(frame: pd.DataFrame) -> Iterator[tuple[Any, ...]]:
+def rows_of(frame: pd.DataFrame) -> Iterator[tuple[object, ...]]:
     """Yield the rows of a frame as values of Python's own types; None is what is missing."""
     yield from frame.astype(object).where(frame.notna(), None).itertuples(index=False, name=None)
 
 
-def harmless(value: Any) -> Any:
+def harmless(value: object) -> object:
     """Return a value as it may stand in a spreadsheet, a truth value as 0 or 1.
 
     Examples
@@ -160,12 +165,12 @@ class SummaryTable:
             table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
             table.add_column("", overflow="fold")
             for i, width in block.items():
-                heading = escape(self.titles[i])
+                heading = _literal(self.titles[i])
                 table.add_column(heading, justify="right", overflow="fold", width=width)
             for condition, seeds, cells in self.rows:
                 shown = (cells[i] for i in block)
                 table.add_row(
-                    f"{escape(condition)}\n[dim]{count(seeds, 'seed')}[/]",
+                    f"{_literal(condition)}\n[dim]{count(seeds, 'seed')}[/]",
                     *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in shown),
                 )
             console.print(table)
@@ -337,7 +342,8 @@ def _blocks(titles: Sequence[str], rows: Sequence[Row], width: int) -> list[dict
     if label + sum(1 + wide for wide in whole) <= width:
         return [dict(enumerate(whole))]
     broken = [max(map(len, [*title.split(), *of_cells])) for title, of_cells in pairs]
-    n, label = len(broken), min(label, LABEL)
+    n = len(broken)
+    label = min(label, LABEL)
     for many in range(n, 0, -1):
         blocks = [{i: broken[i] for i in range(k, min(k + many, n))} for k in range(0, n, many)]
         if all(label + sum(1 + wide for wide in block.values()) <= width for block in blocks):

@@ -18,15 +18,16 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import jinja2
 import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from ...core.plugins.settings import ScenarioSettings
 from ...scenarios import SCENARIOS
-from ..catalogue.study import analyse_as, draw_figures, load_study
+from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError, show
 from ..presentation.figures import styled
 from ..presentation.progress import count
@@ -51,6 +52,23 @@ NOT_SIGNIFICANT = re.compile(r"(?:^  no significant difference: .*\n(?:    .*\n)
 """Lines of differences that are not significant, in what a study says."""
 
 
+Json = dict[str, Any]
+"""An object of JSON."""
+
+
+class EpisodePlayer(Protocol):
+    """A module that plays recordings on a canvas."""
+
+    SCRIPT: Path
+    """What draws a packed episode in its scene."""
+
+    def scene_of(self, recording: Recording) -> Json:
+        """Return the shapes that a recording is drawn in; raise ValueError if it cannot be."""
+
+    def pack(self, recording: Recording, scene: Json) -> Json:
+        """Return a recording as small as can be; its `data` is text."""
+
+
 class Film(NamedTuple):
     """The last training episode of a trial, drawn by its scenario."""
 
@@ -63,9 +81,9 @@ class Film(NamedTuple):
 class Replays(NamedTuple):
     """What the page plays."""
 
-    scenes: list[dict[str, Any]]
+    scenes: list[Json]
     """The shapes that episodes are drawn in."""
-    episodes: list[dict[str, Any]]
+    episodes: list[Json]
     """The packed episodes; `scene` is an index into `scenes`."""
     script: str
     """What draws them; empty if there are none."""
@@ -91,8 +109,11 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
     """
     reached = _reached(store)
     done = {(condition, seed) for condition, seed, _ in reached}
-    scenes, episodes = list[dict[str, Any]](), list[dict[str, Any]]()
-    scripts, others, size = set[str](), list[Planned](), 0
+    scenes = list[Json]()
+    episodes = list[Json]()
+    scripts = set[str]()
+    others = list[Planned]()
+    size = 0
     missing: defaultdict[str, Counter[str]] = defaultdict(Counter)
 
     for trial in trials:
@@ -134,7 +155,7 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
             readable = {trial.identity: trial for trial in trials_of(spec_of(store))}
     for condition in dict.fromkeys(trial.condition for trial in others):
         trial = next(trial for trial in others if trial.condition == condition)
-        gif = _drawn(store, readable[trial.identity]) if trial.identity in readable else ""
+        gif = _gif(store, readable[trial.identity]) if trial.identity in readable else ""
         if 0 < len(gif) <= most_bytes - size:
             films.append(Film(trial.condition, trial.seed, gif))
             size += len(gif)
@@ -144,9 +165,9 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
     return Replays(scenes, episodes, "".join(scripts), films, missing)
 
 
-def _drawn(store: Store, trial: Trial) -> str:
+def _gif(store: Store, trial: Trial) -> str:
     """Return the GIF of a trial's last episode in base64; nothing if its scenario cannot draw."""
-    scenario: Any = trial.world()
+    scenario = trial.world()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "episode.gif"
         try:
@@ -156,11 +177,12 @@ def _drawn(store: Store, trial: Trial) -> str:
         return base64.b64encode(path.read_bytes()).decode("ascii")
 
 
-def _scene_of(recording: Recording) -> tuple[Any, dict[str, Any]]:
+def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
     """Return who plays a recording, and in which scene; none if nobody can."""
-    models: list[Any] = [SCENARIOS.model(name) for name in SCENARIOS.built_in]
-    for name in dict.fromkeys(model.player for model in models if model.player):
-        player: Any = resolve_name(name)
+    models = [SCENARIOS.model(name) for name in SCENARIOS.built_in]
+    names = [model.player for model in models if issubclass(model, ScenarioSettings)]
+    for name in dict.fromkeys(filter(None, names)):
+        player: EpisodePlayer = resolve_name(name)
         with suppress(ValueError):
             return player, player.scene_of(recording)
     return None, {}
@@ -169,8 +191,9 @@ def _scene_of(recording: Recording) -> tuple[Any, dict[str, Any]]:
 def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode reached the goal, by condition, seed and number."""
     training = read(store).episodes.query("phase == 'training'")
-    success: Any = training.set_index(["condition", "seed", "episode"])["success"]
-    return success.astype(bool).to_dict()
+    success = training.set_index(["condition", "seed", "episode"])["success"]
+    reached: Mapping[tuple[str, int, int], bool] = success.astype(bool).to_dict()
+    return reached
 
 
 FOLDER = Path(__file__).parent
@@ -186,7 +209,9 @@ def page(directory: Path) -> str:
     """
     with Store.open(directory) as store:
         store.verify()
-        outline, results, counts = StudyOutline.kept(store), read(store), store.counts()
+        outline = StudyOutline.kept(store)
+        results = read(store)
+        counts = store.counts()
         failed = [
             (condition, seed, without_places(error.rstrip()))
             for condition, seed, error in store.failed()
@@ -197,7 +222,7 @@ def page(directory: Path) -> str:
     with sources.active():
         analysis = analyse_as(outline.study, results)
         figures = draw_figures(load_study(outline.study), analysis)
-    notes = getattr(analysis, "notes", ())
+    notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included
     return _template().render(
@@ -266,7 +291,7 @@ class Picture(NamedTuple):
 
 def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
     """Return a study's figures, by name, as they stand in a page and are taken away from it."""
-    drawn = []
+    drawings = []
     with styled():
         for number, (name, figure) in enumerate(figures.items(), 1):
             svg = io.StringIO()
@@ -275,8 +300,8 @@ def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
             pdf = io.BytesIO()
             figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
             encoded = base64.b64encode(pdf.getvalue()).decode("ascii")
-            drawn.append(Picture(name, Markup(text), encoded))
-    return drawn
+            drawings.append(Picture(name, Markup(text), encoded))
+    return drawings
 
 
 def embedded(svg: str, prefix: str) -> str:
@@ -296,9 +321,17 @@ def embedded(svg: str, prefix: str) -> str:
 
 
 PACKAGES = (
-    "nested-agents", "Box2D", "joblib", "matplotlib", "networkx", "numba", "numpy", "pydantic",
-    "scipy", "shapely",
-)  # fmt: skip
+    "nested-agents",
+    "Box2D",
+    "joblib",
+    "matplotlib",
+    "networkx",
+    "numba",
+    "numpy",
+    "pydantic",
+    "scipy",
+    "shapely",
+)
 """The packages that results and figures come from."""
 
 

@@ -115,7 +115,7 @@ class ConditionSettings(Settings):
             check_team(len(scenario.agents), SECONDS_PER_PAIR)
         except ValueError as error:
             raise ValueError(f"scenario: has {len(scenario.agents)} agents: {error}") from None
-        own: Sequence[tuple[int, int]] | None = getattr(scenario, "interactions", None)
+        own = scenario.interactions
         return scenario, build(self.topology, scenario.agents, scenario.groups, own)
 
     def acts_as(self, other: ConditionSettings) -> bool:

@@ -6,7 +6,7 @@
 ``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
 conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
 conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams. ``[tune]``
-are the values that `nested_agents.studies.api.alternatives` tries. Objects are put in the words
+are the values that `nested_agents.studies.api.tuning` tries. Objects are put in the words
 that a TOML file would have for them.
 """
 

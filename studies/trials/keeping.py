@@ -45,7 +45,7 @@ def open_to_run(
     trials
         All its trials.
     measures
-        What it measures of its episodes, see `nested_agents.studies.trials.session.check`.
+        What it measures of its episodes, see `arrangement.check_conditions`.
     accept_code
         Whether to go on although the installed code has changed since.
 

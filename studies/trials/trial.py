@@ -219,7 +219,7 @@ class Trial:
         # Settings of a user's thing are of a class that only its file can make again.
         evaluations = [(name, other.model_dump()) for name, other in self.evaluations]
         curriculum = [(s.name, s.episodes, s.scenario.model_dump()) for s in self.curriculum]
-        plain = {name: getattr(self, name) for name in ("condition", "seed", *AS_IN_SPEC)}
+        plain = {name: vars(self)[name] for name in ("condition", "seed", *AS_IN_SPEC)}
         return _revived, (self.sources, self.settings.model_dump(), evaluations, curriculum, plain)
 
     @cached_property
@@ -321,7 +321,7 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
             evaluations=condition.evaluations,
             curriculum=condition.curriculum,
             sources=spec.sources,
-            **{name: getattr(spec, name) for name in AS_IN_SPEC},
+            **{name: value for name, value in spec if name in AS_IN_SPEC},
         )
         for condition in spec.conditions()
     ]

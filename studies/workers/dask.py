@@ -11,7 +11,7 @@ import logging
 import os
 import time
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 
 from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, get_worker
@@ -19,7 +19,8 @@ from distributed.comm.core import CommClosedError
 
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .runner import ONE_THREAD, Outcome, RunTrial, Workers, attempt, beginning_processes, versions
+from .nursery import Answer, call_for
+from .runner import ONE_THREAD, Outcome, RunTrial, Workers, beginning_processes, versions
 
 CONNECT = 10.0
 """How long to try to reach a scheduler [s]."""
@@ -32,8 +33,10 @@ class UnlikeWorkerError(Exception):
     """A worker on which a trial might give other bits, or could not run; one line."""
 
 
-def attempt_alike(expected: dict[str, str], run_trial: RunTrial, trial: Trial) -> Outcome:
-    """Run one trial on a worker that somebody else started, if it is as `expected`.
+def call_alike(
+    expected: dict[str, str], function: Callable[..., Outcome | Answer], *arguments: object
+) -> Outcome | Answer:
+    """Run a trial on a worker that somebody else started, if it is as `expected`; see `call_for`.
 
     Raises
     ------
@@ -52,10 +55,10 @@ def attempt_alike(expected: dict[str, str], run_trial: RunTrial, trial: Trial) -
             f"the worker {worker.address} has {worker.state.nthreads} threads, must be 1: start "
             f"dask worker with --nworkers {worker.state.nthreads} --nthreads 1"
         )
-    return attempt(run_trial, trial)
+    return function(*arguments)
 
 
-class DaskWorkers(Workers):
+class DaskWorkers(Workers[Future]):
     """Workers of a Dask cluster; see `Workers`. Use `DaskWorkers.local` or `DaskWorkers.at`.
 
     Parameters
@@ -69,7 +72,9 @@ class DaskWorkers(Workers):
     """
 
     def __init__(self, client: Client, most: int | None, name: str) -> None:
-        self._client, self._most, self._name = client, most, name
+        self._client = client
+        self._most = most
+        self._name = name
         self._alone_since: float | None = None  # when there was no worker any more
 
     @classmethod
@@ -130,12 +135,13 @@ class DaskWorkers(Workers):
 
     def submit(self, run_trial: RunTrial, trial: Trial) -> Future:
         """See `Workers.submit`."""
-        return self._client.submit(attempt_alike, versions(), run_trial, trial, pure=False)
+        call = call_for(run_trial, trial)
+        return self._client.submit(call_alike, versions(), *call, pure=False)
 
     def fetch(self, future: Future, trial: Trial) -> Outcome | None:
         """See `Workers.fetch`."""
         try:
-            outcome: Outcome = future.result(timeout=CONNECT)
+            result: Outcome | Answer = future.result(timeout=CONNECT)
         except TimeoutError:
             return None  # the worker that held the result died
         except KilledWorker:
@@ -147,7 +153,7 @@ class DaskWorkers(Workers):
             raise self._gone() from None
         except ImportError as error:
             raise SpecError(f"{self._name}: a worker cannot begin: {error}") from None
-        return outcome
+        return result if isinstance(result, Outcome) else result.outcome(trial)
 
     def stop(self, futures: Sequence[Future]) -> None:
         """See `Workers.stop`."""

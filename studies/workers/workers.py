@@ -1,10 +1,12 @@
 """Who runs the trials: processes on this machine, or workers of a Dask cluster on many.
 
 A family of siblings with one interface, distinguished by the name of their backend. Whoever runs a
-trial, its bits are the same: each trial has a process to itself, linear algebra uses one thread.
+trial, its bits are the same: linear algebra uses one thread, and a trial that runs files of a user
+has a process to itself. Others may follow each other in one: nothing built in keeps state there.
 """
 
 import os
+import re
 import time
 import warnings
 from collections.abc import Iterator, Sequence
@@ -18,7 +20,8 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from ...core.plugins.settings import closest
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .runner import ONE_THREAD, Backend, Outcome, RunTrial, Workers, attempt, begin, cores
+from .nursery import Answer, call_for, describe_exit
+from .runner import ONE_THREAD, Backend, Outcome, RunTrial, Workers, begin, cores
 
 
 def check_jobs(jobs: int) -> None:
@@ -30,7 +33,7 @@ def check_jobs(jobs: int) -> None:
 @contextmanager
 def start_workers(
     backend: Backend, jobs: int | None, address: str | None, trials: int
-) -> Iterator[Workers]:
+) -> Iterator[Workers[Any]]:
     """Start workers, which end with the context, or connect to those of a cluster.
 
     Parameters
@@ -88,12 +91,29 @@ HANDED_ON = 2.0
 """How long loky may take to hand a trial on to a process [s]; until then it cannot stop it."""
 
 
-class LokyWorkers(Workers):
+CODES = re.compile(r"\w+\((-?\d+)\)")
+"""An exit code as loky writes it, such as ``SIGKILL(-9)``."""
+
+
+def _describe(death: TerminatedWorkerError) -> str:
+    """Return how workers ended; loky says it at length, and what else one might do.
+
+    Examples
+    --------
+    >>> _describe(TerminatedWorkerError("The exit codes of the workers are {EXIT(3), SIGABRT(-6)}"))
+    'exit code 3, killed by SIGABRT'
+    """
+    codes = CODES.findall(str(death).partition("exit codes of the workers are")[2])
+    return ", ".join(describe_exit(int(code)) for code in codes) or "it has not said how"
+
+
+class LokyWorkers(Workers[Future[Outcome | Answer]]):
     """Processes of this machine, which end with their parent; see `Workers`.
 
     Workers are separate processes even for one job: a crash in native code costs one trial, and
     the number of threads that linear algebra uses is always one. When a worker dies, loky ends all
-    others: the trials that were running then are all lost.
+    others: the trials that were running then are all lost. The process of a trial that runs files
+    of a user is no worker, and dies alone.
 
     Parameters
     ----------
@@ -111,23 +131,27 @@ class LokyWorkers(Workers):
         if QUIET not in filters:  # processes that are started from here on inherit it
             os.environ["PYTHONWARNINGS"] = f"{filters},{QUIET}".lstrip(",")
 
-    def submit(self, run_trial: RunTrial, trial: Trial) -> Future[Outcome]:
+    def submit(self, run_trial: RunTrial, trial: Trial) -> Future[Outcome | Answer]:
         """See `Workers.submit`."""
         self._executor = get_reusable_executor(  # another one, if a worker has died
-            self.processes, timeout=IDLE, initializer=begin, initargs=(os.getpid(),),
+            self.processes,
+            timeout=IDLE,
+            initializer=begin,
+            initargs=(os.getpid(),),
             env=ONE_THREAD | dict.fromkeys(THREADS, "1"),
-        )  # fmt: skip
-        future: Future[Outcome] = self._executor.submit(attempt, run_trial, trial)
+        )
+        future: Future[Outcome | Answer] = self._executor.submit(*call_for(run_trial, trial))
         return future
 
-    def fetch(self, future: Future[Outcome], trial: Trial) -> Outcome:
+    def fetch(self, future: Future[Outcome | Answer], trial: Trial) -> Outcome:
         """See `Workers.fetch`."""
         try:
-            return future.result()
+            result = future.result()
         except TerminatedWorkerError as death:
-            return Outcome(trial, str(death), 0.0, lost=True)
+            return Outcome(trial, _describe(death), 0.0, lost=True)
+        return result if isinstance(result, Outcome) else result.outcome(trial)
 
-    def stop(self, futures: Sequence[Future[Outcome]]) -> None:
+    def stop(self, futures: Sequence[Future[Outcome | Answer]]) -> None:
         """See `Workers.stop`."""
         until = time.monotonic() + HANDED_ON
         while any(not (f.running() or f.done()) for f in futures) and time.monotonic() < until:

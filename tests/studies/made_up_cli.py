@@ -19,7 +19,7 @@ import matplotlib.pyplot  # noqa: F401
 from nested_agents.results import commands
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
-from nested_agents.studies.cli.commands import reading, running, watch  # noqa: F401
+from nested_agents.studies.cli.commands import reading, running  # noqa: F401
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import text  # noqa: F401
 from nested_agents.studies.presentation import figures

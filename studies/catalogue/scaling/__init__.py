@@ -1,8 +1,8 @@
 """The scaling study: how the number of robots bears on success, time, memory and messages.
 
 Conditions differ in the number of robots and in how joint actions are evaluated; those of a spec of
-one's own may differ in anything. Of every trial it keeps, besides the episodes: numbers that are a
-function of it, and what it took, which is not.
+one's own may differ in anything, also in the kind of agents. Of every trial it keeps, besides the
+episodes: numbers that are a function of it, and what it took, which is not.
 
 Messages of a step are counted as Section V has agents talk: every agent passes the action it has
 decided to each agent below it, so there is one message for every edge of the hierarchy's transitive
@@ -21,11 +21,10 @@ from ....core.numerics import FloatArray, pd
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, shared
 from ...results.results import Results, Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
-from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..study import check_rule_bases, distinct
+from ..study import distinct
 
 NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median")
 """What of whole trials the analysis rests on."""
@@ -46,11 +45,6 @@ MEMORY = Path("/proc/self/status")
 CLEAR = Path("/proc/self/clear_refs")
 
 
-def check(spec: Spec) -> None:
-    """Raise `SpecError` unless all agents have rule bases."""
-    check_rule_bases(spec, "whose weights and messages it counts")
-
-
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and note what it takes; imported by name in workers."""
     session = Session.compiled(trial)
@@ -69,7 +63,7 @@ def measure(trial: Trial) -> TrialResult:
         "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
         "weight_bytes": float(team.weight_bytes),
     }
-    period = getattr(trial.settings.scenario, "period", None)
+    period = trial.settings.scenario.period
     if period is not None:
         numbers["period_s"] = period
     touching: list[FloatArray] = []

@@ -1,37 +1,60 @@
 """Commands that read a study, or several: what it measured, how far it is, what was learned."""
 
+import io
 import sys
+import time
 from pathlib import Path
 from shlex import quote
-from typing import Any, Literal
+from typing import Literal, TypedDict, Unpack
 
 import click
 
-from ...errors import SpecError, refused
+from ...errors import SpecError, printable, refused
 from ...spec.outline import StudyOutline
 from ...store import durable
 from ...store.store import Store
 from .. import options
-from ..display import print_study, print_table
+from ..display import Form, in_form, print_data, print_study, print_table, print_text
 from ..loading import describe, load_results, opened, progress, trust_files
+
+PERIOD = 2.0
+"""How often a study that is watched is looked at [s]."""
 
 
 @click.command()
 @options.directory
-def status(directory: Path) -> int:
+@options.flag("--watch", "On a terminal, look again every two seconds while anything is to come.")
+def status(directory: Path, watch: bool) -> int:
     """Tell how many trials are done, running, failed (with the reason) and left, and for how long.
 
-    DIR is where the study is kept.
+    DIR is where the study is kept, whoever runs it; looking at it disturbs nothing.
     """
+    if watch and sys.stdout.isatty():
+        _watch(directory)
     with Store.open(directory) as store:
-        now = progress(store)
-        print(*describe(store, now), sep="\n")
+        print_text(*describe(store, progress(store)))
         failed = store.failed()
     for condition, seed, error in failed:
-        print(f"\n{condition}, seed {seed} failed:\n{error.rstrip()}")
+        print_text(f"\n{condition}, seed {seed} failed:\n{error.rstrip()}")
     if failed:
-        print(f"\nto run them again: nested-agents retry {quote(str(directory))}")
+        print_text(f"\nto run them again: nested-agents retry {quote(str(directory))}")
     return 1 if failed else 0
+
+
+def _watch(directory: Path) -> None:
+    """Show how far a study is until nothing is to come."""
+    from rich.live import Live
+    from rich.text import Text
+
+    with Live(auto_refresh=False, transient=True) as live:
+        while True:
+            with Store.open(directory) as store:
+                now = progress(store)
+                lines = "\n".join(describe(store, now))
+            live.update(Text(printable(lines)), refresh=True)
+            if not now.is_going_on:
+                return
+            time.sleep(PERIOD)
 
 
 @click.command()
@@ -46,18 +69,34 @@ def status(directory: Path) -> int:
 )
 @options.form
 @options.trust
-def table(columns: tuple[str, ...], form: str, **choice: Any) -> int:
+def table(
+    sources: tuple[Path, ...],
+    study: str | None,
+    where: str | None,
+    columns: tuple[str, ...],
+    form: Form,
+    trust: bool,
+) -> int:
     """Print conditions against estimates with their 95 % intervals, as at the end of a run.
 
     DIR is where a study is kept; several are analysed together, as the first one says. FILE.json is
     a file of results that `export --format json` has written.
     """
-    study = load_results(**choice)
+    results = load_results(sources, study=study, where=where, trust=trust)
     if form == "table":
-        print_study(study, columns)
+        print_study(results, columns)
     else:
-        print(getattr(study.table(columns), form), end="")
+        print_data(in_form(results.table(columns), form))
     return 0
+
+
+class Compared(TypedDict):
+    """What is compared, see `StudyResults.compare`."""
+
+    by: str | None
+    measure: str
+    phase: str | None
+    reference: str | None
 
 
 @click.command()
@@ -66,7 +105,7 @@ def table(columns: tuple[str, ...], form: str, **choice: Any) -> int:
     "--by",
     metavar="KEY",
     help="Compare conditions that differ in this swept key alone, as robots or topology; "
-    "directory compares studies. By default all conditions with the first.",
+    "directory compares studies. By default (condition) all conditions with the first.",
 )
 @click.option(
     "--measure",
@@ -91,9 +130,9 @@ def compare(
     statistics: bool,
     plot: Path | None,
     where: str | None,
-    form: str,
+    form: Form,
     trust: bool,
-    **compared: Any,
+    **compared: Unpack[Compared],
 ) -> int:
     """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
 
@@ -106,15 +145,16 @@ def compare(
 
         with refused():
             write(comparison.figure(), plot)
-    tables = [comparison.table, *([comparison.aggregated] if statistics else [])]
     if form != "table":
-        print(*(getattr(table, form) for table in tables), sep="\n", end="")
+        print_data(in_form(comparison.table, form))
+        if statistics:
+            print_data(f"\n{in_form(comparison.aggregated, form)}")
         return 0
-    print_table(tables[0])
-    print("", *comparison.verdicts, sep="\n")
+    print_table(comparison.table)
+    print_text("", *comparison.verdicts)
     if statistics:
-        print()
-        print_table(tables[1], comparison.statistics.notes)
+        print_text("")
+        print_table(comparison.aggregated, comparison.statistics.notes)
     return 0
 
 
@@ -148,7 +188,9 @@ def results(directory: Path, form: Literal["table", "csv", "json"], phase: str) 
     if measured.phases and phase not in measured.phases:
         raise SpecError(f"--phase {phase!r}: {closest(phase, measured.phases)}")
     episodes = measured.episodes
-    write_rows(episodes[episodes["phase"] == phase], measured.measures, form, sys.stdout)
+    rows = io.StringIO()
+    write_rows(episodes[episodes["phase"] == phase], measured.measures, form, rows)
+    print_data(rows.getvalue())
     return 0
 
 
@@ -188,7 +230,7 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool) -> i
         raise SpecError(f"--out {folder}: {error.strerror or error}") from None
     for path, text in paths.items():
         durable.write(path, text.encode())
-    print(*paths, sep="\n")
+    print_text(*paths)
     return 0
 
 
@@ -199,7 +241,8 @@ def _texts(store: Store, form: Files) -> dict[str, str]:
     from ...results import marl_eval, published
     from ...results.results import read
 
-    results, outline = read(store), StudyOutline.kept(store)
+    results = read(store)
+    outline = StudyOutline.kept(store)
     if form == "json":
         kept = select_published(outline.study, results)
         return {"results.json": published.dumps(outline, kept)}
@@ -220,7 +263,7 @@ def report(directory: Path, out: Path | None, trust: bool) -> int:
     DIR is where the study is kept; it may be unfinished.
     """
     path = load_results([directory], trust=trust).report(out)
-    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, nothing outside it is needed")
+    print_text(f"{path}: {path.stat().st_size / 1e6:.1f} MB, nothing outside it is needed")
     return 0
 
 
@@ -254,7 +297,6 @@ def explain(directory: Path, condition: str | None, seed: int | None, trust: boo
     written = folder / "explanation.txt"
     durable.write(written, text(explanation).encode())
     figures = save(draw(explanation), folder)
-    print(text(explanation, MOST_AGENTS))
-    for path in (written, *figures):
-        print(path)
+    print_text(text(explanation, MOST_AGENTS))
+    print_text(written, *figures)
     return 0

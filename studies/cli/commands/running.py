@@ -2,12 +2,12 @@
 
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import TypedDict, Unpack
 
 import click
 
 from .. import options
-from ..display import print_table, show_results
+from ..display import print_data, print_table, print_text, show_results
 
 
 @click.command()
@@ -22,33 +22,36 @@ def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
     file = Path(__file__).parents[2] / "catalogue/learning_curve/demo.toml"
     text = file.read_text(encoding="utf-8")
     if print_spec:
-        print(text, end="")
+        print_data(text)
         return 0
-    from ...api import study as api
+    from ...api.running import run
+    from ...api.study import load
     from ...presentation.progress import Terminal
     from ...spec.spec import Spec
     from ...workers.runner import Outcome
 
     spec = Spec.parse(text)
-    first = spec.conditions()[0].label, spec.seeds[0]
+    condition = spec.conditions()[0].label
+    seed = spec.seeds[0]
     replays: dict[str, Future[Path]] = {}
 
     def draw(episode: str) -> Path:
         path = out / "replay" / f"{episode}-episode.gif"
         path.parent.mkdir(exist_ok=True)
-        return api.load(out).replay(*first, episode, path).path
+        return load(out).replay(condition, seed, episode, path).path
 
     def draw_first(outcome: Outcome) -> None:
-        if (outcome.trial.condition, outcome.trial.seed) == first and outcome.error is None:
+        is_first = (outcome.trial.condition, outcome.trial.seed) == (condition, seed)
+        if is_first and outcome.error is None:
             replays.update((name, drawing.submit(draw, name)) for name in ("last", "first"))
             terminal.note(f"what the first trial has learned: {replays['last'].result()}")
 
     terminal = Terminal(draw_first)
     with ThreadPoolExecutor(1) as drawing:  # trials go on while the first episode is drawn
-        study = api.run(spec, out, jobs=jobs, observer=terminal)
+        study = run(spec, out, jobs=jobs, observer=terminal)
     status = show_results(study)
     for name in ("first", "last") if not study.failed else ():
-        print(f"replay  {replays[name].result() if name in replays else draw(name)}")
+        print_text(f"replay  {replays[name].result() if name in replays else draw(name)}")
     return status
 
 
@@ -69,13 +72,13 @@ def run(
     trust: bool,
     figures: tuple[str, ...],
     changes: tuple[str, ...],
-    **running: Any,
+    **running: Unpack[options.RunOptions],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
 
     SPEC.toml says what to run; `nested-agents demo --print-spec` prints an example.
     """
-    from ...api import study as api
+    from ...api.running import run
     from ...errors import SpecError
     from ...presentation.progress import Terminal
     from ...spec.spec import Spec
@@ -86,7 +89,7 @@ def run(
         if (directory / DATABASE).exists():
             trust_files(directory)
     try:
-        given = Spec.load(spec, changes, study=out)
+        changed = Spec.load(spec, changes, study=out)
     except SpecError as error:
         if not (out / DATABASE).exists() or spec.resolve() != (out / SPEC_FILE).resolve():
             raise
@@ -94,7 +97,20 @@ def run(
             f"{error}; if you did not edit {spec}, it is damaged: nested-agents retry {out} goes "
             "on by the database"
         ) from None
-    return show_results(api.run(given, out, observer=Terminal(), **running), figures)
+    return show_results(run(changed, out, observer=Terminal(), **running), figures)
+
+
+class Budget(TypedDict):
+    """The options of how much is tried by ``tune``."""
+
+    trials: int
+    seeds: int
+    first_seed: int
+    draw: int
+
+
+class TuneOptions(Budget, options.RunOptions):
+    """All options of ``tune`` but where to and what to change."""
 
 
 @click.command()
@@ -109,21 +125,30 @@ def run(
 @options.number("--draw", "N", 0, "Seed of the draw.")
 @options.running
 @options.changes
-def tune(spec: Path, out: Path, changes: tuple[str, ...], **choice: Any) -> int:
+def tune(spec: Path, out: Path, changes: tuple[str, ...], **choice: Unpack[TuneOptions]) -> int:
     """Look for better settings of a spec, on seeds that no report uses; again, it continues.
 
     SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
     configurations are tried on two seeds, the better half on four, and so on.
     """
-    from ...api import alternatives
+    from ...api import tuning
     from ...spec.spec import Spec
 
-    tuned = alternatives.tune(Spec.load(spec, changes, study=out), out, **choice)
+    tuned = tuning.tune(Spec.load(spec, changes, study=out), out, **choice)
     print_table(tuned.study.table(tuned.columns))
-    print("", *tuned.lines, "", sep="\n")
-    print(f"spec    {out / alternatives.BEST_FILE}")
-    print(f"table   {out / alternatives.TABLE_FILE}")
+    print_text("", *tuned.lines, "")
+    print_text(f"spec    {out / tuning.BEST_FILE}")
+    print_text(f"table   {out / tuning.TABLE_FILE}")
     return 0
+
+
+class Supposed(TypedDict):
+    """What a plan supposes."""
+
+    jobs: int | None
+    deviation: float
+    smallest: float
+    timed: bool
 
 
 @click.command()
@@ -133,15 +158,15 @@ def tune(spec: Path, out: Path, changes: tuple[str, ...], **choice: Any) -> int:
 @options.number("--smallest", "D", 0.2, "The smallest difference of success rates of interest.")
 @click.option("--timed/--no-timed", default=True, help="Try episodes of every condition.")
 @options.changes
-def plan(spec: Path, changes: tuple[str, ...], **supposed: Any) -> int:
+def plan(spec: Path, changes: tuple[str, ...], **supposed: Unpack[Supposed]) -> int:
     """Tell trials, time, memory and the differences that a study can find, before it is run.
 
     SPEC.toml says what to run. Episodes of every condition are tried out for a second.
     """
-    from ...api import running
+    from ...api import planning
     from ...spec.spec import Spec
 
-    print(running.plan(Spec.load(spec, changes), **supposed))
+    print_text(planning.plan(Spec.load(spec, changes), **supposed))
     return 0
 
 
@@ -149,12 +174,12 @@ def plan(spec: Path, changes: tuple[str, ...], **supposed: Any) -> int:
 @options.directory
 @options.running
 @options.trust
-def retry(directory: Path, trust: bool, **running: Any) -> int:
+def retry(directory: Path, trust: bool, **running: Unpack[options.RunOptions]) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
     DIR is where the study is kept.
     """
-    from ...api import study as api
+    from ...api.running import run
     from ...presentation.progress import Terminal
     from ...store.store import Store
     from ...trials.keeping import spec_of
@@ -164,5 +189,5 @@ def retry(directory: Path, trust: bool, **running: Any) -> int:
         trust_files(directory)
     with Store.open(directory) as store:
         spec = spec_of(store)
-    study = api.run(spec, directory, retry_failed=True, observer=Terminal(), **running)
+    study = run(spec, directory, retry_failed=True, observer=Terminal(), **running)
     return show_results(study)

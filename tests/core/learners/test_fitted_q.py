@@ -1,5 +1,7 @@
 """Fitted Q against ridge regression written out in NumPy, and what it makes of a hierarchy."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from acting import fuzzy
@@ -212,14 +214,81 @@ def test_neighbours_are_refused_as_they_tell_nothing() -> None:
         team(Hierarchy(names, [], [names[:2]]))
 
 
-def test_a_team_goes_on_with_all_it_has_learned_unless_others_tell_it_something() -> None:
+def test_a_team_goes_on_with_all_it_has_learned() -> None:
     former, later = team(chain()), team(chain())
     told_in(former)
     fuzzy(former).learner.theta[:] = 1.0
     later.continue_from(former)
     assert (fuzzy(later).learner.theta == 1.0).all()
-    with pytest.raises(ValueError, match="told by 1 fewer others than when it learned"):
-        team(chain(told="parents")).continue_from(former)
+
+
+def test_who_is_told_by_others_goes_on_by_name_of_variable() -> None:
+    fewer, more = made(1)[0], made(2)[0]
+    fewer.theta[1] = [1, 2, 3, 4, 5, 6, 10, 20, 30, 40, 50, 60]
+    more.continue_from(fewer, np.arange(2))
+    assert more.theta[1].tolist() == [1, 2, 3, 4, 5, 6, 10, 20, 30, 40, 50, 60, *[0] * 6]
+    assert (more.theta[0] == 0).all()
+    more.theta[1, -6:] = [100, 200, 300, 400, 500, 600]  # told2 is left, right, nobody
+    fewer.continue_from(more, np.arange(2))
+    # Where told2 was nobody there is left the sum, of which it does not matter whose part it is.
+    values = fewer.theta[1].reshape(2, 3, 2)
+    assert (values[0, :, None] + values[1]).tolist() == [
+        [[1 + 10 + 500, 2 + 20 + 600], [1 + 30 + 500, 2 + 40 + 600], [1 + 50 + 500, 2 + 60 + 600]],
+        [[3 + 10 + 500, 4 + 20 + 600], [3 + 30 + 500, 4 + 40 + 600], [3 + 50 + 500, 4 + 60 + 600]],
+        [[5 + 10 + 500, 6 + 20 + 600], [5 + 30 + 500, 6 + 40 + 600], [5 + 50 + 500, 6 + 60 + 600]],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("order", "numbers"),
+    [(1, (0, 2)), ("full", (2, 0)), *product([1, 2, "full"], [(1, 3), (3, 1), (2, 1)])],
+)
+def test_values_are_carried_whoever_tells(order: int | str, numbers: tuple[int, int]) -> None:
+    """With those who tell nothing any more, or nothing yet, an agent values as it did."""
+    rng = np.random.default_rng(0)
+    base = RuleBaseSettings(order=order)
+    before, after = (made(n, rule_base=base)[0] for n in numbers)
+    before.theta[:] = rng.normal(size=before.theta.shape)
+    after.continue_from(before, np.arange(2))
+    known = min(numbers)
+    told = rng.integers(0, 3, (20, known)).astype(float)
+    gaps, acts = rng.random((20, 1)), rng.integers(0, 2, (20, 1))
+    there, here = (np.hstack([gaps, told, np.full((20, n - known), 2.0), acts]) for n in numbers)
+    for old, new in zip(before.theta, after.theta, strict=True):
+        ours, theirs = after.rules.values(new, here), before.rules.values(old, there)
+        np.testing.assert_allclose(ours, theirs, atol=1e-12)
+
+
+def test_experience_of_others_who_tell_is_that_of_nobody() -> None:
+    """What is learned after is what would have been learned with nobody in place of them."""
+    rng = np.random.default_rng(2)
+    keys = {"forgetting": 0.2, "target_averaging_rate": 1.0, "regression_iterations": 60}
+    lefts = np.concatenate([rng.random((7, 2, 1)), rng.integers(0, 3, (7, 2, 1))], axis=2)
+    padded = np.concatenate([lefts, np.full((7, 2, 1), 2.0)], axis=2)
+    acts, paid = rng.integers(0, 2, (7, 2)), 0.01 * rng.normal(size=7)
+    carried, whole = made(2, **keys)[0], made(2, **keys)[0]
+    former = made(1, **keys)[0]
+    feed(former, lefts, acts, paid, True)
+    feed(whole, padded, acts, paid, True)
+    carried.continue_from(former, np.arange(2))
+    np.testing.assert_allclose(carried.arrays()["gram"], whole.arrays()["gram"], atol=1e-12)
+    for learner in (carried, whole):
+        feed(learner, padded[::-1], acts, paid, True)
+    np.testing.assert_allclose(carried.theta, whole.theta, atol=1e-6)
+    shorter = made(1, **keys)[0]
+    shorter.continue_from(whole, np.arange(2))
+    assert shorter.states_of(0).shape == (14, 3)
+    fresh = made(1, **keys)[0]
+    feed(fresh, lefts, acts, paid, True)
+    feed(fresh, lefts[::-1], acts, paid, True)
+    np.testing.assert_allclose(shorter.arrays()["gram"], fresh.arrays()["gram"], atol=1e-12)
+
+
+def test_products_that_are_none_without_those_who_tell_are_refused() -> None:
+    products = RuleBaseSettings(products=(("gap", "told1", "told2"),))
+    before = made(2, rule_base=products)[0]
+    with pytest.raises(ValueError, match="is told by fewer others than when it learned"):
+        made(1)[0].continue_from(before, np.arange(2))
 
 
 def test_a_topology_that_says_whom_agents_consider_is_remarked_on() -> None:

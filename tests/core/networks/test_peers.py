@@ -4,15 +4,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+from acting import look
 
+from nested_agents.core.agents.team import Team
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.agents import Agents
+from nested_agents.core.interface.experience import Experience, Observation
+from nested_agents.core.interface.plain import as_scenario
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
-from nested_agents.core.networks.peer import FARTHEST, Inputs, Peer, RewardScale, Seen
+from nested_agents.core.networks.inputs import FARTHEST, Inputs, RewardScale
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import Session, check, run_trial
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 TABLE: dict[str, Any] = {
@@ -42,7 +49,7 @@ class Beacons:
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
 
-    def reset(self) -> Any:
+    def reset(self, seed: Any = 0, episode: int = 0) -> Any:
         self.lit = self.rng.integers(4, size=2)
         return np.eye(4)[self.lit]
 
@@ -58,7 +65,7 @@ def test_inputs_by_hand() -> None:
             "two", (Variable("speed", "1", -2, 2), Variable("way", "rad", 0, 2, periodic=True)), 1
         )
 
-    inputs = Inputs(Two(0))
+    inputs = Inputs(as_scenario(Two(0)))
     states = np.array([[1.0, 0.5], [-100.0, 0.5]])
     assert inputs.each(states) == pytest.approx(
         np.array([[0.5, 1, 0, 1, 0], [-FARTHEST, 1, 0, 0, 1]]), abs=1e-12
@@ -70,8 +77,8 @@ def test_inputs_by_hand() -> None:
 def test_what_is_seen_is_the_present_and_what_may_follow() -> None:
     scenario = LineUpSettings(carts=2).build()
     states = scenario.reset(3)
-    seen = Peer(np.random.SeedSequence(0)).predict(scenario, states)
-    assert isinstance(seen, Seen)
+    seen = look(scenario, states)
+    assert isinstance(seen, Observation)
     assert seen.present is states
     joint = np.array([[0, 1], [2, 3]])
     assert (seen.states(1, joint) == scenario.predict().states(1, joint)).all()
@@ -85,9 +92,9 @@ def test_rewards_are_scaled_by_the_spread_of_returns() -> None:
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.networks.networks", None)
+    monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.networks.policies", None)
     with pytest.raises(SpecError, match=r"'ippo': needs the extra peers, pip install") as raised:
-        check(spec_of("ippo"))
+        check_conditions(spec_of("ippo"))
     assert "\n" not in str(raised.value)
 
 
@@ -115,18 +122,19 @@ def test_they_learn(kind: str) -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     table = {"kind": kind, "rollout": 32, "learning_rate": 0.003, "entropy": 0.02}
     world = Beacons(10_000)
-    peer: Any = LEARNERS.model(kind).model_validate(table).build(world, np.random.SeedSequence(0))
+    settings: Any = LEARNERS.model(kind).model_validate(table)
+    team = Team(settings, world, Hierarchy(world.agents, []), np.random.SeedSequence(0))
 
     def rate(episodes: int, *, learn: bool) -> float:
         paid = 0.0
         for _ in range(episodes):
-            peer.begin_episode()
-            joint = peer.act(Seen(world.reset(), world), explore=learn)  # type: ignore[arg-type]
-            transition = world.step(joint)
+            team.begin_episode()
+            seen = look(world, world.reset())
+            decision = team.act(seen, explore=learn)
+            transition = world.step(decision.joint_action)
             paid += np.mean(transition.reward)
             if learn:
-                peer.learn(transition)
-                peer.end_episode()
+                team.learn(Experience(seen, decision, transition, last=True))
         return paid / episodes
 
     rate(500, learn=True)
@@ -139,17 +147,17 @@ def test_arrays_act_as_the_networks_do(kind: str) -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     session = Session(trials_of(spec_of(kind))[0])
     session.train(2)  # the networks have been updated by now
-    peer: Any = session.team
-    policy = peer._model.policy if kind == "dqn" else peer.parts["all"].model.policy
+    agents: Any = session.team.only(Agents)
+    policy = agents._model.policy if kind == "dqn" else agents.policies["all"].model.policy
     n_inputs = policy.observation_space.shape[0]
     seen = np.random.default_rng(0).standard_normal((5, n_inputs)).astype(np.float32)
     with torch.no_grad():
         if kind == "dqn":
-            pairs = [(peer._q(seen), policy.q_net(torch.as_tensor(seen)))]
+            pairs = [(agents._q(seen), policy.q_net(torch.as_tensor(seen)))]
         else:
             features = policy.mlp_extractor(torch.as_tensor(seen))
-            pairs = [(peer.parts["all"].actor(seen), policy.action_net(features[0]))]
-            pairs += [(peer.parts["all"].critic(seen), policy.value_net(features[1]))]
+            pairs = [(agents.policies["all"].actor(seen), policy.action_net(features[0]))]
+            pairs += [(agents.policies["all"].critic(seen), policy.value_net(features[1]))]
     for ours, theirs in pairs:
         assert ours == pytest.approx(theirs.numpy(), abs=1e-5)
 
@@ -157,13 +165,14 @@ def test_arrays_act_as_the_networks_do(kind: str) -> None:
 def test_dqn_needs_one_agent() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     with pytest.raises(SpecError, match=r"dqn': acts for one agent, there are 2; use agents"):
-        check(spec_of("dqn", agents="actuator"))
+        check_conditions(spec_of("dqn", agents="actuator"))
 
 
 def test_what_needs_rule_bases_says_so() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
-    (trial,) = trials_of(spec_of("ppo", study="scaling"))
-    from nested_agents.studies.catalogue.scaling import measure
+    (trial,) = trials_of(spec_of("ppo", study="related"))
+    from nested_agents.studies.catalogue.related import measure
 
-    with pytest.raises(ValueError, match="acts for all by itself; this needs agents with rule"):
+    with pytest.raises(ValueError, match="needs FuzzyAgents, the team is of CentralPPO") as raised:
         measure(trial)
+    assert "\n" not in str(raised.value)

@@ -78,3 +78,6 @@ def test_what_cannot_be_is_refused() -> None:
         faults.recovery_table(make, {}, late, episodes=15)
     with pytest.raises(ValueError, match="seeds = 0"):
         faults.recovery_table(make, {}, {}, seeds=0)
+    never = {"never": [faults.Free(actuators=0, episode=5)]}
+    with pytest.raises(ValueError, match="policy = 7: must be a function, or have a method"):
+        faults.recovery_table(make, {"seven": 7}, never, episodes=15)

@@ -1,94 +1,21 @@
-import re
+"""Studies are run, with made-up results."""
 
-import numpy as np
+import made_up
 import pytest
 
 import nested_agents as na
-from nested_agents.core.agents.team import Team
 from nested_agents.studies.api import running
-from nested_agents.studies.api.running import learned, try_out
-from nested_agents.studies.cli.main import main
-from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.catalogue import learning_curve
 
-SPEC = na.Spec(
-    seeds=5, episodes=4, steps=20, evaluation=2, learner={"kind": "td-lambda"},
-    scenario=na.LineUpSettings(carts=2), sweep={"scenario.carts": [2, 3]},
-)  # fmt: skip
+TABLE = {"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
+         "sweep": {"preset": ["default", "frozen"]}}  # fmt: skip
 
 
-def test_a_plan_tells_trials_time_memory_and_power() -> None:
-    plan = na.plan(SPEC, jobs=2)
-    assert (plan.trials, plan.processes, plan.comparisons) == (10, 2, 1)
-    quick, slow = plan.seconds
-    assert 0.0 < quick < slow / 2
-    assert quick > 0.1, "a worker has to start"
-    assert 5e7 < plan.memory < 1e10
-    text = str(plan)
-    assert "trials   10, each 4 episodes of up to 20 steps" in text
-    assert "5 seeds cannot give an adjusted p below .05" in text
-    assert "with 2 processes, the start of workers included" in text
-    assert "at most" not in text
-    assert max(map(len, text.splitlines())) <= 80
-
-
-def test_more_seeds_find_smaller_differences() -> None:
-    plans = [na.plan(SPEC.model_copy(update={"seeds": n}), timed=False) for n in (8, 20, 40)]
-    smallest = [re.search(r"a difference of (\.\d+) is found", str(plan))[1] for plan in plans]
-    assert smallest == sorted(smallest, reverse=True)
-    assert len(set(smallest)) == 3
-    assert plans[1].seconds is None
-    assert all("it takes about 15" in " ".join(str(plan).split()) for plan in plans)
-
-
-def test_learning_from_all_that_is_kept_grows_with_the_square_of_training() -> None:
-    steps = np.array([30.0, 10.0, 20.0])
-    taken = 1e-3 * steps + 1e-6 * steps * np.array([30.0, 40.0, 60.0])
-    quick, slow = learned(steps, taken, np.array([50.0, 100.0]), np.array([10]))
-    assert quick == pytest.approx(0.5 + 1e-6 * 50**2 * 55)
-    assert slow == pytest.approx(1.0 + 1e-6 * 100**2 * 55)
-    stages = learned(steps, taken, np.array([100.0]), np.array([4, 6]))
-    assert stages[0] == pytest.approx(1.0 + 1e-6 * 100**2 * (10 + 21))
-
-
-def test_what_a_condition_takes_is_tried_out() -> None:
-    tried = try_out(trials_of(SPEC)[0])
-    assert 0.0 < tried.seconds[0] <= tried.seconds[1] < 60.0
-    assert tried.memory > 0.0
-
-
-def test_of_many_agents_first_steps_are_tried(monkeypatch) -> None:
-    monkeypatch.setattr(running, "WHOLE", 8)
-    acted: list[int] = []
-    act = Team.act
-    monkeypatch.setattr(
-        Team, "act", lambda team, *args, **kwargs: acted.append(1) or act(team, *args, **kwargs)
-    )
-    try_out(trials_of(SPEC)[0])
-    assert len(acted) == 2 + 2 * 2 + 4 * 4 + 2 * 4, "brief, then four steps of two carts' episodes"
-
-
-def test_episodes_that_were_not_tried_last_from_a_quarter_to_twice_as_long() -> None:
-    assert running._others([4.0, 8.0], 20, 100).tolist() == [1.5, 16.0]
-    assert running._others([4.0, 4.0], 20, 4).tolist() == [4.0, 20.0], "not tried to their ends"
-
-
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        (["--deviation", "0"], "--deviation 0: must be above 0 and at most 1"),
-        (["--smallest", "x"], "'--smallest': 'x' is not a valid float"),
-        (["--jobs", "0"], "--jobs 0: must be at least 1"),
-    ],
-)
-def test_numbers_out_of_range_are_refused(tmp_path, capsys, options, complaint) -> None:
-    path = tmp_path / "spec.toml"
-    path.write_text("seeds = 2")
-    assert main(["plan", str(path), "--no-timed", *options]) == 2
-    assert complaint in capsys.readouterr().err
-
-
-def test_doubtful_sizes_are_told_before_anything_is_spent(tmp_path, capsys) -> None:
-    path = tmp_path / "spec.toml"
-    path.write_text("seeds = 2\n[scenario.infrared]\nreach = 60.0\n")
-    assert main(["plan", str(path), "--no-timed"]) == 0
-    assert "scenario.infrared.reach = 60 m: perhaps meant in mm" in capsys.readouterr().out
+def test_failed_trials_are_warned_of(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(learning_curve, "measure", made_up.failing)
+    monkeypatch.setattr(running, "check", lambda spec, **_: made_up.MEASURES)
+    with pytest.warns(UserWarning, match=r"1 trial failed: study\.failed says why"):
+        study = na.run(TABLE, tmp_path / "out", jobs=1, progress=False)
+    ((condition, seed, error),) = study.failed
+    assert (condition, seed) == ("frozen", 1)
+    assert "a wheel came off" in error

@@ -1,5 +1,7 @@
 """A study in Python, with made-up results: nothing here simulates."""
 
+from dataclasses import replace
+
 import made_up
 import pytest
 
@@ -36,6 +38,13 @@ def test_a_study_tells_its_conditions_table_and_notes(study) -> None:
     assert table._repr_html_().count("<tr>") == 2
     assert "<th>default, 3 seeds</th>" in study._repr_html_()
     assert "3 seeds cannot give an adjusted p below .05" in " ".join(study.power)
+
+
+def test_a_name_is_text_in_html(study, monkeypatch) -> None:
+    table = study.table()
+    monkeypatch.setattr(na.StudyResults, "table", lambda _: table)
+    named = replace(study, outline=study.outline._replace(study="<b>.py:Mine"))
+    assert named._repr_html_().startswith("<h4>&lt;b&gt;.py:Mine</h4>")
 
 
 def test_rows_are_data_frames_whose_columns_are_told(study) -> None:
@@ -118,13 +127,3 @@ def test_what_holds_no_study_is_refused_in_one_line(tmp_path) -> None:
         na.load(tmp_path)
     with pytest.raises(na.SpecError, match="needs a directory"):
         na.load()
-
-
-def test_failed_trials_are_warned_of(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(learning_curve, "measure", made_up.failing)
-    monkeypatch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
-    with pytest.warns(UserWarning, match=r"1 trial failed: study\.failed says why"):
-        study = na.run(TABLE, tmp_path / "out", jobs=1, progress=False)
-    ((condition, seed, error),) = study.failed
-    assert (condition, seed) == ("frozen", 1)
-    assert "a wheel came off" in error

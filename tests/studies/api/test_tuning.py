@@ -3,7 +3,7 @@ import tomllib
 import pytest
 
 import nested_agents as na
-from nested_agents.studies.api import alternatives
+from nested_agents.studies.api import tuning
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.workers.runner import Observer
@@ -59,7 +59,7 @@ def test_what_was_interrupted_goes_on_and_runs_nothing_twice(tuned, tmp_path, mo
                 if len(ran) in (3, 9):  # in the first rung, and in the last
                     raise KeyboardInterrupt
 
-    monkeypatch.setattr(alternatives, "Terminal", Interrupting)
+    monkeypatch.setattr(tuning, "Terminal", Interrupting)
     budget = {**BUDGET, "progress": True}
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
@@ -67,7 +67,7 @@ def test_what_was_interrupted_goes_on_and_runs_nothing_twice(tuned, tmp_path, mo
     assert na.tune(SPEC, tmp_path, **budget).changes == former.changes
     with Store.open(out) as store:
         assert sorted(ran) == sorted(store.states())
-    for name in (alternatives.BEST_FILE, alternatives.TABLE_FILE):
+    for name in (tuning.BEST_FILE, tuning.TABLE_FILE):
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
     na.tune(SPEC, tmp_path, **budget)
     assert len(ran) == len(set(ran))
@@ -75,7 +75,7 @@ def test_what_was_interrupted_goes_on_and_runs_nothing_twice(tuned, tmp_path, mo
 
 def test_the_same_draw_gives_the_same_configurations() -> None:
     spec = na.Spec.of({key: value for key, value in SPEC.items() if key != "tune"})
-    first, again, other = (alternatives._sampled(spec, 5, draw) for draw in (0, 0, 1))
+    first, again, other = (tuning._sample(spec, 5, draw) for draw in (0, 0, 1))
     assert list(first) == ["given", "c01", "c02", "c03", "c04"]
     assert first == again != other
     keys = set(first["c01"])

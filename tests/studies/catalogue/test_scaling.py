@@ -1,4 +1,5 @@
 from pathlib import Path
+from typing import Any
 
 import pytest
 from made_up_results import NOTHING, Arrays, scaling
@@ -6,10 +7,11 @@ from made_up_results import NOTHING, Arrays, scaling
 from nested_agents.results import SPECS
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
-from nested_agents.studies.catalogue.study import draw_figures
+from nested_agents.studies.catalogue.study import draw_figures, load_study
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import arrange, check, run_trial
+from nested_agents.studies.trials.arrangement import arrange, check_conditions
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SIZES = {2: 0.9, 8: 0.9, 64: 0.5}
@@ -105,6 +107,57 @@ def test_a_trial_is_measured_without_being_changed() -> None:
     assert result.usage["process_bytes"] > 0
 
 
+SHORT = {"rollout": 4, "batch_size": 4, "epochs": 1, "hidden": [8]}
+
+
+@pytest.mark.parametrize(
+    ("learner", "agents", "expected"),
+    [
+        ({}, "actuator", {"messages": 1, "joint_actions": 8}),
+        ({"kind": "hierarchy-ppo", **SHORT}, "actuator", {"messages": 1, "joint_actions": 8}),
+        ({"kind": "mappo", **SHORT}, "actuator", {"messages": 0, "joint_actions": 8}),
+        ({"kind": "ppo", **SHORT}, "actuator", {"messages": 0, "joint_actions": 8}),
+        ({"kind": "dqn", "hidden": [8]}, "team", {"messages": 0, "agents": 1}),
+    ],
+)
+def test_agents_of_every_kind_are_counted(
+    learner: dict[str, Any], agents: str, expected: dict[str, float]
+) -> None:
+    if "hidden" in learner:
+        pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    table = {
+        "study": "scaling",
+        "seeds": [7],
+        "episodes": 1,
+        "steps": 6,
+        "evaluation": 1,
+        "scenario": {"kind": "line-up", "carts": 2},
+        "agents": agents,
+        "learner": learner,
+        "preset": "default" if learner else "fitted-q",
+    }
+    spec = Spec.of(table)
+    load_study("scaling").check(spec)
+    (trial,) = trials_of(spec)
+    result = measure(trial)
+    assert result.rows == run_trial(trial).rows
+    assert {name: result.numbers[name] for name in expected} == expected
+    assert 0 < result.numbers["weight_bytes"] <= result.numbers["team_bytes"]
+
+
+def test_weights_of_networks_by_hand() -> None:
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    table = {
+        "scenario": {"kind": "line-up", "carts": 2},
+        "learner": {"kind": "hierarchy-ppo", "critic": "own", **SHORT},
+    }
+    (condition,) = Spec.of(table).conditions()
+    told, own, hidden, actions = 4, 4, 8, 4
+    actor = hidden * (told + own + 1) + actions * (hidden + 1)
+    critic = hidden * (own + 1) + hidden + 1
+    assert arrange(condition.settings, 0).team.weight_bytes == 4 * (actor + critic)
+
+
 def test_the_spec_reaches_from_2_to_64_robots() -> None:
     own = Path(module.__file__).parent / "scaling.toml"
     paths = (SPECS / "scaling" / "costs.toml", own, SPECS / "scaling" / "crowds.toml")
@@ -114,4 +167,4 @@ def test_the_spec_reaches_from_2_to_64_robots() -> None:
         assert sizes <= {c.settings.scenario.robots for c in conditions}
     spec = specs[0]
     small = spec.model_copy(update={"overrides": spec.overrides[:1]})
-    check(small)
+    check_conditions(small)

@@ -1,4 +1,4 @@
-"""Results are read and watched without running again: commands, with made-up results."""
+"""Results are read without running again: commands, with made-up results."""
 
 import os
 import shutil
@@ -8,9 +8,9 @@ from contextlib import closing
 import made_up
 import pytest
 from made_up_commands import Command, finish, run_here
-from rich.console import Console
 
-from nested_agents.studies.cli.commands.watch import curve, frame
+from nested_agents.studies.cli.commands import reading
+from nested_agents.studies.cli.loading import Progress, progress
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import Store
@@ -67,23 +67,32 @@ def test_conditions_are_compared_in_every_form(study, capsys) -> None:
     assert (status, "is named more than once" in errors) == (2, True)
 
 
-def test_watching_shows_trials_curves_and_failures(study, capsys, monkeypatch) -> None:
+@pytest.mark.parametrize("by", [(), ("--by", "preset"), ("--by", "condition")])
+def test_conditions_are_compared_by_what_they_are_called(study, by, capsys) -> None:
+    status, printed, _ = said_by(capsys, "compare", study[0], *by)
+    assert (status, printed) == said_by(capsys, "compare", study[0])[:2]
+
+
+def test_a_study_is_watched_while_anything_is_to_come(study, capsys, monkeypatch) -> None:
+    out, _ = study
+    once = said_by(capsys, "status", out)
+    assert once == said_by(capsys, "status", out, "--watch"), "no terminal"
+    assert "done     5 of 6 trials" in once[1]
+    assert "RuntimeError: a wheel came off" in once[1]
+    to_come = iter([True, True, False])
+    monkeypatch.setattr(Progress, "is_going_on", property(lambda _: next(to_come)))
+    monkeypatch.setattr(reading, "PERIOD", 0.0)
     monkeypatch.setenv("COLUMNS", "80")
-    status, printed, _ = said_by(capsys, "watch", study[0], "--once")
-    assert status == 0
-    assert said_by(capsys, "status", study[0])[1].startswith(printed.partition("left ")[0])
-    assert "done     5 of 6 trials" in printed
-    assert "failed: frozen, seed 1: RuntimeError: a wheel came off" in printed
-    assert any(block in printed for block in "▁▂▃▄▅▆▇█")
-    assert max(map(len, printed.splitlines())) <= 80
-    assert said_by(capsys, "watch", study[0], "--every", "0")[0] == 2
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    status, printed, _ = said_by(capsys, "status", out, "--watch")
+    assert (status, [*to_come]) == (1, [])
+    assert printed.count("done     5 of 6 trials") >= 4
+    assert printed.endswith(once[1])
 
 
 @pytest.mark.parametrize("what", ["a row altered", "a row deleted", "a recording deleted"])
-def test_watching_says_of_damage_what_status_says_and_draws_none(
-    study, tmp_path, capsys, monkeypatch, what
-) -> None:
-    monkeypatch.setenv("COLUMNS", "400")
+def test_of_a_damaged_study_nothing_is_to_come(study, tmp_path, capsys, what) -> None:
     out = tmp_path / "out"
     shutil.copytree(study[0], out)
     if what == "a recording deleted":
@@ -95,22 +104,12 @@ def test_watching_says_of_damage_what_status_says_and_draws_none(
         with closing(sqlite3.connect(out / "results.sqlite")) as connection, connection:
             connection.execute(f"{change} WHERE {one} AND episode = 0")
     lines = said_by(capsys, "status", out)[1].splitlines()
-    (warning,) = [line for line in lines if "must run again" in line]
-    status, printed, _ = said_by(capsys, "watch", out)
-    assert status == 0
-    assert warning in printed
-    assert not any(block in printed for block in "▁▂▃▄▅▆▇█")
-    assert not frame(out)[1]
+    assert sum("must run again" in line for line in lines) == 1
+    with Store.open(out) as store:
+        assert not progress(store).is_going_on
 
 
-def test_watching_ends_when_nothing_is_to_come(study) -> None:
-    shown, is_going_on = frame(study[0])
-    assert not is_going_on
-    assert Console(width=60, record=True).render_lines(shown)
-    assert curve([0.0] * 100) == "▁" * 24
-
-
-READING = ["results", "table", "compare", "status", "watch", "export", "report"]
+READING = ["results", "table", "compare", "status", "export", "report"]
 
 
 @pytest.mark.parametrize("command", READING)
@@ -120,12 +119,11 @@ def test_a_database_of_another_study_is_noted_by_all_that_read_it(
     monkeypatch.setenv("COLUMNS", "400")
     own = tmp_path / "own"
     shutil.copytree(study[0], own)
-    once = ["--once"] if command == "watch" else []
-    said_by(capsys, command, own, *once)
-    assert "is not the spec" not in " ".join(said_by(capsys, command, own, *once)[1:])
+    said_by(capsys, command, own)
+    assert "is not the spec" not in " ".join(said_by(capsys, command, own)[1:])
     text = (own / "study.toml").read_text()
     (own / "study.toml").write_text(text.replace("steps = 5", "steps = 6"))
-    said = " ".join(" ".join(said_by(capsys, command, own, *once)[1:]).split())
+    said = " ".join(" ".join(said_by(capsys, command, own)[1:]).split())
     assert "study.toml: is not the spec of results.sqlite beside it, whose results these" in said
     assert "steps = 6 here, 5 there" in said
 
@@ -151,7 +149,7 @@ def test_a_copy_of_the_spec_that_means_the_same_is_not_noted(study, tmp_path, ca
 @pytest.mark.parametrize(
     ("command", "encoding"),
     [
-        *[(command, "ascii") for command in ("table", "watch", "results", "compare")],
+        *[(command, "ascii") for command in ("table", "results", "compare")],
         *[("table", encoding) for encoding in ("latin-1", "utf-8")],
     ],
 )
@@ -162,7 +160,7 @@ def test_what_a_terminal_cannot_write_has_a_sign_in_its_place(study, command, en
         assert ("0–" if encoding == "utf-8" else "0-") in out
 
 
-@pytest.mark.parametrize("command", ["table", "watch", "results"])
+@pytest.mark.parametrize("command", ["table", "results", "status"])
 def test_a_reader_that_goes_away_is_told_by_the_status(study, command) -> None:
     reading, writing = os.pipe()
     os.close(reading)

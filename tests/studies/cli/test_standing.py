@@ -96,7 +96,7 @@ def test_what_other_code_has_done_is_done(study, monkeypatch, capsys):
 
 def test_a_study_of_another_version_is_refused(study, monkeypatch, capsys):
     monkeypatch.setattr(database, "RESULTS_VERSION", 99)
-    for command in (["status"], ["watch", "--once"]):
+    for command in (["status"], ["status", "--watch"]):
         assert main([*command, str(study)]) == 2
         error = capsys.readouterr().err
         assert "this is version 99; an older nested-agents reads it" in error

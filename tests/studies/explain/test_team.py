@@ -150,8 +150,8 @@ def test_results_of_another_version_are_refused(study, monkeypatch, capsys):
 def test_another_team_than_the_one_that_was_measured_is_not_explained(study, monkeypatch):
     with Store.open(study) as store:
         trial = finished_trial(store, None, None)
-        kept = explain._kept(store, trial)
-        monkeypatch.setattr(explain, "_kept", lambda *_: [*kept[:2], (*kept[2][:-1], 0.0)])
+        kept = explain._kept_rows(store, trial)
+        monkeypatch.setattr(explain, "_kept_rows", lambda *_: [*kept[:2], (*kept[2][:-1], 0.0)])
         with pytest.raises(ValueError, match="gives another episode 2 than the one that is kept"):
             explain.explain(store, trial)
 

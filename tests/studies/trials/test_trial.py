@@ -19,7 +19,8 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import RESULTS_VERSION
 from nested_agents.studies.trials import trial as trial_module
-from nested_agents.studies.trials.session import check, run_trial
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import EpisodeMeter, EpisodeRow, trials_of
 
 SHORT = {"seeds": [7], "episodes": 2, "steps": 6, "evaluation": 1}
@@ -173,14 +174,14 @@ def test_everything_that_matters_is_in_the_identity(monkeypatch):
 )
 def test_settings_that_do_not_fit_are_refused_before_anything_runs(table, said):
     with pytest.raises(SpecError, match=said) as caught:
-        check(Spec.of(SHORT | table))
+        check_conditions(Spec.of(SHORT | table))
     assert "\n" not in str(caught.value)
 
 
 def test_which_condition_does_not_fit_is_named():
     spec = Spec.of(SHORT | {"sweep": {"learner.rule_base.order": [1, 9]}})
     with pytest.raises(SpecError, match=r"\(condition '9'\)"):
-        check(spec)
+        check_conditions(spec)
 
 
 def test_further_evaluations_leave_the_rest_of_a_trial_as_it_is(result):
@@ -208,10 +209,10 @@ OWN = SHORT | {"preset": "own-value"}
 )
 def test_a_team_is_not_evaluated_where_it_cannot_act(change):
     with pytest.raises(SpecError, match=r"evaluations\.other: a team trained with 4 agents"):
-        check(Spec.of(OWN | {"evaluations": {"other": change}}))
+        check_conditions(Spec.of(OWN | {"evaluations": {"other": change}}))
     several = OWN | {"sweep": {"learner.ridge": [1.0, 2.0]}, "evaluations": {"other": change}}
     with pytest.raises(SpecError, match=r"evaluations\.other: .* \(condition '1.0'\)$"):
-        check(Spec.of(several))
+        check_conditions(Spec.of(several))
 
 
 def transition(reward=0.5, terminated=False, **info):

@@ -1,9 +1,8 @@
-"""Alternatives tried: other settings of a spec, other hierarchies for teams that a study keeps.
+"""Other settings of a spec, drawn at random and tried on seeds of their own.
 
-Settings are drawn at random and tried on seeds of their own. They are conditions of one ordinary
-study, so what has run is kept and never run again. By successive halving (Jamieson and Talwalkar
-2016) all of them are tried on two seeds, the better half on four, and so on: seeds are spent on
-what may be best. All meet the same worlds.
+They are conditions of one ordinary study, so what has run is kept and never run again. By
+successive halving (Jamieson and Talwalkar 2016) all of them are tried on two seeds, the better half
+on four, and so on: seeds are spent on what may be best. All meet the same worlds.
 """
 
 from __future__ import annotations
@@ -11,33 +10,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial, reduce
-from itertools import product, starmap
+from functools import reduce
+from itertools import starmap
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
 from ...core.numerics import pd
-from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
 from ..presentation.progress import Terminal, count
-from ..results.results import DONE, Results, read
-from ..spec.spec import Spec, plain
-from ..spec.tables import TomlTable, dumps, label, nested, overlay
+from ..results.results import Results, read
+from ..spec.spec import Spec
+from ..spec.tables import TomlTable, dumps, nested, overlay
 from ..store import durable
-from ..store.database import EVALUATION
-from ..store.durable import TEAM
-from ..store.store import Store
-from ..trials.keeping import check_teams, open_to_run
-from ..trials.session import Session, check
-from ..trials.trial import Trial, TrialResult, trials_of
-from ..workers.runner import Backend, Observer, Outcome, run_trials
-from ..workers.workers import start_workers
+from ..trials.arrangement import check_conditions
+from ..trials.trial import Trial, trials_of
+from ..workers.runner import Backend, Observer
 from .running import run_study
-from .study import Place, StudyResults, load
+from .study import StudyResults, load
 
 FIRST_SEED = 10_000
 """The smallest seed to tune on: those below it are for reports."""
@@ -48,7 +39,7 @@ CONTROLS: dict[str, TomlTable] = {
     for name, rule in (("frozen", "value"), ("planner", "reward"))
 }
 """What the best is compared with, as overrides of a spec."""
-USUAL: dict[str, tuple[Any, ...]] = {
+USUAL: dict[str, tuple[object, ...]] = {
     "learner.weights": ("own", "role"),
     "learner.decision.value_of": ("own", "below", "team"),
     "learner.decision.rule": ("value", "reward-and-value"),
@@ -61,11 +52,12 @@ USUAL: dict[str, tuple[Any, ...]] = {
     "learner.exploration.rate": (0.1, 0.3, 0.6),
 }
 """What is tried of a spec without a table ``[tune]``, where its learner and scenario have it."""
-BEST_FILE, TABLE_FILE = "best.toml", "configurations.csv"
+BEST_FILE = "best.toml"
+TABLE_FILE = "configurations.csv"
 DRAWS = 50
 """Draws for every configuration wanted, before those found are taken for all there are."""
 
-Point = Mapping[str, Any]
+Point = Mapping[str, object]
 """Values by dotted key."""
 
 
@@ -79,8 +71,8 @@ class Tuning:
     """What that configuration lays over the spec; empty if the spec is not bettered."""
     study: StudyResults
     """The finalists and the controls, on all seeds."""
-    configurations: Any
-    """A data frame, best first: the name of each configuration, on how many seeds it was tried, its
+    configurations: pd.DataFrame
+    """Best first: the name of each configuration, on how many seeds it was tried, its
     mean evaluation success (or nothing) and return, and its values."""
 
     def __str__(self) -> str:
@@ -109,7 +101,7 @@ class Tuning:
 
 
 def tune(
-    spec: Spec | Mapping[str, Any] | str | PathLike[str],
+    spec: Spec | Mapping[str, object] | str | PathLike[str],
     out: str | PathLike[str],
     *,
     trials: int = 20,
@@ -150,25 +142,35 @@ def tune(
     SpecError
         If there is nothing to tune, or it cannot be run; one line says why.
     """
-    spec, out = Spec.read(spec, study=Path(out)), Path(out)
-    _check(spec, trials, seeds, first_seed, draw)
-    points = _sampled(spec, trials, draw)
+    out = Path(out)
+    spec = Spec.read(spec, study=out)
+    _check_request(spec, trials, seeds, first_seed, draw)
+    points = _sample(spec, trials, draw)
     study = _study(spec, points, range(first_seed, first_seed + seeds))
-    everything, planned = trials_of(study), dict[str, Trial]()
+    everything = trials_of(study)
+    planned = dict[str, Trial]()
     observer = Terminal() if progress else Observer()
     names = list(points)
     for n_configurations, n_seeds in rungs(len(points), seeds):
         names = names[:n_configurations]
-        wanted = {*names, GIVEN, *(CONTROLS if n_seeds == seeds else ())}
+        wanted = {*names, GIVEN}
+        if n_seeds == seeds:
+            wanted |= CONTROLS.keys()
         planned |= {
             trial.identity: trial
             for trial in everything
             if trial.condition in wanted and trial.seed < first_seed + n_seeds
         }
         with run_study(
-            study, out, jobs=jobs, backend=backend, address=address, accept_code=accept_code,
-            observer=observer, chosen=list(planned.values()),
-        ) as store:  # fmt: skip
+            study,
+            out,
+            jobs=jobs,
+            backend=backend,
+            address=address,
+            accept_code=accept_code,
+            observer=observer,
+            chosen=list(planned.values()),
+        ) as store:
             results = read(store)
         observer.note(f"compared {count(len(names), 'configuration')} on {count(n_seeds, 'seed')}")
         table = _table(results, points, range(first_seed, first_seed + n_seeds))
@@ -196,11 +198,15 @@ def rungs(configurations: int, seeds: int) -> Iterator[tuple[int, int]]:
     yield configurations, seeds
 
 
-def _check(spec: Spec, trials: int, seeds: int, first_seed: int, draw: int) -> None:
-    for name, value, allowed in (
-        ("trials", trials, range(2, 10_001)), ("seeds", seeds, range(2, 10_001)),
-        ("first-seed", first_seed, range(FIRST_SEED, 10**9)), ("draw", draw, range(10**9)),
-    ):  # fmt: skip
+def _check_request(spec: Spec, trials: int, seeds: int, first_seed: int, draw: int) -> None:
+    """Refuse numbers out of range, and specs that have nothing to tune or to compare."""
+    numbers = {
+        "trials": (trials, range(2, 10_001)),
+        "seeds": (seeds, range(2, 10_001)),
+        "first-seed": (first_seed, range(FIRST_SEED, 10**9)),
+        "draw": (draw, range(10**9)),
+    }
+    for name, (value, allowed) in numbers.items():
         if value not in allowed:
             raise SpecError(f"--{name} {value}: allowed {allowed[0]:,} to {allowed[-1]:,}")
     if spec.sweep or spec.overrides:
@@ -224,13 +230,13 @@ def _laid(spec: Spec, point: Point) -> Spec:
     return Spec.of(_over(table, point), spec.sources)
 
 
-def _built(spec: Spec) -> str:
+def _content(spec: Spec) -> str:
     """Return what the only condition of a spec consists of, if it can be built."""
-    check(spec)
+    check_conditions(spec)
     return spec.conditions()[0].settings.canonical()
 
 
-def _space(spec: Spec) -> dict[str, Sequence[Any]]:
+def _space(spec: Spec) -> dict[str, Sequence[object]]:
     """Return the values to draw from by key: the spec's own, or the usual ones that it may have."""
     if spec.tune:
         for key, values in spec.tune.items():
@@ -239,26 +245,31 @@ def _space(spec: Spec) -> dict[str, Sequence[Any]]:
         return dict(spec.tune)
     with spec.sources.active():
         scenario = spec.conditions()[0].settings.scenario.build()
-    has_roles = len({*scenario.roles}) < len(scenario.agents)
-    possible = dict[str, Sequence[Any]]()
-    for key, values in USUAL.items():
-        for value in values if has_roles or key != "learner.weights" else ():
+    usual = dict(USUAL)
+    if len({*scenario.roles}) == len(scenario.agents):
+        del usual["learner.weights"]  # nobody shares a role
+    possible = dict[str, Sequence[object]]()
+    for key, values in usual.items():
+        for value in values:
             with suppress(SpecError):
-                _built(_laid(spec, {key: value}))
+                _content(_laid(spec, {key: value}))
                 possible[key] = [*possible.get(key, ()), value]
     return possible
 
 
-def _sampled(spec: Spec, trials: int, draw: int) -> dict[str, Point]:
+def _sample(spec: Spec, trials: int, draw: int) -> dict[str, Point]:
     """Return distinct configurations that can be built, by name; the spec's own is the first."""
-    space, rng, problem = _space(spec), np.random.default_rng(draw), "all are the spec's own"
-    points, tried = {_built(spec): dict[str, Any]()}, set[str]()
+    space = _space(spec)
+    rng = np.random.default_rng(draw)
+    problem = "all are the spec's own"
+    points: dict[str, Point] = {_content(spec): {}}
+    tried = set[str]()
     for _ in range(DRAWS * trials):
         point = {key: values[int(rng.integers(len(values)))] for key, values in space.items()}
         if len(points) < trials and repr(point) not in tried:
             tried.add(repr(point))
             try:
-                points.setdefault(_built(_laid(spec, point)), point)
+                points.setdefault(_content(_laid(spec, point)), point)
             except SpecError as error:
                 problem = str(error)
     if len(points) == 1:
@@ -275,12 +286,12 @@ def _study(spec: Spec, points: Mapping[str, Point], seeds: Iterable[int]) -> Spe
     for name, table in CONTROLS.items():
         control = {"name": name, **table}
         with suppress(SpecError):  # if no rewards are predicted
-            check(Spec.of({**base, "overrides": [control]}, spec.sources))
+            check_conditions(Spec.of({**base, "overrides": [control]}, spec.sources))
             overrides.append(control)
     return Spec.of({**base, "overrides": overrides}, spec.sources)
 
 
-def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) -> Any:
+def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) -> pd.DataFrame:
     """Return the data frame of all configurations: those of most of the seeds first, then by score.
 
     The score is the mean evaluation success, 0 where it is not measured, then the return.
@@ -293,108 +304,3 @@ def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) 
     values = pd.DataFrame(list(points.values()), dtype=object)
     table = lines.astype({"seeds": int}).join(values).astype(object)
     return table.sort_values(list(means), ascending=False, ignore_index=True)
-
-
-def reevaluate(
-    study: StudyResults | Place,
-    topology: Sequence[Any] = (),
-    decision: Sequence[Any] = (),
-    *,
-    jobs: int | None = None,
-    observer: Observer | None = None,
-) -> pd.DataFrame:
-    """Evaluate the trained teams of a study under other topologies and ways to decide.
-
-    Every team acts with its weights on the worlds of its own evaluation, and begins with the random
-    numbers that it began that one with: under what it was trained with, it does the same again.
-    Files of yours that the study keeps are taken as it keeps them.
-
-    Parameters
-    ----------
-    study
-        What `load` or `run` returned, or a part of it by ``where``; or the directory of a study
-        that keeps its teams (``keep_teams = true``).
-    topology
-        Topologies, as a spec has them: text, or a table laid over that of training.
-    decision
-        Tables laid over ``learner.decision`` of training. If both are given, each of these is
-        evaluated with each topology.
-    jobs
-        Processes; None: one for every core.
-    observer
-        Is notified of the progress; None: it is shown on standard error.
-
-    Returns
-    -------
-    DataFrame
-        A row per episode as in `StudyResults.episodes`, with a column `entry`: which of the
-        topologies and decisions it is of.
-
-    Raises
-    ------
-    SpecError
-        If there are no such teams, or they cannot act so; one line.
-    """
-    study = study if isinstance(study, StudyResults) else load(study)
-    done = study.trials[study.trials["state"] == DONE]
-    identities = {(row.condition, row.seed): str(row.identity) for row in done.itertuples()}
-    directory = study.directory.resolve()
-    with Store.open(directory) as store:
-        check_teams(store, {*identities.values()})
-        table = {**store.spec(), "evaluations": _entries(topology, decision), "keep_teams": False}
-        sources = Sources(Path(), store.sources(), brought_by=str(directory))
-    spec = Spec.of(table, sources)
-    if spec.evaluation < 1:
-        raise SpecError("evaluation = 0: reevaluate needs a study of 1 or more")
-    measures = check(spec, {condition for condition, _ in identities})
-    trials = [t for t in trials_of(spec) if (t.condition, t.seed) in identities]
-    with (
-        TemporaryDirectory() as folder,
-        start_workers("loky", jobs, None, len(trials)) as workers,
-        open_to_run(Path(folder), spec, trials, measures) as store,
-    ):
-        evaluate = partial(_evaluate, directory, identities)
-        outcomes = _succeeding(run_trials(trials, store, evaluate, workers))
-        (observer or Terminal()).follow(outcomes, len(trials), 0)
-        frame = read(store).episodes
-    frame.insert(0, "entry", frame["phase"].str.removeprefix(EVALUATION))
-    meaning = "topology and decision by which the trained team acts"
-    frame.attrs["columns"]["entry"] = {"unit": "", "meaning": meaning}
-    return frame
-
-
-def _succeeding(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
-    """Yield outcomes until one is a failure."""
-    for outcome in outcomes:
-        if outcome.error is not None:
-            where = f"{outcome.trial.condition}, seed {outcome.trial.seed}"
-            raise SpecError(f"{where}: {outcome.error.splitlines()[-1]}")
-        yield outcome
-
-
-def _entries(topology: Sequence[Any], decision: Sequence[Any]) -> dict[str, dict[str, Any]]:
-    """Return the table of ``[evaluations]``, by what tells its entries apart."""
-    given = {"topology": topology, "decision": decision}
-    lists = {key: plain(values, key) for key, values in given.items() if values}
-    if not lists or not all(isinstance(values, list | tuple) for values in lists.values()):
-        requested = ", ".join(f"{key} = {show(values)}" for key, values in given.items())
-        raise SpecError(f"{requested}: must be lists, one of them not empty")
-    entries = {}
-    for values in product(*lists.values()):
-        point: dict[str, Any] = dict(zip(lists, values, strict=True))
-        name = label(point)
-        if "decision" in point:
-            point["learner"] = {"decision": point.pop("decision")}
-        entries[name] = point
-    return entries
-
-
-def _evaluate(
-    directory: Path, identities: Mapping[tuple[str, int], str], trial: Trial
-) -> TrialResult:
-    """Evaluate the kept team of a trial in its `evaluations`; imported by name in workers."""
-    with Store.open(directory) as store:
-        arrays = store.recording(identities[trial.condition, trial.seed], TEAM)
-    session = Session.restored(trial, arrays)
-    session.run_other_evaluations()
-    return session.result()

@@ -1,0 +1,70 @@
+"""Conditions of a study compared with each other: verdicts, statistics of runs, figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING
+
+from ..presentation.tables import SummaryTable, tabulate
+from ..results.aggregates import Aggregates, aggregate
+from ..results.analysis import Difference
+from ..results.contrasts import Contrasts
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Conditions compared by one measure; printed or shown by a notebook, table and verdicts."""
+
+    contrasts: Contrasts
+    """The analysis."""
+
+    @cached_property
+    def table(self) -> SummaryTable:
+        """Estimates and differences, in all forms."""
+        return tabulate(self.contrasts.table)
+
+    @property
+    def differences(self) -> tuple[Difference, ...]:
+        """Every difference with its interval, and p raw and adjusted."""
+        return self.contrasts.differences
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """What was found, and what could have been detected, line by line."""
+        return self.contrasts.notes
+
+    @cached_property
+    def statistics(self) -> Aggregates:
+        """Interquartile means, probabilities of improvement and performance profiles.
+
+        Raises
+        ------
+        SpecError
+            If no two conditions have two seeds each.
+        """
+        return aggregate(self.contrasts)
+
+    @cached_property
+    def aggregated(self) -> SummaryTable:
+        """The table of `statistics`, in all forms."""
+        return tabulate(self.statistics.table)
+
+    def figure(self) -> Figure:
+        """Return performance profiles, and the interquartile mean by episode of training."""
+        from ..presentation.figures import draw_profiles  # matplotlib takes its time
+
+        return draw_profiles(self.statistics)
+
+    def __str__(self) -> str:
+        return "\n".join([str(self.table), "", *self.verdicts])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        lines = "\n".join(map(escape, self.verdicts))
+        return f"{self.table.html}<pre>{lines}</pre>"

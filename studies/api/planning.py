@@ -1,0 +1,298 @@
+"""Tells what a study will take and what it can find, before anything is spent on it.
+
+Episodes of every condition are tried for a while, to see what a step takes and after how many they
+end, on a seed that no study reports. Deciding and simulating take a time per step. Learning may
+take one per step, too, and one per step kept so far: a regression over all of training grows with
+the square of its length. A process has to start, too, to load or compile what each condition needs,
+and to build each trial: that is measured once. All of this is processor time; the time of the clock
+that it comes to depends on what else the machine does, which is seen while planning.
+"""
+
+import os
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from textwrap import wrap
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.numerics import FloatArray, IntArray, optimize, pd
+from ..errors import WIDTH, SpecError
+from ..presentation.progress import count, duration
+from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
+from ..spec.outline import StudyOutline
+from ..spec.spec import Spec
+from ..trials.session import Session, run_trial
+from ..trials.trial import Trial, trials_of
+from ..workers.runner import cores
+from ..workers.workers import check_jobs
+from .running import examine
+from .study import Place
+
+SEED = 10_000
+"""Of the trials that are tried out."""
+TRIED = 1.0
+"""Processor time [s] for which episodes of training are tried of every condition."""
+EPISODES = 2
+"""That are tried at least, of training and of every evaluation."""
+WHOLE = 10_000
+"""Agents times steps up to which an episode is tried: of more agents its first steps only."""
+QUICK = 0.25
+"""Least steps of the other episodes, as a fraction of the mean of those tried last."""
+LONG = 2.0
+"""Most steps of the other episodes, as a multiple of the longest of those tried last."""
+FASTER = 0.7
+"""By what another process, and other seeds, may take less time than what was tried."""
+SLOWER = 2.2
+"""By what they may take more."""
+KEEPING = np.array([0.02, 0.15])
+"""Seconds to hand out a trial and to keep it, from and to: a disk takes longer than a processor."""
+STARTS = 5
+"""Starts of a process that a run takes: the command's own, its workers', which start together, and
+as much as three more for the store, the tables and the figures."""
+START = f"import {Session.__module__}, matplotlib.pyplot"
+"""What a process imports."""
+
+Range = tuple[float, float]
+"""From and to."""
+
+
+class Tried(NamedTuple):
+    """What a condition takes, by one of its trials."""
+
+    seconds: FloatArray
+    """Processor time [s] of a trial, from and to."""
+    loading: float
+    """Processor time [s] to import, load and compile what the first step needs, once a process."""
+    memory: float
+    """What the team holds in the end [bytes]."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study will take and what it can find."""
+
+    outline: StudyOutline
+    """What the study consists of."""
+    trials: int
+    """How many there are."""
+    processes: int
+    """How many run at a time."""
+    seconds: Range | None
+    """Time of the whole study [s], from and to: by how early episodes end that were not tried, and
+    by what else this machine does."""
+    memory: float | None
+    """Of all processes together [bytes], about."""
+    comparisons: int
+    """With the first condition."""
+    deviation: float
+    """Standard deviation of paired differences that is supposed."""
+    smallest: float
+    """The smallest difference of success rates that is of interest."""
+    warnings: tuple[str, ...] = ()
+    """What looks wrong and is not refused, a line each."""
+
+    def __str__(self) -> str:
+        return "\n".join(self._lines())
+
+    __repr__ = __str__
+
+    def _lines(self) -> Iterator[str]:
+        outline = self.outline
+        n_seeds = len(outline.seeds)
+        conditions = count(len(outline.columns), "condition")
+        steps = count(outline.steps, "step")
+        processes = count(self.processes, "process", "es")
+        yield f"study    {outline.study}: {conditions} x {count(n_seeds, 'seed')}"
+        yield f"trials   {self.trials}, each {outline.lengths} of up to {steps}"
+        if self.seconds is not None:
+            quick, slow = map(duration, self.seconds)
+            yield f"time     {quick} to {slow} with {processes}, the start of workers included:"
+            yield "         by how early episodes end, and by what else this machine does"
+        if self.memory is not None:
+            yield f"memory   about {self.memory / 1e9:.1f} GB with {processes}"
+        if self.comparisons:
+            yield ""
+            yield from power_text(n_seeds, self.comparisons, self.deviation, self.smallest)
+            text = (
+                f"Differences of success rates, every condition with the first, p adjusted; "
+                f"differences of single seeds are taken to deviate by {self.deviation:g}."
+            )
+            yield from wrap(text, WIDTH)
+        yield from self.warnings
+
+
+def plan(
+    spec: Spec | Mapping[str, object] | Place,
+    *,
+    jobs: int | None = None,
+    deviation: float = USUAL_DEVIATION,
+    smallest: float = SMALLEST,
+    timed: bool = True,
+) -> Plan:
+    """Return what a study will take and what it can find; some seconds a condition are run.
+
+    Parameters
+    ----------
+    spec
+        A `Spec`, a table, or the path of a TOML file.
+    jobs
+        Trials at a time; by default one for every core.
+    deviation
+        Standard deviation that is supposed of the differences of single seeds.
+    smallest
+        The smallest difference of success rates that is of interest.
+    timed
+        Whether to try the conditions out.
+
+    Raises
+    ------
+    SpecError
+        If the study cannot be run, or a number is out of range.
+    """
+    spec = Spec.read(spec)
+    for name, value in (("deviation", deviation), ("smallest", smallest)):
+        if not 0.0 < value <= 1.0:
+            raise SpecError(f"--{name} {value:g}: must be above 0 and at most 1")
+    if jobs is not None:
+        check_jobs(jobs)
+    examine(spec)
+    trials = trials_of(spec)
+    processes = max(1, min(jobs or cores(), len(trials)))
+    seconds, memory = _estimate(spec, trials, processes) if timed else (None, None)
+    return Plan(
+        outline=StudyOutline.of(spec),
+        trials=len(trials),
+        processes=processes,
+        seconds=seconds,
+        memory=memory,
+        comparisons=len(spec.conditions()) - 1,
+        deviation=deviation,
+        smallest=smallest,
+        warnings=spec.warnings(),
+    )
+
+
+def _estimate(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Range, float]:
+    """Return the time of a study [s], from and to, and its memory [bytes]."""
+    begin = time.perf_counter()
+    used = _used()
+    # Ctrl-C is for this process, which then kills that one: it would print a traceback.
+    subprocess.run([sys.executable, "-c", START], check=True, process_group=0)
+    starting = STARTS * (_used() - used)
+    with spec.sources.active():
+        tried = [try_out(trial) for trial in trials[: len(spec.conditions())]]
+    loading = sum(each.loading for each in tried)  # less, if what was compiled here is kept
+    each_seed = np.sum([one.seconds / processes + KEEPING for one in tried], axis=0)
+    quick, slow = len(spec.seeds) * each_seed
+    # Processes that have no trial left wait for the last one.
+    slow += (1 - 1 / processes) * max(each.seconds[1] for each in tried)
+    busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
+    least = FASTER * busy**0.5  # other programs may stop
+    most = SLOWER * busy  # or go on
+    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    peak *= 1 if sys.platform == "darwin" else 1024
+    memory = peak + max(each.memory for each in tried)
+    shortest = least * (starting + quick)
+    longest = most * (starting + loading + slow)
+    return (float(shortest), float(longest)), processes * memory
+
+
+def try_out(trial: Trial) -> Tried:
+    """Return what the trials of a condition take."""
+    alone = replace(trial, seed=SEED, curriculum=(), evaluation=min(trial.evaluation, EPISODES))
+    brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
+    loading = _seconds(partial(run_trial, brief))
+    building = _seconds(partial(Session, alone))
+    longest = trial.evaluation_steps or trial.steps
+    cut = max(2, WHOLE // len(trial.world().agents))
+    session = Session(
+        replace(alone, steps=min(trial.steps, cut), evaluation_steps=min(longest, cut))
+    )
+    held = _bytes(session)
+    training = _seconds_of_episodes(session, trial.episodes)
+    in_own = _seconds(session.evaluate)
+    in_others = _seconds(session.run_other_evaluations)
+    by_phase = pd.DataFrame(session.result().rows).groupby("phase")["steps"]
+    lengths = {phase: steps.to_numpy(float) for phase, steps in by_phase}
+    steps = lengths.pop("training")
+
+    acting = in_own / sum(lengths.get("evaluation", [1.0]))
+    per_step = (in_own + in_others) / max(sum(map(sum, lengths.values())), 1.0)
+    mean_lengths = [_mean_length(tried, longest, cut) for tried in lengths.values()]
+    evaluating = per_step * np.sum(mean_lengths, axis=0)
+
+    episodes = np.array([*(stage.episodes for stage in trial.curriculum), trial.episodes])
+    whole = steps[steps < cut]
+    others = (episodes.sum() - len(whole)) * _mean_length(
+        steps[len(training) // 2 :], trial.steps, cut
+    )
+    mean = (whole.sum() + others) / episodes.sum()
+    beside = np.array(training) - acting * steps
+    if len(whole):
+        learning = learning_time(steps, beside, mean, episodes)
+    else:  # beginnings do not tell how learning grows
+        learning = mean * episodes.sum() * max(beside.sum(), 0.0) / steps.sum()
+    seconds = building + acting * mean * episodes.sum() + learning
+    growth = mean[1] * episodes.sum() / steps.sum()
+    memory = held + growth * max(_bytes(session) - held, 0.0)
+    return Tried(seconds + trial.evaluation * evaluating, loading, memory)
+
+
+def _seconds_of_episodes(session: Session, episodes: int) -> list[float]:
+    """Train for a while; return the processor time of each episode [s]."""
+    seconds = list[float]()
+    while len(seconds) < episodes and (len(seconds) < EPISODES or sum(seconds) < TRIED):
+        seconds.append(_seconds(partial(session.train, 1, len(seconds))))
+    return seconds
+
+
+def learning_time(
+    steps: FloatArray, seconds: FloatArray, mean: FloatArray, episodes: IntArray
+) -> FloatArray:
+    """Return the processor time [s] to learn from all episodes of a trial.
+
+    An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
+
+    Parameters
+    ----------
+    steps, seconds
+        Of the episodes that were tried: their steps, and the time that was learned from them [s].
+    mean
+        Mean steps of an episode; several possible ones.
+    episodes
+        How many there are in every stage of training.
+    """
+    (per_step, per_kept), _ = optimize.nnls(
+        np.stack([steps, steps * np.cumsum(steps)], axis=1), np.maximum(seconds, 0.0)
+    )
+    kept = mean * (episodes * (episodes + 1)).sum() / 2
+    return np.asarray(mean * (per_step * episodes.sum() + per_kept * kept))
+
+
+def _mean_length(tried: Sequence[float] | FloatArray, most: int, cut: int) -> FloatArray:
+    """Return the mean steps of episodes that were not tried to their ends, from and to."""
+    longest = max(tried)
+    if longest >= cut:
+        return np.array([np.mean(tried), most])
+    return np.array([QUICK * np.mean(tried), min(most, LONG * longest)])
+
+
+def _used() -> float:
+    """Return the processor time of this process and of those that it has waited for [s]."""
+    return sum(os.times()[:4])
+
+
+def _seconds(call: Callable[[], object]) -> float:
+    begin = time.process_time()
+    call()
+    return time.process_time() - begin
+
+
+def _bytes(session: Session) -> float:
+    return float(sum(array.nbytes for array in session.team.arrays().values()))

@@ -1,0 +1,183 @@
+"""The command ``check``: whether scenarios keep what they promise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+
+from ...errors import SpecError, refused
+from .. import options
+from ..display import print_text, print_wrapped
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from ....core.adaptation.predictors import LearnedPredictorSettings
+    from ....core.plugins.settings import ScenarioSettings
+    from ...trials.trial import Trial
+
+SHORT = "{:.2g}".format
+"""How numbers are printed."""
+LESSONS = 8
+"""Episodes from which a predictor has learned when its errors are shown."""
+
+
+class ScenarioCase(NamedTuple):
+    """A scenario that is checked."""
+
+    label: str
+    """What it is called."""
+    build: Callable[[], object]
+    """Makes it anew."""
+    episodes: list[int]
+    """Numbers of the episodes that are played: the first, and those in which failures begin."""
+
+
+@click.command()
+@click.argument("source", metavar="SPEC.toml|FILE.py:NAME")
+@options.number("--steps", "N", 40, "Most steps of the episodes that are played for it.")
+@options.changes
+def check(source: str, steps: int, changes: tuple[str, ...]) -> int:
+    """Check what every scenario must promise, such as equal bits for equal seeds.
+
+    A table shows the values met of every variable beside its range, and the root mean square error
+    of its prediction beside that of persistence, as if all stayed as it is. Where agents learn to
+    predict, a second table shows the errors of that after a few episodes.
+
+    SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
+    file that makes a scenario of one's own. A class with a nested class Settings is given these
+    with their defaults.
+    """
+    from pandas import DataFrame
+
+    from ....scenarios.checking.checker import ScenarioError, check_scenario
+
+    is_spec = not source.partition(":")[0].endswith(".py")
+    if not is_spec and changes:
+        raise SpecError("--set: lays values over a spec, not over a Python file")
+    cases = _cases_of_spec(source, changes) if is_spec else [_case_of_file(source)]
+    faults = 0
+    for case in cases:
+        try:
+            findings = check_scenario(case.build, steps=steps, episodes=case.episodes)
+        except ScenarioError as error:
+            faults += 1
+            print_text(f"FAULT   {case.label}: {error}")
+        except ValueError as error:
+            raise SpecError(str(error)) from None
+        else:
+            print_wrapped(f"{case.label}: {', '.join(findings.passed)}", "passed  ", 8)
+            for name, reason in findings.unchecked.items():
+                print_wrapped(f"{name}: {reason}", "not checked  ", 8)
+            for warning in findings.warnings():
+                print_wrapped(warning, "warning  ", 8)
+            frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
+            _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
+    if is_spec and not faults:
+        faults += _report_order(source, changes, steps)
+    if is_spec and not faults:
+        for label, errors in _learned_errors(source, changes, steps):
+            print_wrapped(f"{label}: what {LESSONS} episodes teach to predict", "learned  ", 8)
+            _print_frame(errors.to_string(float_format=SHORT))
+    return 1 if faults else 0
+
+
+def _print_frame(text: str) -> None:
+    print_text("", text, "")
+
+
+def _report_order(source: str, changes: tuple[str, ...], steps: int) -> bool:
+    """Say that trials depend on what ran before them; return whether they do."""
+    from ...spec.spec import Spec
+    from ...trials.order import fault_of_order, has_programs
+    from ...trials.trial import trials_of
+
+    trials = trials_of(Spec.load(Path(source), changes))
+    if not has_programs(trials[0]):
+        return False
+    fault = fault_of_order(trials, steps)
+    if fault:
+        print_text(f"FAULT   order of trials: {fault}")
+    else:
+        print_wrapped("order of trials: the same rows in two orders", "passed  ", 8)
+    return bool(fault)
+
+
+def _learned_errors(
+    source: str, changes: tuple[str, ...], steps: int
+) -> Iterator[tuple[str, DataFrame]]:
+    """Yield the errors of learned predictors by variable, see `errors_of`, each once."""
+    from ...explain.team import errors_of
+    from ...spec.spec import Spec
+    from ...trials.session import Session
+    from ...trials.trial import trials_of
+
+    checked: set[tuple[ScenarioSettings, LearnedPredictorSettings]] = set()
+    for trial in trials_of(Spec.load(Path(source), changes)):
+        predictor = _learned_predictor(trial)
+        if predictor is None or (trial.settings.scenario, predictor) in checked:
+            continue
+        checked.add((trial.settings.scenario, predictor))
+        session = Session(replace(trial, episodes=LESSONS, steps=steps, curriculum=()))
+        session.train(LESSONS)
+        errors = errors_of(session.team, session.scenario, trial.seed)
+        if errors is not None:
+            yield trial.condition, errors
+
+
+def _learned_predictor(trial: Trial) -> LearnedPredictorSettings | None:
+    """Return how the agents of a trial learn to predict, if they do."""
+    from ....core.adaptation.predictors import LearnedPredictorSettings
+    from ....core.learners import LearnerSettings
+
+    learner = trial.settings.learner
+    if not isinstance(learner, LearnerSettings):
+        return None
+    return learner.predictor if isinstance(learner.predictor, LearnedPredictorSettings) else None
+
+
+def _case_of_file(source: str) -> ScenarioCase:
+    """Return what is to be checked of a function or class in a Python file."""
+    with refused():
+        build = _factory_of(source)
+    try:
+        build()
+    except (Exception, SystemExit) as error:
+        message = f"raised {type(error).__name__}: {' '.join(str(error).split())}"
+        raise SpecError(f"{source}, called as a scenario is, {message}") from None
+    return ScenarioCase(source.rpartition(":")[2], build, [0, 1])
+
+
+def _factory_of(source: str) -> Callable[[], object]:
+    """Return what makes a scenario of one's own, by its own settings as they are by default."""
+    from ....core.plugins.sources import active
+    from ....scenarios import SCENARIOS
+
+    thing: Callable[[], object] = active().load(source)
+    if not hasattr(thing, "Settings"):
+        return thing
+    try:
+        build: Callable[[], object] = SCENARIOS.parsed(source).build
+    except ValueError as error:
+        raise ValueError(f"{source}: its Settings have no defaults for all keys, {error}") from None
+    return build
+
+
+def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCase]:
+    """Yield what is to be checked of a spec, each scenario once."""
+    from ....core.interface.plain import as_scenario
+    from ....core.learners import check_prediction
+    from ...spec.spec import Spec
+
+    checked: set[ScenarioSettings] = set()
+    for condition in Spec.load(Path(source), changes).conditions():
+        settings = condition.settings.scenario
+        with refused():
+            check_prediction(condition.settings.learner, as_scenario(settings.build()))
+        if settings not in checked:
+            checked.add(settings)
+            yield ScenarioCase(condition.label, settings.build, sorted({0, *settings.onsets}))

@@ -1,0 +1,216 @@
+"""Teams of networks are kept, restored, and continue elsewhere."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from acting import look
+
+from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.arrangement import arrange, check_conditions
+from nested_agents.studies.trials.session import Session, run_trial
+from nested_agents.studies.trials.trial import trials_of
+
+pytest.importorskip("stable_baselines3", reason="extra [peers]")
+
+PPO = {"rollout": 16, "batch_size": 8, "epochs": 2}
+KINDS: dict[str, dict[str, Any]] = {
+    "ppo": {"kind": "ppo", **PPO},
+    "ippo": {"kind": "ippo", **PPO},
+    "mappo": {"kind": "mappo", **PPO},
+    "hierarchy-ppo": {"kind": "hierarchy-ppo", **PPO},
+    "own weights": {"kind": "hierarchy-ppo", "weights": "own", **PPO},
+    "dqn": {"kind": "dqn", "begin": 10, "target_interval": 20, "memory": 50},
+}
+MIXED = [
+    {"agents": "cart1", "learner": KINDS["dqn"]},
+    {"agents": ["cart2", "cart3"], "learner": KINDS["ppo"]},
+    {"agents": ["cart4", "cart5"], "learner": KINDS["hierarchy-ppo"]},
+    {"agents": "cart6", "learner": KINDS["mappo"]},
+    {"agents": "*", "learner": {"kind": "fitted-q"}},
+]
+
+
+def spec_of(name: str, **changes: Any) -> Spec:
+    table: dict[str, Any] = {
+        "study": "peers",
+        "seeds": [10_000],
+        "episodes": 6,
+        "steps": 11,
+        "evaluation": 2,
+        "scenario": {"kind": "line-up", "carts": 2},
+        "learner": KINDS[name],
+    }
+    if name == "dqn":
+        table["agents"] = "team"
+    return Spec.of({**table, **changes})
+
+
+def same(one: Session, other: Session) -> bool:
+    first, second = one.team.arrays(), other.team.arrays()
+    assert first.keys() == second.keys()
+    return all((first[name] == second[name]).all() for name in first)
+
+
+@pytest.mark.parametrize("failing", [False, True])
+@pytest.mark.parametrize("name", KINDS)
+def test_a_restored_team_goes_on_to_the_same_bits(name: str, failing: bool) -> None:
+    topology: dict[str, Any] = {"kind": "chain"}
+    if failing:
+        topology["failures"] = [{"kind": "lost", "agents": "*", "probability": 0.5}]
+    (trial,) = trials_of(spec_of(name, **({} if name == "dqn" else {"topology": topology})))
+    session = Session(trial)
+    for episode in range(6):
+        kept = {key: array.copy() for key, array in session.team.arrays().items()}
+        restored = Session.restored(trial, kept)
+        session.train(1, episode)
+        restored.train(1, episode)
+        assert same(session, restored), f"after episode {episode}"
+    kept = {key: array.copy() for key, array in session.team.arrays().items()}
+    restored = Session.restored(trial, kept)
+    for one in (session, restored):
+        one.evaluate()
+        one.run_other_evaluations()
+    evaluated = [row for row in session.result().rows if row.phase != "training"]
+    assert list(restored.result().rows) == evaluated
+
+
+def test_networks_are_parts_of_a_team() -> None:
+    """Each learns of its own, is told of all others, goes on to the same bits when restored."""
+    world = {"kind": "line-up", "carts": 8}
+    learner = {"kind": "mixed", "parts": MIXED}
+    (trial,) = trials_of(spec_of("ppo", scenario=world, learner=learner))
+    session = Session(trial)
+    for episode in range(3):
+        restored = Session.restored(trial, session.team.arrays())
+        session.train(1, episode)
+        restored.train(1, episode)
+        assert same(session, restored)
+    states = session.scenario.reset(0)
+    seen = look(session.scenario, states)
+    decision = session.team.act(seen)
+    ppo: Any = session.team.parts[1]
+    assert (decision.inputs[1].logits.any(axis=1) == [False, True, True, *[False] * 5]).all()
+    assert ppo.policies["all"].model.rollout_buffer.actions.shape[1:] == (1, 2)
+    policies: Any = session.team.parts[2]
+    expected = np.zeros((2, 7, 4))
+    for place, agent in enumerate((3, 4)):
+        expected[place, range(agent), decision.joint_action[:agent]] = 1.0
+    told = decision.inputs[2].seen[[3, 4], : policies.width]
+    assert (told == expected.reshape(2, -1)).all()
+    assert session.team.parts[3].width == 0, "mappo is told nothing"
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_team_that_a_trial_keeps_is_the_one_that_was_evaluated(name: str) -> None:
+    (trial,) = trials_of(spec_of(name, keep_teams=True))
+    result = run_trial(trial)
+    restored = Session.restored(trial, result.recordings["team"])
+    restored.evaluate()
+    evaluated = [row for row in result.rows if row.phase == "evaluation"]
+    assert list(restored.result().rows) == evaluated
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_arrays_of_other_teams_are_refused(name: str) -> None:
+    other = "mappo" if name == "ppo" else "ppo"
+    arrays = arrange(spec_of(other).conditions()[0].settings, 0).team.arrays()
+    team = arrange(spec_of(name).conditions()[0].settings, 0).team
+    with pytest.raises(ValueError, match=r"^team: ") as raised:
+        team.restore(arrays)
+    assert "\n" not in str(raised.value)
+
+
+def test_arrays_of_more_policies_are_refused() -> None:
+    settings = [spec_of(name).conditions()[0].settings for name in ("own weights", "ippo")]
+    own, every = (arrange(each, 0).team for each in settings)
+    with pytest.raises(ValueError, match=r"^team: more has been saved than of all$"):
+        every.restore({**own.arrays(), **every.arrays()})
+
+
+ELSEWHERE: dict[str, dict[str, Any]] = {
+    "more agents": {"carts": 4},
+    "star": {"topology": {"kind": "star"}},
+    "reversed": {"topology": {"kind": "chain", "order": "reversed"}},
+    "independent": {"topology": "independent"},
+    "lost": {"topology": {"kind": "chain", "failures": [{"kind": "lost", "agents": "*"}]}},
+    "delayed": {"topology": {"kind": "chain", "failures": [{"kind": "delayed", "agents": "*"}]}},
+}
+
+
+@pytest.mark.parametrize("name", ["ippo", "mappo", "hierarchy-ppo"])
+def test_teams_are_evaluated_and_taught_elsewhere(name: str) -> None:
+    stages = [
+        {"name": "one", "episodes": 2, "scenario": {"carts": 1}},
+        {"name": "three", "episodes": 2, "scenario": {"carts": 3}},
+    ]
+    spec = spec_of(name, episodes=2, evaluations=ELSEWHERE, curriculum=stages)
+    check_conditions(spec)
+    (trial,) = trials_of(spec)
+    rows = run_trial(trial).rows
+    phases = {row.phase for row in rows}
+    assert {f"evaluation:{other}" for other in ELSEWHERE} < phases
+    assert {"training:one", "training:three"} < phases
+    assert run_trial(trial).rows == rows
+
+
+@pytest.mark.parametrize("critic", ["own", "central"])
+def test_weights_go_on_with_the_names_of_inputs(critic: str) -> None:
+    """Whoever decides first says as much as before, who is told of nobody new decides as before."""
+    table = {**KINDS["hierarchy-ppo"], "critic": critic}
+    chain = spec_of("hierarchy-ppo", learner=table, scenario={"kind": "line-up", "carts": 3})
+    others = {
+        "reversed": {"topology": {"kind": "chain", "order": "reversed"}},
+        "more": {"scenario": {"kind": "line-up", "carts": 5}},
+    }
+    session = Session(trials_of(chain)[0])
+    session.train(3)
+    former: Any = session.team.parts[0]
+    for name, changes in others.items():
+        spec = spec_of(
+            "hierarchy-ppo",
+            **{"learner": table, "scenario": {"kind": "line-up", "carts": 3}, **changes},
+        )
+        there = arrange(spec.conditions()[0].settings, 0)
+        agents: Any = there.team.parts[0]
+        agents.continue_from(former)
+        before = dict(zip(former.input_names["policy_net"], weights_into(former).T, strict=True))
+        after = dict(zip(agents.input_names["policy_net"], weights_into(agents).T, strict=True))
+        for input_, column in after.items():
+            assert (column == before.get(input_, 0.0)).all(), (name, input_)
+        assert {*after} - {*before}, "some inputs are new"
+        states = np.random.default_rng(0).random((5, there.scenario.state_space.n_variables))
+        first = int(there.team.hierarchy.order[0])
+        seen = look(there.scenario, states[: len(there.scenario.agents)])
+        inputs = agents.perceive(seen, explore=False)
+        there.team._walk(seen, (inputs,))
+        alike = look(former.scenario, states[:3])
+        own = former.perceive(alike, explore=False)
+        own.seen[:, : former.width] = 0.0
+        if first < 3:
+            expected = former._actors[0](own.seen[[first]])
+            assert inputs.logits[[first]] == pytest.approx(expected, abs=1e-6)
+
+
+def weights_into(agents: Any) -> Any:
+    weights = agents.policies["all"].model.policy.state_dict()
+    return weights["mlp_extractor.policy_net.0.weight"].numpy()
+
+
+def test_whose_weights_are_their_own_meet_no_other_agents() -> None:
+    spec = spec_of("own weights", evaluations={"more": {"carts": 4}})
+    with pytest.raises(SpecError, match=r"evaluations.more: .*'own'; with 'all', all") as raised:
+        check_conditions(spec)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [("ppo", "one policy acts for all of them"), ("dqn", "trained over another state space")],
+)
+def test_who_acts_for_all_meets_no_other_agents(name: str, problem: str) -> None:
+    spec = spec_of(name, evaluations={"more": {"carts": 3}})
+    with pytest.raises(SpecError, match=f"evaluations.more: .*{problem}") as raised:
+        check_conditions(spec)
+    assert "\n" not in str(raised.value)
