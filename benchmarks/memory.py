@@ -20,8 +20,9 @@ from rich.console import Console
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.episodes import EpisodeRow
 from nested_agents.studies.trials.keeping import open_to_run
-from nested_agents.studies.trials.trial import EpisodeRow, Trial, TrialResult, trials_of
+from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.runner import save
 
 from .startup import used_by

@@ -8,7 +8,8 @@ from tempfile import TemporaryDirectory
 
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
-from ..errors import SpecError, show
+from ...core.plugins.words import show
+from ..errors import SpecError
 from ..presentation.progress import Terminal
 from ..results.results import DONE, read
 from ..spec.spec import Spec, plain

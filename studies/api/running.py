@@ -77,7 +77,9 @@ def run_study(
             store.forget_failed()
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
-        run_one = measure_by_name if is_reference(spec.study) else load_study(spec.study).measure
+        with spec.sources.active():
+            is_own = is_reference(spec.study)
+            run_one = measure_by_name if is_own else load_study(spec.study).measure
         for note in (*store.notes, *spec.warnings()):
             observer.note(note)
         if left:

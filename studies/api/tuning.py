@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from ...core.numerics import pd
-from ..errors import SpecError, show
+from ...core.plugins.words import show
+from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..results.results import Results, read
 from ..spec.spec import Spec

@@ -22,7 +22,7 @@ from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings, Stage
 from ..spec.spec import Spec
-from .trial import joined
+from .episodes import join_measures
 
 Evaluations = Sequence[tuple[str, ConditionSettings]]
 """Names and settings under which a trained team is evaluated beside its own."""
@@ -156,7 +156,7 @@ def check_conditions(
                 failing = failing or SpecError(f"{problem}{where}")
     if failing and not (measures and may_fail):
         raise failing
-    return joined(measures, conditions[0].columns)
+    return join_measures(measures, conditions[0].columns)
 
 
 def _check_saved(settings: ConditionSettings) -> None:

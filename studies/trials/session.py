@@ -27,7 +27,8 @@ from ...core.interface.scenario import Scenario
 from ..store.database import EVALUATION, STAGE
 from ..store.durable import TEAM, Recording
 from .arrangement import Arrangement, arrange, teach, transfer
-from .trial import EpisodeMeter, EpisodeRow, Trial, TrialResult, joined
+from .episodes import EpisodeMeter, EpisodeRow, join_measures
+from .trial import Trial, TrialResult
 
 
 class Stopwatch:
@@ -240,7 +241,7 @@ class Session:
         the steps, whole episodes may be run `at_once`, compiled.
         """
         measures = measures_of(there.world.measures)
-        self._measures = joined((self._measures, measures))
+        self._measures = join_measures((self._measures, measures))
         if at_once and self._at_once(there, phase, counted_from, **loop):
             return
         for record in control_loop(there.scenario, there.team, seed=self.trial.seed, **loop):
