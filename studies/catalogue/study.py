@@ -182,9 +182,9 @@ def system_of(results: Results, condition: str) -> tuple[str, dict[str, object]]
 
 def draw_figures(study: Study, analysis: Any) -> Figures:
     """Return the figures of an analysis by name, as all figures look; none of an empty table."""
-    from ..presentation.figures import styled  # matplotlib takes its time
+    from ..presentation.figures import apply_style  # matplotlib takes its time
 
-    with styled():
+    with apply_style():
         return study.draw(analysis) if analysis.table else {}
 
 

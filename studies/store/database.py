@@ -35,7 +35,7 @@ def insert(connection: sqlite3.Connection, table: str, rows: list[tuple[object, 
         connection.executemany(f"INSERT INTO {table} VALUES ({places})", rows)
 
 
-def quoted(name: str) -> str:
+def quote(name: str) -> str:
     """Return a name as SQL takes any name."""
     return '"' + name.replace('"', '""') + '"'
 
@@ -141,12 +141,12 @@ def measures_from(tables: Iterable[Mapping[str, Any]]) -> tuple[Measure, ...]:
 
 def prepare(db: sqlite3.Connection, noted: Noted) -> None:
     """Make the tables, and note what the study is and what computes it; within a transaction."""
-    swept = [quoted(key) for key in next(iter(noted.columns.values()))]
+    swept = [quote(key) for key in next(iter(noted.columns.values()))]
     definitions = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
     for statement in SCHEMA:
         db.execute(statement)
     # A measure is NULL where a scenario has it not.
-    kinds = ((quoted(m.name), "INTEGER" if m.is_rate else "REAL") for m in noted.measures)
+    kinds = ((quote(m.name), "INTEGER" if m.is_rate else "REAL") for m in noted.measures)
     measured = "".join(f"{name} {kind}, " for name, kind in kinds)
     db.execute(
         f"""CREATE TABLE IF NOT EXISTS episodes (
@@ -162,7 +162,7 @@ def prepare(db: sqlite3.Connection, noted: Noted) -> None:
     db.execute(
         f"""CREATE VIEW IF NOT EXISTS results AS
         SELECT c.condition, {"".join(f"c.{key}, " for key in swept)}t.seed,
-            {", ".join(f"e.{quoted(name)}" for name in columns(noted.measures))}
+            {", ".join(f"e.{quote(name)}" for name in columns(noted.measures))}
         FROM episodes e JOIN trials t USING (identity) JOIN conditions c USING (condition)
         WHERE t.state = 'done' ORDER BY c.position, t.seed, {stage} DESC,
             CASE WHEN {stage} THEN e.episode END, e.phase DESC, e.episode"""

@@ -208,7 +208,7 @@ class Store:
         }
         parts = ", ".join(f'{part} AS "seconds.{part}"' for part in database.SECONDS)
         cursor = self._db.execute(
-            f"SELECT c.condition, {''.join(f'c.{database.quoted(key)}, ' for key in swept)}seed, "
+            f"SELECT c.condition, {''.join(f'c.{database.quote(key)}, ' for key in swept)}seed, "
             f"state, identity, error, {parts} FROM trials "
             "JOIN conditions c USING (condition) LEFT JOIN seconds USING (identity) "
             "ORDER BY position, seed"
@@ -241,7 +241,7 @@ class Store:
     def create(
         cls, directory: Path, noted: Noted, files: Mapping[str, bytes], damage: str | None
     ) -> Iterator[Store]:
-        """Open a directory to write, within the context of `locked`.
+        """Open a directory to write, within the context of `lock_directory`.
 
         A damaged database is set aside under another name, and what can be trusted of it copied.
 

@@ -18,7 +18,7 @@ from ..spec.tables import aliases, dumps, flat, named
 from ..store.connection import DamageError
 from ..store.database import DATABASE, SPEC_FILE, NoStudyError, Noted
 from ..store.store import Store
-from ..store.writer import locked
+from ..store.writer import lock_directory
 from .trial import AS_IN_SPEC, Trial, column_of, trials_of
 
 SAME = (*AS_IN_SPEC, "evaluations")
@@ -57,7 +57,7 @@ def open_to_run(
     """
     noted = noted_of(spec, measures, trials)
     _examine(directory, spec, noted, accept_code=accept_code)  # what is refused leaves nothing
-    with locked(directory):
+    with lock_directory(directory):
         # Again: nobody else writes from here on.
         damage, code = _examine(directory, spec, noted, accept_code=accept_code)
         computed = replace(noted, code=present(code))
