@@ -40,9 +40,10 @@ class Problem:
     """L."""
 
     def __post_init__(self) -> None:
-        for name, least in (("rules", 1), ("actions", 2), ("iterations", 1)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name} = {getattr(self, name)}, allowed: {least} or more")
+        least = {"rules": 1, "actions": 2, "iterations": 1}
+        for name, value in vars(self).items():
+            if value < least[name]:
+                raise ValueError(f"{name} = {value}, allowed: {least[name]} or more")
 
     def nested(self, below: Iterable[int]) -> int:
         """Return the cost of any hierarchy (Eq. 18, generalised).

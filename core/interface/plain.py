@@ -32,6 +32,13 @@ DECLARED = (
     "bounds",
 )
 """What a scenario says of itself."""
+MISSING = object()
+"""What an object has not."""
+
+
+def offered(thing: object, name: str, otherwise: Any = None) -> Any:
+    """Return what an object of a user has by a name, or something else if it has not."""
+    return getattr(thing, name, otherwise)
 
 
 def as_scenario(thing: object) -> Scenario:
@@ -44,7 +51,7 @@ def as_scenario(thing: object) -> Scenario:
     """
     if isinstance(thing, Scenario):
         return thing
-    missing = ", ".join(name for name in NECESSARY if not hasattr(thing, name))
+    missing = ", ".join(name for name in NECESSARY if offered(thing, name) is None)
     if missing:
         raise ValueError(f"scenario.kind: {type(thing).__name__} lacks {missing}")
     return PlainScenario(thing)
@@ -69,14 +76,18 @@ class PlainScenario(Scenario):
     def __init__(self, plain: Any) -> None:
         self.plain = plain
         for name in DECLARED:
-            if hasattr(plain, name):
-                setattr(self, name, getattr(plain, name))
+            own = offered(plain, name)
+            if own is not None:
+                setattr(self, name, own)
 
     def __getattr__(self, name: str) -> Any:
         """Return what the user's object has by this name."""
         if name == "plain":  # not there yet: an object that is being copied or unpickled
             raise AttributeError(name)
-        return getattr(self.plain, name)
+        value = offered(self.plain, name, MISSING)
+        if value is MISSING:
+            raise AttributeError(name)
+        return value
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode and return states ``(n, d)``."""
@@ -91,13 +102,13 @@ class PlainScenario(Scenario):
     @property
     def predicts(self) -> bool:
         """Whether the user's object has a method predict."""
-        return hasattr(self.plain, "predict")
+        return offered(self.plain, "predict") is not None
 
     @property
     def lacks_prediction(self) -> str:
         """Why it predicts nothing, in the user's words if there are any."""
         unnamed = f"the scenario {type(self.plain).__name__} has no method predict"
-        return str(getattr(self.plain, "lacks_prediction", unnamed))
+        return str(offered(self.plain, "lacks_prediction", unnamed))
 
     def predict(self) -> Prediction | None:
         """Return the prediction of the user's object."""
@@ -105,28 +116,31 @@ class PlainScenario(Scenario):
 
     def with_exact_prediction(self) -> Scenario | None:
         """Return the user's exactly predicting scenario, if there is one."""
-        if not hasattr(self.plain, "with_exact_prediction"):
+        own_way = offered(self.plain, "with_exact_prediction")
+        if own_way is None:
             return None
-        exact = self.plain.with_exact_prediction()
+        exact = own_way()
         return self if exact is self.plain else as_scenario(exact)
 
     def partners(self) -> Sequence[int] | None:
         """Return who stands in whose place in the mirror, if the user's object knows."""
-        return self.plain.partners() if hasattr(self.plain, "partners") else None
+        own_way = offered(self.plain, "partners")
+        return None if own_way is None else own_way()
 
     def measure(self) -> Mapping[str, Any]:
         """Return the measurements of the present state, if the user's object takes them."""
-        return self.plain.measure() if hasattr(self.plain, "measure") else {}
+        own_way = offered(self.plain, "measure")
+        return {} if own_way is None else own_way()
 
     def constants_of_episode(self) -> Mapping[str, Any]:
         """Return what the user's object keeps once an episode."""
-        has_constants = hasattr(self.plain, "constants_of_episode")
-        return self.plain.constants_of_episode() if has_constants else {}
+        own_way = offered(self.plain, "constants_of_episode")
+        return {} if own_way is None else own_way()
 
     @property
     def draws(self) -> bool:
         """Whether the user's object draws recordings."""
-        return bool(self.recorded) and hasattr(self.plain, "animate")
+        return bool(self.recorded) and offered(self.plain, "animate") is not None
 
     def animate(self, recording: Mapping[str, Any], path: Path) -> None:
         """Let the user's object draw a recording."""
@@ -147,13 +161,13 @@ class PlainPrediction(Prediction, Tables):
 
     def __init__(self, plain: Any) -> None:
         self.plain = plain
-        self._has_tables = hasattr(plain, "blocks")
-        self.alike = getattr(plain, "alike", None)
+        self._has_tables = offered(plain, "blocks") is not None
+        self.alike = offered(plain, "alike", None)
 
     @property
     def rewarded(self) -> bool:  # type: ignore[override]  # of users' classes it is not known before
         """Whether there is a table of rewards."""
-        return hasattr(self.plain, "reward_table")
+        return offered(self.plain, "reward_table") is not None
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent`."""
@@ -162,17 +176,17 @@ class PlainPrediction(Prediction, Tables):
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray] | None:
         """Return own and shared variables of all, if the user's object knows a way."""
-        own_way = getattr(self.plain, "states_by_group", None)
+        own_way = offered(self.plain, "states_by_group", None)
         return None if own_way is None else own_way(joint_actions)
 
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
         """Return rewards, if the user's object predicts them."""
-        own_way = getattr(self.plain, "rewards", None)
+        own_way = offered(self.plain, "rewards", None)
         return None if own_way is None else own_way(joint_actions)
 
     def after(self, joint_action: IntArray) -> Prediction | None:
         """Return the prediction from where a joint action leads, if it goes on."""
-        own_way = getattr(self.plain, "after", None)
+        own_way = offered(self.plain, "after", None)
         return None if own_way is None else as_prediction(own_way(joint_action))
 
     def tables(self) -> Tables | None:

@@ -182,10 +182,12 @@ def system_of(results: Results, condition: str) -> tuple[str, dict[str, object]]
 
 def draw_figures(study: Study, analysis: Any) -> Figures:
     """Return the figures of an analysis by name, as all figures look; none of an empty table."""
-    from ..presentation.figures import apply_style  # matplotlib takes its time
+    from ..presentation.figures import apply_style, spell_dollars  # matplotlib takes its time
 
     with apply_style():
-        return study.draw(analysis) if analysis.table else {}
+        figures = study.draw(analysis) if analysis.table else {}
+        names = [line.condition for line in analysis.table]
+        return {name: spell_dollars(figure, names) for name, figure in figures.items()}
 
 
 def measure_by_name(trial: Trial) -> TrialResult:

@@ -23,7 +23,7 @@ from rich.table import Table
 
 from ...core.interface.measures import Measure
 from ...core.numerics import pd
-from ...core.plugins.settings import near
+from ...core.plugins.words import near
 from ..errors import SpecError, printable
 from ..results.analysis import Summary
 from ..results.statistics import FEW, Estimate, between, exactly, stack_estimates, two_figures

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from ...core.interface.measures import Measure
 from ...core.numerics import pd
-from ...core.plugins.settings import closest
+from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
 from .analysis import NOTHING, BySeed, Difference, Summary, differences, identity_lines, verdicts

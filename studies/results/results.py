@@ -25,7 +25,7 @@ from ..errors import SpecError
 from ..spec.tables import flat, label
 from ..store.database import EVALUATION
 from ..store.store import Store
-from ..trials.trial import joined as joined_measures
+from ..trials.episodes import join_measures
 
 Array = NDArray[Any]
 
@@ -439,5 +439,5 @@ def combine(
     trials = [rename(part.trials, new) for part, new in zip(parts, labels, strict=True)]
     phases = dict.fromkeys(phase for part in parts for phase in part.phases)
     usage = (name for part in parts for name in part.usage)
-    measures = joined_measures(part.measures for part in parts)
+    measures = join_measures(part.measures for part in parts)
     return assemble(episodes, trials, phases, columns, measures, usage), labels

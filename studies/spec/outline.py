@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...core.plugins.sources import Sources, meaning
-from ..errors import SpecError, show
+from ...core.plugins.words import show
+from ..errors import SpecError
 from ..store.database import DATABASE, SPEC_FILE
 from ..store.store import Store
 
@@ -117,7 +118,8 @@ def other_spec(store: Store) -> str | None:
     One of the two may have come from another study. None if they mean the same, or there is no
     copy. Files of users are run only if they are trusted, and if the copy is written otherwise.
     """
-    path, own = store.directory / SPEC_FILE, store.spec()
+    path = store.directory / SPEC_FILE
+    own = store.spec()
     if not path.exists():
         return None
     try:
@@ -126,12 +128,13 @@ def other_spec(store: Store) -> str | None:
             from .spec import Spec
             from .tables import dumps
 
-            tables = Spec.of(copy, sources_of(store)).table(), own
-            copy, own = (tomllib.loads(dumps(table)) for table in tables)  # without what is None
+            copy = tomllib.loads(dumps(Spec.of(copy, sources_of(store)).table()))
+            own = tomllib.loads(dumps(own))  # without what is None
     except (OSError, ValueError, RecursionError) as error:
         return f"{path}: is not the spec of {DATABASE} beside it: {error}"
     for key in sorted(own.keys() | copy.keys()):
-        here, there = copy.get(key, "absent"), own.get(key, "absent")
+        here = copy.get(key, "absent")
+        there = own.get(key, "absent")
         if here != there:
             return (
                 f"{path}: is not the spec of {DATABASE} beside it, whose results these are: "
@@ -143,9 +146,13 @@ def other_spec(store: Store) -> str | None:
 PACKAGE = Path(__file__).parents[2]
 """Where the package is installed."""
 COMPUTING = (
-    "core/**/*.py", "topologies/**/*.py", "scenarios/**/*.py", "scenarios/**/*.toml",
-    "studies/trials/**/*.py", "studies/catalogue/**/*.py",
-)  # fmt: skip
+    "core/**/*.py",
+    "topologies/**/*.py",
+    "scenarios/**/*.py",
+    "scenarios/**/*.toml",
+    "studies/trials/**/*.py",
+    "studies/catalogue/**/*.py",
+)
 """Modules that compute results, and what they are given."""
 SILENT = ("checking", "pictures", "environments.py", "figure.py", "drawing.py")
 """Parts of them that do not."""
@@ -189,7 +196,8 @@ def _offering() -> Iterator[Path]:
 
 def present(known: Mapping[str, tuple[str, str]] | None = None) -> Code:
     """Return the digests of the installed code; modules whose text is `known` are not parsed."""
-    digests, known = {}, known or {}
+    digests: Code = {}
+    known = known or {}
     for name, text in modules().items():
         digest = hashlib.sha256(text.encode()).hexdigest()[:16]
         is_same = name in known and known[name][0] == digest

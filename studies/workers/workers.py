@@ -17,7 +17,7 @@ from typing import Any, get_args
 from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from ...core.plugins.settings import closest
+from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..trials.trial import Trial
 from .nursery import Answer, call_for, describe_exit

@@ -31,10 +31,10 @@ COLUMNS = 2
 def check(spec: Spec) -> None:
     """Raise `SpecError` if something is to fail after the last episode of training."""
     for condition in spec.conditions():
-        for failure in getattr(condition.settings.scenario, "failures", ()):
-            if failure.episode >= spec.episodes:
+        for onset in condition.settings.scenario.onsets:
+            if onset >= spec.episodes:
                 raise SpecError(
-                    f"scenario.failures: one begins in episode {failure.episode}, allowed 0 to "
+                    f"scenario.failures: one begins in episode {onset}, allowed 0 to "
                     f"{spec.episodes - 1} of {spec.episodes} episodes "
                     f"(condition {condition.label!r})"
                 )

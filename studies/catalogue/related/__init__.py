@@ -68,7 +68,7 @@ def measure(trial: Trial) -> TrialResult:
         "formula": float(tried * n_rules),
         "counted": counted / len(session.deciding),
     }
-    period = getattr(trial.settings.scenario, "period", None)
+    period = trial.settings.scenario.period
     if period is not None:
         numbers["period"] = float(period)
     return session.finish(numbers, {"decision_median": float(np.median(session.deciding))})

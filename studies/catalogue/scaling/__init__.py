@@ -63,7 +63,7 @@ def measure(trial: Trial) -> TrialResult:
         "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
         "weight_bytes": float(team.weight_bytes),
     }
-    period = getattr(trial.settings.scenario, "period", None)
+    period = trial.settings.scenario.period
     if period is not None:
         numbers["period_s"] = period
     touching: list[FloatArray] = []

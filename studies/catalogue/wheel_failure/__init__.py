@@ -28,7 +28,8 @@ from ...results.results import Results
 from ...results.statistics import BLOCK, NOT_NEGATIVE, REGAINED, Array, bootstrap, rate, recovery
 from ...spec.spec import Spec
 from ...spec.tables import label_but
-from ...trials.session import Session, arrange
+from ...trials.arrangement import arrange
+from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases, distinct
 
@@ -64,7 +65,7 @@ def measure(trial: Trial) -> TrialResult:
     kept = _keeping_weights(session)
     session.train(trial.episodes - onset, onset)
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
-    begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
+    begun = sorted(set(trial.settings.scenario.onsets) - {onset})
     later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
     return session.finish({"onset": float(onset), **later})
 
