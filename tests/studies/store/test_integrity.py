@@ -345,7 +345,7 @@ def test_rows_that_no_run_wrote_are_told_and_never_counted(study, sound, tables,
     for table in tables:
         change(study, INVENTED[table], made_up.TRIALS[3].identity)
     name = "frozen, seed 99" if "trials" in tables else "trial x"
-    for command in ("results", "table", "compare", "export", "report", "status", "watch --once"):
+    for command in ("results", "table", "compare", "export", "report", "status", "status --watch"):
         first, *options = command.split()
         assert main([first, str(study), *options]) == 2, command
         out, err = capsys.readouterr()
