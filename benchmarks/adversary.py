@@ -54,8 +54,9 @@ from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store import durable
 from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.store.store import LOCK, Store
+from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
-from nested_agents.studies.trials.session import check, run_trial
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.runner import Outcome, RunTrial, save
 
@@ -83,7 +84,7 @@ Answer = tuple[int, str, str]
 @cache
 def _run_once() -> tuple[tuple[Measure, ...], tuple[Trial, ...], dict[str, TrialResult]]:
     """Return what the study measures, its trials, and by identity what they measured."""
-    measures, trials = check(SPEC), trials_of(SPEC)
+    measures, trials = check_conditions(SPEC), trials_of(SPEC)
     return measures, trials, {trial.identity: run_trial(trial) for trial in trials}
 
 

@@ -31,7 +31,7 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import MARK, Store
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 
 def spec_of(seeds: int) -> Spec:
@@ -216,7 +216,9 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         study, spec = spec_of(options.seeds), Path(folder) / "spec.toml"
         spec.write_text(dumps(study.table()))
-        check(study)  # loads what every command needs, so that each is a copy that has it
+        check_conditions(
+            study
+        )  # loads what every command needs, so that each is a copy that has it
         assert _status(_begin(["run", spec, "--out", spec.parent / "whole"], "loky", jobs=1)) == 0
         expected, is_fine = _digest(spec.parent / "whole"), True
         for backend, kills in zip(options.backend, options.kills, strict=True):

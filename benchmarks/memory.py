@@ -19,9 +19,10 @@ from rich.console import Console
 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.episodes import EpisodeRow
 from nested_agents.studies.trials.keeping import open_to_run
-from nested_agents.studies.trials.session import check
-from nested_agents.studies.trials.trial import EpisodeRow, Trial, TrialResult, trials_of
+from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.runner import save
 
 from .startup import used_by
@@ -85,7 +86,7 @@ def fill(directory: Path, trials: int, episodes: int) -> None:
         }
     )  # fmt: skip
     trials = trials_of(spec)
-    with open_to_run(directory, spec, trials, check(spec)) as store:
+    with open_to_run(directory, spec, trials, check_conditions(spec)) as store:
         store._db.execute("PRAGMA synchronous = OFF")
         for trial in trials:
             save(store, trial, made_up(trial, store), total=1.0)

@@ -26,8 +26,9 @@ from joblib.externals.loky import get_reusable_executor
 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.keeping import open_to_run
-from nested_agents.studies.trials.session import check, run_trial
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.runner import run_trials
 from nested_agents.studies.workers.workers import LokyWorkers
@@ -59,7 +60,7 @@ def measure(spec: Spec, jobs: int) -> Round:
     """Run the trials of a spec with warm workers."""
     trials = trials_of(spec)
     warm = [replace(trial, seed=10**6 + i) for i, trial in enumerate(trials[: 2 * jobs])]
-    measures = check(spec)
+    measures = check_conditions(spec)
     with tempfile.TemporaryDirectory() as folder:
         workers = LokyWorkers(jobs)
         with open_to_run(Path(folder) / "warm", spec, trials, measures) as store:

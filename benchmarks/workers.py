@@ -20,8 +20,8 @@ import numpy as np
 from rich.console import Console
 
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.keeping import open_to_run
-from nested_agents.studies.trials.session import check
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save
 
@@ -43,7 +43,7 @@ def saved_per_second(trials: int, episodes: int) -> float:
     all_trials = trials_of(spec)
     with (
         tempfile.TemporaryDirectory() as folder,
-        open_to_run(Path(folder) / "study", spec, all_trials, check(spec)) as store,
+        open_to_run(Path(folder) / "study", spec, all_trials, check_conditions(spec)) as store,
     ):
         results = [made_up(trial, store) for trial in all_trials]
         begun = perf_counter()

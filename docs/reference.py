@@ -84,8 +84,8 @@ MODULES = {
         "api.tuning", "api.reevaluation", "api.recovery",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.power", "results.contrasts", "results.published", "catalogue.study",
-        "cost.cost", "cost.table",
+        "results.power", "results.contrasts", "results.aggregates", "results.published",
+        "catalogue.study", "cost.cost", "cost.table",
     )),
     "results": ("What has been published, and what is said of it.", (
         "claims", "measures", "push_n",

@@ -6,7 +6,7 @@ from typing import get_args
 
 import click
 
-from ..core.plugins.settings import closest
+from ..core.plugins.words import closest
 from ..studies import catalogue
 from ..studies.api.running import run as run_study
 from ..studies.cli import options

@@ -1,9 +1,8 @@
 """What is wrong with something that the user can mend, in one line to act on."""
 
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from decimal import Decimal
 
 LONGEST = 1200
 """Characters of a message; of a longer one the middle is left out."""
@@ -51,20 +50,3 @@ def refused(before: str = "", after: str = "") -> Iterator[None]:
         yield
     except ValueError as error:
         raise SpecError(f"{before}{error}{after}") from None
-
-
-def show(value: object, width: int | None = 60) -> str:
-    """Return a value as TOML would write it, shortened to `width` characters if that is given."""
-    if isinstance(value, bool):
-        text = str(value).lower()
-    elif isinstance(value, int) and abs(value) >= 10**100:
-        text = f"{Decimal(value):.3e}"  # Python writes some thousand digits at most
-    elif isinstance(value, str):
-        text = repr(value)
-    elif isinstance(value, Mapping):
-        text = "{" + ", ".join(f"{k} = {show(v, width)}" for k, v in value.items()) + "}"
-    elif isinstance(value, Sequence):
-        text = "[" + ", ".join(show(v, width) for v in value) + "]"
-    else:
-        text = str(value)
-    return text if width is None or len(text) <= width else text[: width - 3] + "..."

@@ -9,7 +9,7 @@ import pytest
 from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parent.parent
 WITH_SPECS = ("README.md", "docs/start.md")
@@ -25,7 +25,7 @@ def blocks(page: str, language: str) -> list[str]:
 @pytest.mark.parametrize("page", WITH_SPECS)
 def test_the_spec_is_one(page: str) -> None:
     (spec,) = blocks(page, "toml")
-    check(Spec.parse(spec))
+    check_conditions(Spec.parse(spec))
 
 
 @pytest.mark.parametrize("page", WITH_SPECS)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from nested_agents.core.plugins.sources import Sources
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 
@@ -54,7 +55,7 @@ def test_a_tutorial_can_be_typed(
         if file and language == "python":
             compile(text, file[1], "exec")
         elif file:
-            Spec.parse(text, folder=tmp_path)
+            Spec.parse(text, sources=Sources(tmp_path))
         elif language == "python":
             exec(text, names)
         elif language == "sh":

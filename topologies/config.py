@@ -23,7 +23,8 @@ from ..core.hierarchy.hierarchy import Considers, Hierarchy, Told
 from ..core.numerics import nx
 from ..core.plugins import sources
 from ..core.plugins.registry import Plugged, SettingsRegistry
-from ..core.plugins.settings import Settings, SettingsError, closest, tuples, unwritten
+from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
+from ..core.plugins.words import closest
 from .builders import Bodies, Names, check_names, from_networkx, quote
 from .files import read_file
 from .strings import ARGUMENTS, Keys
@@ -206,10 +207,12 @@ def build(
     if not isinstance(settings, TopologySettings):
         settings = parse(settings)
     title = settings.title
+    named: Bodies = [(a,) for a in agents]
     try:
         if not agents:
             raise ValueError("no agents")
-        named = [(a,) for a in agents] if bodies is None else _named(agents, bodies)
+        if bodies is not None:
+            named = _named(agents, bodies)
         if interactions is not None and dict(settings).get("shape") == "scenario":
             pairs = tuple((agents[a], agents[b]) for a, b in interactions)
             settings = settings.model_copy(update={"edges": pairs})
@@ -225,7 +228,9 @@ def build(
         problem = str(error)
         for start in ("hierarchy: ", f"{title}: ", f"topology {title!r}: "):
             problem = problem.removeprefix(start)
-        raise ValueError(f"topology {title!r}: {problem}") from None
+        is_of_user = settings.kind not in TOPOLOGIES.built_in
+        given = f" (given {len(agents)} agents of {len(named)} bodies)" if is_of_user else ""
+        raise ValueError(f"topology {title!r}: {problem}{given}") from None
 
 
 def from_file(agents: Names, bodies: Bodies = (), *, path: str) -> nx.DiGraph:

@@ -50,8 +50,7 @@ def _called(build: Build, name: str, agents: Names, bodies: Bodies) -> nx.Graph:
         lines = [f.lineno for f in frames if f.filename == frames[0].filename]
         where = f" in line {lines[-1]}" if lines else ""
         raise ValueError(
-            f"{name} raised {type(error).__name__}{where}, given {len(agents)} agents of "
-            f"{len(bodies)} bodies: {sources.message(error)}"
+            f"{name} raised {type(error).__name__}{where}: {sources.message(error)}"
         ) from None
     if edges is None:
         raise ValueError(

@@ -24,7 +24,7 @@ from ..evaluators.evaluator import (
 )
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn, all_hear_all
-from ..interface.agents import Agents, Counts, Memory, Placement
+from ..interface.agents import Agents, Counts, Memory, Placement, under
 from ..interface.experience import Experience, Observation
 from ..interface.prediction import NOT_EXPLORING, UNPREDICTED, Prediction
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
@@ -428,15 +428,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.seen = memory["seen"].copy()
         if self.given.size:
             self.given = memory["given"].copy()
-        self.learner.restore(_under("learner", memory))
+        self.learner.restore(under("learner.", memory))
         for name, part in self.foresight.adaptive.items():
-            part.restore(_under(name, memory))
-
-
-def _under(name: str, memory: Mapping[str, AnyArray]) -> Memory:
-    """Return the arrays of a part by their own names."""
-    head = f"{name}."
-    return {key.removeprefix(head): memory[key] for key in memory if key.startswith(head)}
+            part.restore(under(f"{name}.", memory))
 
 
 def _senders(settings: LearnerSettings, hierarchy: Hierarchy) -> list[list[int]]:

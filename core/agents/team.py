@@ -13,7 +13,7 @@ import numpy as np
 from ..hierarchy.failures import MessageFailure, Messages
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Slot, Turn, slots_of
-from ..interface.agents import Agents, Counts, Memory, Placement
+from ..interface.agents import Agents, Counts, Memory, Placement, under
 from ..interface.experience import Decision, Experience, Observation
 from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
@@ -245,8 +245,4 @@ class Team:
             self.parts[0].restore(arrays)
             return
         for k, part in enumerate(self.parts):
-            head = f"part{k}."
-            own = {
-                name.removeprefix(head): a for name, a in arrays.items() if name.startswith(head)
-            }
-            part.restore(own)
+            part.restore(under(f"part{k}.", arrays))

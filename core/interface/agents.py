@@ -27,6 +27,15 @@ Memory = dict[str, AnyArray]
 """All that agents remember, as named arrays."""
 
 
+def under(head: str, memory: Mapping[str, AnyArray]) -> Memory:
+    """Return the arrays whose names begin with a head, without it.
+
+    >>> under("part1.", {"part1.seen": np.zeros(2), "part2.seen": np.ones(1)})
+    {'seen': array([0., 0.])}
+    """
+    return {key.removeprefix(head): memory[key] for key in memory if key.startswith(head)}
+
+
 @dataclass(frozen=True)
 class Placement:
     """Where agents act: what their settings are built for."""

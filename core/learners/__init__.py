@@ -48,8 +48,8 @@ def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
     if not settings.needs_prediction or scenario.predicts:
         return
     lack = scenario.lacks_prediction
-    whole = [kind for kind in LEARNERS.built_in if kind != "mixed"]
-    others = [kind for kind in whole if not LEARNERS.parsed(kind).needs_prediction]
+    kinds = [k for k in LEARNERS.built_in if k != "mixed"]
+    others = [k for k in kinds if not LEARNERS.parsed(k).needs_prediction]
     raise ValueError(
         f"learner.kind = {settings.kind!r}: decides by predicted states, and {lack}; without it "
         f"do {', '.join(others)}, and any with learner.predictor.kind = 'learned' or "

@@ -10,7 +10,7 @@ from gymnasium.spaces import Discrete
 from stable_baselines3 import DQN
 
 from ..hierarchy.turns import Turn
-from ..interface.agents import Agents, Counts, Memory, Placement
+from ..interface.agents import Agents, Counts, Memory, Placement, under
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Scenario
 from ..numerics import AnyArray, FloatArray, IntArray, set_words, words_of
@@ -24,7 +24,6 @@ from .training import (
     prepare,
     set_moments,
     set_weights,
-    under,
     weights_of,
 )
 
@@ -139,7 +138,7 @@ class DeepQ(Agents[ValueInputs]):
         """Return all that it remembers: weights, Adam's moments, the replay buffer."""
         buffer = self._model.replay_buffer
         held = buffer.buffer_size if buffer.full else buffer.pos
-        replay = {name: getattr(buffer, name)[:held] for name in REPLAYED}
+        replay = {name: vars(buffer)[name][:held] for name in REPLAYED}
         parts = {
             "weights": weights_of(self._model.policy),
             "adam": moments_of(self._model.policy.optimizer),
@@ -158,7 +157,7 @@ class DeepQ(Agents[ValueInputs]):
         buffer = self._model.replay_buffer
         held = len(replay["rewards"])
         for name in REPLAYED:
-            getattr(buffer, name)[:held] = replay[name]
+            vars(buffer)[name][:held] = replay[name]
         buffer.full = held == buffer.buffer_size
         buffer.pos, self._decisions = map(int, replay["place"])
         set_words(self.rng, memory["generator"])

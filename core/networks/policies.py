@@ -17,13 +17,13 @@ from scipy.special import logsumexp
 
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn
-from ..interface.agents import Agents, Counts, Memory, Placement
+from ..interface.agents import Agents, Counts, Memory, Placement, under
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Scenario
 from ..numerics import AnyArray, FloatArray, IntArray, set_words, words_of
 from .inputs import Inputs
 from .settings import MultiAgentPPOSettings, PPOSettings
-from .training import ActorCritic, InputNames, bytes_of, under
+from .training import ActorCritic, InputNames, bytes_of
 
 
 @dataclass

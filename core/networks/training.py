@@ -20,7 +20,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import MlpExtractor
 
-from ..interface.agents import Memory
+from ..interface.agents import Memory, under
 from ..numerics import AnyArray, FloatArray, IntArray
 from .inputs import RewardScale
 from .settings import PolicyGradientSettings
@@ -126,11 +126,6 @@ def set_moments(optimizer: torch.optim.Optimizer, moments: Mapping[str, AnyArray
         states.setdefault(int(number), {})[name] = torch.as_tensor(array)
     groups = optimizer.state_dict()["param_groups"]
     optimizer.load_state_dict({"state": states, "param_groups": groups})
-
-
-def under(head: str, memory: Mapping[str, AnyArray]) -> Memory:
-    """Return the arrays whose names begin so, without that."""
-    return {key.removeprefix(head): memory[key] for key in memory if key.startswith(head)}
 
 
 class SplitExtractor(MlpExtractor):
@@ -270,7 +265,7 @@ class ActorCritic:
         """Return all that is remembered: weights, Adam's moments, what the buffer holds."""
         buffer = self.model.rollout_buffer
         held = buffer.buffer_size if buffer.full else buffer.pos
-        kept = {name: getattr(buffer, name)[:held] for name in BUFFERED}
+        kept = {name: vars(buffer)[name][:held] for name in BUFFERED}
         parts = {
             "weights": weights_of(self.model.policy),
             "adam": moments_of(self.model.policy.optimizer),
@@ -290,7 +285,7 @@ class ActorCritic:
         self._starts = kept["starts"].copy()
         held = len(kept["rewards"])
         for name in BUFFERED:
-            getattr(buffer, name)[:held] = kept[name]
+            vars(buffer)[name][:held] = kept[name]
         buffer.full = held == buffer.buffer_size
         buffer.pos = held
 

@@ -12,21 +12,34 @@ A class with a nested ``Settings`` stands for the model that builds it; a functi
 fields are its annotated keyword-only parameters, documented as its docstring does.
 """
 
+from __future__ import annotations
+
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from inspect import getdoc, isfunction, signature
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
-from pydantic import Field, create_model
+from pydantic import (
+    Field,
+    GetCoreSchemaHandler,
+    SerializationInfo,
+    ValidationInfo,
+    create_model,
+)
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
-from .settings import Settings, closest, tuples
+from .models import Kinds
+from .settings import Settings, tuples
+from .words import closest
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint, EntryPoints
 
 MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
 """A parameter in a docstring: its name, and what is said of it, indented."""
@@ -40,8 +53,8 @@ def _folders() -> tuple[tuple[str, int], ...]:
 
 @cache
 def _offered(
-    entry_points: Callable[..., Any], group: str, folders: tuple[tuple[str, int], ...]
-) -> tuple[Any, ...]:
+    entry_points: Callable[..., EntryPoints], group: str, folders: tuple[tuple[str, int], ...]
+) -> tuple[EntryPoint, ...]:
     """Return the entry points of a group: a hundred packages are read for them, so once only."""
     return tuple(entry_points(group=group))
 
@@ -115,19 +128,20 @@ class Registry:
         if sources.is_reference(name):
             return sources.active().load(name)
         place = self.built_in.get(name) or self.installed().get(name)
-        if place is None and ":" in name and "." in name.partition(":")[0]:
-            place = name
-        if place is None:
+        is_module = "." in name.partition(":")[0] and ":" in name
+        if place is None and not is_module:
             unknown = f"{closest(name, self.names())}, or one of your own as file.py:NAME"
             raise ValueError(self.moved.get(name, unknown))
+        if place is None:
+            sources.active().permit(name.partition(":")[0])
         try:
-            return resolve_name(place)
+            return resolve_name(place or name)
         except Exception as error:
             if name in self.built_in:
                 raise
             raise ValueError(f"cannot be loaded: {sources.format_error(error)}") from None
 
-    def reference_to(self, thing: Any) -> str:
+    def reference_to(self, thing: object) -> str:
         """Return the name of an object: the registered one, or where it is defined.
 
         Raises
@@ -191,8 +205,9 @@ class SettingsRegistry(Registry):
         moved: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(kind, built_in, moved)
-        self.base, self.root = base, root or base
-        self._adapted: dict[tuple[str, int], tuple[Any, type[Settings]]] = {}
+        self.base = base
+        self.root = root or base
+        self._adapted: dict[tuple[str, int], tuple[object, type[Settings]]] = {}
 
     def model(self, name: str) -> type[Settings]:
         """Return the settings model of a thing, by name or by where it is.
@@ -204,7 +219,7 @@ class SettingsRegistry(Registry):
         """
         return self.adapted(name, self.find(name))
 
-    def adapted(self, name: str, thing: Any) -> type[Settings]:
+    def adapted(self, name: str, thing: object) -> type[Settings]:
         """Return the settings model that stands for a thing, whose ``kind`` is `name`.
 
         Raises
@@ -219,7 +234,7 @@ class SettingsRegistry(Registry):
             self._adapted[key] = thing, self._derived(name, thing)
         return self._adapted[key][1]
 
-    def _derived(self, name: str, thing: Any) -> type[Settings]:
+    def _derived(self, name: str, thing: object) -> type[Settings]:
         is_model = isinstance(thing, type) and issubclass(thing, Settings)
         own = thing if is_model else getattr(thing, "Settings", self.base)
         if not (isinstance(own, type) and issubclass(own, self.root)):
@@ -229,7 +244,7 @@ class SettingsRegistry(Registry):
             raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
         has_own = hasattr(thing, "Settings")
         fields = {} if is_model or has_own else _parameters(thing)
-        model = create_model(
+        derived = create_model(
             own.__qualname__,
             __base__=own,
             __module__=own.__module__,
@@ -237,31 +252,46 @@ class SettingsRegistry(Registry):
             kind=(cast(Any, Literal[name]), name),
             **fields,
         )
-        if not is_model:
+        model = cast(type[Settings], derived)
+        if is_model:
+            return model
 
-            def build(settings: Settings, *given: Any) -> Any:
-                given = (settings, *given) if has_own else given
-                named = {field: getattr(settings, field) for field in fields}
-                if not isinstance(thing, type):  # a function says it itself
-                    return thing(*given, **named)
-                try:
-                    signature(thing).bind(*given, **named)
-                except TypeError as error:
-                    lacks = "" if has_own else "; it has no nested class Settings"
-                    raise ValueError(f"{self.kind} {name!r}: {error}{lacks}") from None
-                try:
-                    return thing(*given, **named)
-                except OSError:
-                    raise
-                except Exception as error:
-                    where = sources.place(error)
-                    raised = f"{self.kind} {name!r} raises {sources.format_error(error)}"
-                    if isinstance(error, ValueError):  # its own words
-                        raised = f"{sources.message(error)}{',' if where else ''}"
-                    raise ValueError(f"{raised}{where}") from error
+        def build(settings: Settings, *given: object) -> object:
+            if has_own:
+                given = (settings, *given)
+            named = {field: getattr(settings, field) for field in fields}
+            if not isinstance(thing, type):  # a function says it itself
+                return thing(*given, **named)
+            return self._instance(name, thing, given, named)
 
-            model.build = build  # type: ignore[attr-defined]
-        return cast(type[Settings], model)
+        model.build = build  # type: ignore[attr-defined]
+        return model
+
+    def _instance(
+        self, name: str, cls: type, given: tuple[object, ...], named: Mapping[str, object]
+    ) -> object:
+        """Return an instance of a user's class.
+
+        Raises
+        ------
+        ValueError
+            If the class takes other arguments, or raises; one line that says where.
+        """
+        try:
+            signature(cls).bind(*given, **named)
+        except TypeError as error:
+            lacks = "" if hasattr(cls, "Settings") else "; it has no nested class Settings"
+            raise ValueError(f"{self.kind} {name!r}: {error}{lacks}") from None
+        try:
+            return cls(*given, **named)
+        except OSError:
+            raise
+        except Exception as error:
+            where = sources.place(error)
+            raised = f"{self.kind} {name!r} raises {sources.format_error(error)}"
+            if isinstance(error, ValueError):  # its own words
+                raised = f"{sources.message(error)}{',' if where else ''}"
+            raise ValueError(f"{raised}{where}") from error
 
     def parsed(self, text: str, /, **table: Any) -> Any:
         """Return the settings that a name stands for, alone or with what else is in its table.
@@ -274,7 +304,7 @@ class SettingsRegistry(Registry):
         return self.model(text)(**table)
 
 
-def _parameters(thing: Any) -> dict[str, Any]:
+def _parameters(thing: object) -> dict[str, Any]:
     """Return type and default of each annotated keyword-only parameter of a function, by name.
 
     What the section "Parameters" of its docstring, in the form of numpydoc, says of each goes with
@@ -294,12 +324,12 @@ def _parameters(thing: Any) -> dict[str, Any]:
     return fields
 
 
-def _dumped(value: Settings, info: Any) -> Any:
+def _dump(value: Settings, info: SerializationInfo) -> dict[str, object]:
     """Write settings as the model that holds them is written."""
     return value.model_dump(mode=info.mode, exclude_none=info.exclude_none)
 
 
-class Plugged:
+class Plugged(Kinds):
     """Marks a field that holds the settings of any thing of a registry.
 
     A table is validated by the model that its ``kind`` names; a text is what `shorthand` makes of
@@ -316,16 +346,27 @@ class Plugged:
     def __init__(
         self, registry: SettingsRegistry, shorthand: Callable[[str], Settings] | None = None
     ) -> None:
-        self.registry, self.shorthand = registry, shorthand
+        self.registry = registry
+        self.shorthand = shorthand
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+    def model(self, kind: str) -> type[Settings]:
+        """Return the settings model of a kind, see `SettingsRegistry.model`."""
+        return self.registry.model(kind)
+
+    def built_in(self) -> Iterable[str]:
+        """Return the kinds that are built in."""
+        return self.registry.built_in
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
         """Return how pydantic validates and writes the field."""
         return core_schema.with_info_plain_validator_function(
-            self._validated,
-            serialization=core_schema.plain_serializer_function_ser_schema(_dumped, info_arg=True),
+            self._validate,
+            serialization=core_schema.plain_serializer_function_ser_schema(_dump, info_arg=True),
         )
 
-    def _validated(self, value: Any, info: Any) -> Settings:
+    def _validate(self, value: object, info: ValidationInfo) -> Settings:
         if isinstance(value, Settings):
             return value
         if isinstance(value, str) and self.shorthand is not None:

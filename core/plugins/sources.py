@@ -5,22 +5,16 @@ kept with the study and travels to workers, so that nothing else is needed to co
 report the study elsewhere. What a file means is its syntax tree: comments and layout do not count.
 
 Names are resolved by the `Sources` that are *active*, see `Sources.active`; outside of any study
-these are the files below the working directory.
-
-A study keeps the files that its spec names, and runs them again when it is explained or continued.
-Of a study that came from somebody else, nothing may be run unasked; a digest inside it would
-protect nobody. So every file that is run from a spec in hand is noted, by the SHA-256 of its text,
-in a list outside of all studies: ``$XDG_STATE_HOME/nested-agents/trusted``, by default below
-``~/.local/state``. What a study brings along is run if the list has it.
+these are the files below the working directory. What came with somebody else's study is run only if
+it is trusted, see `trust`; so are modules that it names, see `Sources.permit`.
 """
 
 from __future__ import annotations
 
 import ast
 import contextlib
-import hashlib
 import linecache
-import os
+import re
 import sys
 import traceback
 from collections.abc import Iterator, Mapping
@@ -30,36 +24,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-_here: set[str] = set()
-"""What this process trusts, also where no list can be written."""
-
-
-def trusted_list() -> Path:
-    """Return where the list is."""
-    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
-    return Path(state) / "nested-agents" / "trusted"
-
-
-def is_trusted(text: str) -> bool:
-    """Tell whether a file of this text may be run."""
-    digest = _sha256(text)
-    with contextlib.suppress(OSError, ValueError):
-        return digest in _here or digest in trusted_list().read_text(encoding="ascii").split()
-    return False
-
-
-def trust(text: str) -> None:
-    """Allow a file of this text to be run from now on; if no list can be written, only for now."""
-    if is_trusted(text):
-        return
-    digest = _sha256(text)
-    _here.add(digest)
-    path = trusted_list()
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(path, "a", encoding="ascii") as file:
-            file.write(f"{digest}\n")
-
+from .trust import LIBRARIES, is_trusted, module_text, sha256, trust
 
 FOLDER = "sources"
 """Where a study keeps copies, below its own directory."""
@@ -82,8 +47,8 @@ class Sources:
         Directory of a study, whose copies stand in for files that are not there any more, before
         those of `folder`, if that is a study too.
     brought_by
-        What brought the `texts` along, if they are not the user's own: these are run only if they
-        are trusted, see `is_trusted`.
+        What brought the `texts` along, and names modules, if it is not the user's own: these are
+        run only if they are trusted, see `is_trusted`.
 
     Examples
     --------
@@ -105,7 +70,10 @@ class Sources:
         self._texts = dict(texts or {})
         self._studies = [place for place in (study, folder) if place is not None]
         self._brought = dict.fromkeys(self._texts, brought_by) if brought_by else {}
+        self._brought_by = brought_by
         self._was_sent = False
+        self._copies: dict[Path, str] = {}
+        """Which file each copy of a study is of, by path."""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sources) and self._texts == other._texts
@@ -126,6 +94,7 @@ class Sources:
         """Return the files of some names alone."""
         sources = Sources(None, {name: self.text(name) for name in sorted(names)})
         sources._brought = {name: by for name, by in self._brought.items() if name in names}
+        sources._brought_by = self._brought_by
         return sources
 
     def text(self, name: str) -> str:
@@ -169,6 +138,25 @@ class Sources:
             raise ValueError(f"{path} has no {name!r}, it has: {', '.join(own) or 'nothing'}")
         return thing
 
+    def permit(self, module: str) -> None:
+        """Refuse a module that only somebody else's study names, unless it is trusted.
+
+        Raises
+        ------
+        ValueError
+            If it may not be imported; one line.
+        """
+        if module.partition(".")[0] in LIBRARIES:
+            return
+        text = module_text(module)
+        if self._brought_by is not None and not is_trusted(text):
+            raise ValueError(
+                f"{module} is a module that {self._brought_by} names and no spec of yours has "
+                "imported: it can do whatever you can; --trust imports it"
+            )
+        if not self._was_sent:
+            trust(text)
+
     @contextlib.contextmanager
     def active(self) -> Iterator[None]:
         """Resolve names by these files for as long as the context lasts."""
@@ -184,9 +172,10 @@ class Sources:
         path = self.folder / name
         if not path.exists():
             for study in self._studies:
-                kept = study / FOLDER / kept_name(name)
-                if kept.exists():
-                    path, self._brought[name] = kept, str(study)
+                copy = self._copy(study / FOLDER, name)
+                if copy is not None:
+                    path = copy
+                    self._brought[name] = str(study)
                     break
         if path.exists() and not path.is_file():
             raise ValueError(f"{name}: is no file")
@@ -208,9 +197,23 @@ class Sources:
                 )
         return text
 
+    def _copy(self, folder: Path, name: str) -> Path | None:
+        """Return a study's copy of a file; None if it has none."""
+        for copy in (folder / kept_name(name), folder / former_kept_name(name)):
+            if copy.exists():
+                other = self._copies.setdefault(copy, name)
+                if other == name:
+                    return copy
+                raise ValueError(
+                    f"{name}: the copy {copy.name} in {folder} is that of {other}, or of both: "
+                    "version 0.3 kept but one of them; put the file back where the spec looks for "
+                    "it"
+                )
+        return None
+
     def _module(self, name: str) -> ModuleType:
         text = self.text(name)
-        key = f"_nested_agents_{_sha256(name + chr(0) + text)[:16]}"
+        key = f"_nested_agents_{sha256(name + chr(0) + text)[:16]}"
         if key in sys.modules:
             return sys.modules[key]
         if name in self._brought and not is_trusted(text):
@@ -259,21 +262,29 @@ def is_file(text: object) -> bool:
     return isinstance(text, str) and text.lower().endswith(GRAPHS)
 
 
-def named(value: Any) -> set[str]:
-    """Return the names of all files that settings mention, at any depth.
+def mentions(value: object, key: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the files that settings mention, at any depth, each with the dotted key that does.
 
     Examples
     --------
-    >>> sorted(named({"kind": "arm.py:Arm", "graphs": ["teams.json"]}))
-    ['arm.py', 'teams.json']
+    >>> list(mentions({"kind": "arm.py:Arm", "graphs": ["teams.json"]}))
+    [('arm.py', 'kind'), ('teams.json', 'graphs')]
     """
     if isinstance(value, Mapping):
-        return set().union(*map(named, value.values()))
-    if isinstance(value, list | tuple):
-        return set().union(*map(named, value))
-    if is_reference(value):
-        return {split(value)[0]}
-    return {value} if is_file(value) else set()
+        for name, inner in value.items():
+            yield from mentions(inner, f"{key}.{name}".lstrip("."))
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from mentions(inner, key)
+    elif isinstance(value, str) and is_reference(value):
+        yield split(value)[0], key
+    elif isinstance(value, str) and is_file(value):
+        yield value, key
+
+
+def files_in(value: object) -> set[str]:
+    """Return the names of all files that settings mention, at any depth."""
+    return {name for name, _ in mentions(value)}
 
 
 def split(reference: str) -> tuple[str, str]:
@@ -292,12 +303,24 @@ def split(reference: str) -> tuple[str, str]:
 
 
 def kept_name(name: str) -> str:
-    """Return the name of a study's copy of a file.
+    """Return the name of a study's copy of a file; those of different files differ.
 
     Examples
     --------
-    >>> kept_name("../arms/arm.py")
-    '..__arms__arm.py'
+    >>> kept_name("../arms/arm.py"), kept_name("arms__arm.py")
+    ('..__arms__arm.py', 'arms%5F%5Farm.py')
+    """
+    quoted = re.sub(r"[%\\]|_(?=[_/])|(?<=[_/])_", lambda match: f"%{ord(match[0]):02X}", name)
+    return quoted.replace("/", "__")
+
+
+def former_kept_name(name: str) -> str:
+    """Return the name of a study's copy of a file in version 0.3: not always its own.
+
+    Examples
+    --------
+    >>> former_kept_name("arms/arm.py") == former_kept_name("arms__arm.py")
+    True
     """
     return name.replace("\\", "/").replace("/", "__")
 
@@ -312,12 +335,12 @@ def meaning(text: str, name: str) -> str:
         If it is called so, and is none.
     """
     if not name.endswith(".py"):
-        return _sha256(text)[:16]
+        return sha256(text)[:16]
     try:
         tree = ast.dump(ast.parse(text, name))
     except (SyntaxError, ValueError, RecursionError) as error:
         raise ValueError(f"{name} cannot be run: {format_error(error)}") from None
-    return _sha256(tree)[:16]
+    return sha256(tree)[:16]
 
 
 def imported(text: str) -> set[str]:
@@ -360,7 +383,3 @@ def message(error: BaseException) -> str:
     with contextlib.suppress(Exception):
         return " ".join(str(error).split())
     return ""
-
-
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -21,9 +21,9 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal, NoReturn
 
-from nested_agents.core.plugins.settings import closest
+from nested_agents.core.plugins.words import closest, show
 from nested_agents.studies.cli.main import run_to_status
-from nested_agents.studies.errors import SpecError, show
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.tables import write_csv
 
 from labs import LABS, Lab

@@ -17,7 +17,7 @@ from typing import Any
 import gymnasium
 
 from ...core.plugins import sources
-from ...core.plugins.settings import near
+from ...core.plugins.words import near
 from .settings import AdaptedSettings, GymnasiumSettings
 from .simulators import Environment, GymnasiumSimulator, Simulator, simulator_of
 

@@ -39,7 +39,8 @@ from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
 from ...core.numerics import FloatArray, IntArray
-from ...core.plugins.settings import ScenarioSettings, closest
+from ...core.plugins.settings import ScenarioSettings
+from ...core.plugins.words import closest
 
 OF_OPTIMA = (
     Measure(SUCCESS.name, SUCCESS.title, source="optimal", better="higher", is_rate=True),

@@ -8,8 +8,9 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from ..presentation.tables import SummaryTable, tabulate
+from ..results.aggregates import Aggregates, aggregate
 from ..results.analysis import Difference
-from ..results.contrasts import Aggregates, Contrasts, aggregate
+from ..results.contrasts import Contrasts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,7 +8,8 @@ from tempfile import TemporaryDirectory
 
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
-from ..errors import SpecError, show
+from ...core.plugins.words import show
+from ..errors import SpecError
 from ..presentation.progress import Terminal
 from ..results.results import DONE, read
 from ..spec.spec import Spec, plain
@@ -16,8 +17,9 @@ from ..spec.tables import TomlTable, label
 from ..store.database import EVALUATION
 from ..store.durable import TEAM
 from ..store.store import Store
+from ..trials.arrangement import check_conditions
 from ..trials.keeping import check_teams, open_to_run
-from ..trials.session import Session, check
+from ..trials.session import Session
 from ..trials.trial import Trial, TrialResult, trials_of
 from ..workers.runner import Observer, Outcome, run_trials
 from ..workers.workers import start_workers
@@ -75,7 +77,7 @@ def reevaluate(
     spec = Spec.of(table, sources)
     if spec.evaluation < 1:
         raise SpecError("evaluation = 0: reevaluate needs a study of 1 or more")
-    measures = check(spec, {condition for condition, _ in identities})
+    measures = check_conditions(spec, {condition for condition, _ in identities})
     trials = [t for t in trials_of(spec) if (t.condition, t.seed) in identities]
     with (
         TemporaryDirectory() as folder,

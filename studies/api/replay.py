@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-from ...core.plugins.settings import closest
+from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..store.store import Store
 

@@ -14,8 +14,8 @@ from ..catalogue.study import load_study, measure_by_name
 from ..presentation.progress import Terminal, count
 from ..spec.spec import Spec
 from ..store.store import Store
+from ..trials.arrangement import check_conditions
 from ..trials.keeping import open_to_run, pending
-from ..trials.session import check
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer, run_trials
 from ..workers.workers import start_workers
@@ -77,7 +77,9 @@ def run_study(
             store.forget_failed()
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
-        run_one = measure_by_name if is_reference(spec.study) else load_study(spec.study).measure
+        with spec.sources.active():
+            is_own = is_reference(spec.study)
+            run_one = measure_by_name if is_own else load_study(spec.study).measure
         for note in (*store.notes, *spec.warnings()):
             observer.note(note)
         if left:
@@ -105,7 +107,7 @@ def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
         If a condition cannot be built, or the study has not what it needs; before anything is run
         or written.
     """
-    measures = check(spec, may_fail=may_fail)
+    measures = check_conditions(spec, may_fail=may_fail)
     with spec.sources.active():
         load_study(spec.study).check(spec)
     return measures

@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
-from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources
+from ...core.plugins.words import closest
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
 from ..presentation.tables import SummaryTable, tabulate
@@ -205,8 +205,11 @@ class StudyResults:
         SpecError
             If there is no such study.
         """
-        load_study(name)
-        return replace(self, outline=self.outline._replace(study=name), _is_whole=False)
+        own = Sources(Path())
+        with own.active():
+            load_study(name)
+        outline = self.outline._replace(study=name)
+        return replace(self, outline=outline, _sources=own, _is_whole=False)
 
     @property
     def figures(self) -> dict[str, Figure]:
@@ -363,7 +366,8 @@ def _load_one(path: Path) -> StudyResults:
     if path.is_file():
         kept = published.load(path)
         remarks = (f"{path}: {kept.note}",) if kept.note else ()
-        return StudyResults(kept.outline, kept.results, (), remarks)
+        sources = Sources(brought_by=str(path))
+        return StudyResults(kept.outline, kept.results, (), remarks, sources)
     with Store.open(path) as store:
         store.verify()
         return StudyResults.of(store)

@@ -18,13 +18,14 @@ from pathlib import Path
 import numpy as np
 
 from ...core.numerics import pd
-from ..errors import SpecError, show
+from ...core.plugins.words import show
+from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..results.results import Results, read
 from ..spec.spec import Spec
 from ..spec.tables import TomlTable, dumps, nested, overlay
 from ..store import durable
-from ..trials.session import check
+from ..trials.arrangement import check_conditions
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer
 from .running import run_study
@@ -232,7 +233,7 @@ def _laid(spec: Spec, point: Point) -> Spec:
 
 def _content(spec: Spec) -> str:
     """Return what the only condition of a spec consists of, if it can be built."""
-    check(spec)
+    check_conditions(spec)
     return spec.conditions()[0].settings.canonical()
 
 
@@ -286,7 +287,7 @@ def _study(spec: Spec, points: Mapping[str, Point], seeds: Iterable[int]) -> Spe
     for name, table in CONTROLS.items():
         control = {"name": name, **table}
         with suppress(SpecError):  # if no rewards are predicted
-            check(Spec.of({**base, "overrides": [control]}, spec.sources))
+            check_conditions(Spec.of({**base, "overrides": [control]}, spec.sources))
             overrides.append(control)
     return Spec.of({**base, "overrides": overrides}, spec.sources)
 

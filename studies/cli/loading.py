@@ -9,8 +9,8 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING
 
-from ...core.plugins.sources import is_trusted
-from ...core.plugins.sources import trust as trust_text
+from ...core.plugins.trust import is_trusted, module_text, modules_in
+from ...core.plugins.trust import trust as trust_text
 from ..presentation.progress import count, duration, say
 from ..spec.outline import StudyOutline, other_spec, outdated
 from ..store.store import Store
@@ -38,8 +38,7 @@ def load_results(
 
     if trust:
         for source in sources:
-            if source.is_dir():
-                trust_files(source)
+            trust_files(source)
     results = load(*sources)
     for remark in results.remarks:
         say(remark)
@@ -47,13 +46,27 @@ def load_results(
     return results if study is None else results.as_study(study)
 
 
-def trust_files(directory: Path) -> None:
-    """Allow the Python files that are kept with a study to be run, and say which."""
-    with Store.open(directory) as store:
-        texts = store.sources()
-    for name, text in texts.items():
-        if name.endswith(".py") and not is_trusted(text):
-            say(f"{name}, which came with {directory}, is trusted from now on")
+def trust_files(source: Path) -> None:
+    """Allow what a study keeps and names to be run and imported, and say what.
+
+    These are the Python files that are kept with it, and modules by name; those of a file of
+    results are named in its spec.
+    """
+    texts: dict[str, str] = {}
+    if source.is_dir():
+        with Store.open(source) as store:
+            kept = store.sources()
+            tables: object = [store.spec(), *store.settings().values()]
+        texts = {f"{n}, which came with {source},": t for n, t in kept.items() if n.endswith(".py")}
+    else:
+        from ..results import published  # pandas takes its time
+
+        tables = published.load(source).outline.table
+    modules = dict(modules_in(tables))
+    texts |= {f"{name}, which {source} names,": module_text(name) for name in modules}
+    for title, text in texts.items():
+        if not is_trusted(text):
+            say(f"{title} is trusted from now on")
             trust_text(text)
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import click
 
+from ...core.plugins.words import closest
 from ..errors import SpecError, printable
 from .options import complete
 
@@ -91,8 +92,6 @@ class _Commands(click.Group):
                 "results/, not in the installed package"
             )
         if command is None:
-            from ...core.plugins.settings import closest  # pydantic takes its time
-
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
         parts = command.commands if isinstance(command, click.Group) else {}
         owner = parts.get(args[1], command) if args[1:] else command

@@ -132,10 +132,10 @@ def running(command: Callable[..., int]) -> Callable[..., int]:
 
 trust = flag(
     "--trust",
-    "Run, from now on, the Python files that came with the study, though no spec of yours has "
-    "run them yet. They can do whatever you can.",
+    "Run, from now on, the Python files that came with the study, and import the modules that it "
+    "names, though no spec of yours has done so yet. They can do whatever you can.",
 )
-"""Whether the users' files that a study brings along may be run."""
+"""Whether code that a study brings along or names may be run, see `core.plugins.trust`."""
 
 changes = click.option(
     "--set",

@@ -344,7 +344,7 @@ def _kept_rows(store: Store, trial: Trial) -> list[tuple[object, ...]]:
     at = [names.index(name) for name in columns(store.measures())]
     condition, seed, phase = (names.index(name) for name in ("condition", "seed", "phase"))
     own = (row for row in every if (row[condition], row[seed]) == (trial.condition, trial.seed))
-    trained = (row for row in own if row[phase] == "training" or row[phase].startswith(STAGE))
+    trained = (row for row in own if row[phase] == "training" or str(row[phase]).startswith(STAGE))
     return [tuple(row[i] for i in at) for row in trained]
 
 

@@ -10,11 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import ArrayLike
 
+from ..results.aggregates import Aggregates
 from ..results.analysis import Difference, Figures
-from ..results.contrasts import Aggregates
 from ..results.statistics import LEVEL, Estimate, stacked
 from ..store.durable import replacing
 
@@ -48,6 +49,15 @@ def styled() -> Iterator[None]:
     """Let figures that are made within look as all do."""
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
         yield
+
+
+def spell_dollars(figure: Figure, names: Iterable[str]) -> Figure:
+    """Let ``$`` be a character in a figure if it is one in names; else it begins a formula."""
+    if any("$" in name for name in names):
+        for text in figure.findobj(Text):
+            if isinstance(text, Text) and "$" in text.get_text():  # ticks of logarithms come later
+                text.set_parse_math(False)
+    return figure
 
 
 def panels(
@@ -320,4 +330,4 @@ def draw_profiles(aggregates: Aggregates) -> Figure:
             own.set(title="interquartile mean, training")
             as_episodes(own)
         name_curves(figure, names)
-    return figure
+    return spell_dollars(figure, names)

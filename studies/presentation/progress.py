@@ -68,7 +68,8 @@ class Terminal(Observer):
 
     def announce(self, spec: Spec, directory: Path, processes: int) -> None:
         """Say what is about to be run."""
-        conditions, seeds = len(spec.conditions()), len(spec.seeds)
+        conditions = len(spec.conditions())
+        seeds = len(spec.seeds)
         self.note(
             f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
             f"{StudyOutline.of(spec).lengths} of up to {count(spec.steps, 'step')}, "
@@ -121,7 +122,8 @@ def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:
 def _follow_lines(outcomes: Iterable[Outcome], total: int, done: int) -> None:
     begin = last = time.monotonic()
     for here, outcome in enumerate(outcomes, 1):
-        now, finished = time.monotonic(), done + here
+        now = time.monotonic()
+        finished = done + here
         if outcome.error is not None:
             say(_failure(outcome))
         if now - last >= PLAIN_SECONDS or finished == total:

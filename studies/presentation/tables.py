@@ -23,7 +23,7 @@ from rich.table import Table
 
 from ...core.interface.measures import Measure
 from ...core.numerics import pd
-from ...core.plugins.settings import near
+from ...core.plugins.words import near
 from ..errors import SpecError, printable
 from ..results.analysis import Summary
 from ..results.statistics import FEW, Estimate, between, exactly, stacked, two_figures
@@ -99,7 +99,7 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """With what a spreadsheet's formula begins, if the spaces before it are left out."""
 
 
-def write_csv(file: TextIO, names: Iterable[str], rows: Iterable[Sequence[Any]]) -> None:
+def write_csv(file: TextIO, names: Iterable[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a header and rows; None becomes an empty cell."""
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(map(harmless, names))
@@ -113,12 +113,12 @@ def in_csv(frame: pd.DataFrame) -> str:
     return file.getvalue()
 
 
-def rows_of(frame: pd.DataFrame) -> Iterator[tuple[Any, ...]]:
+def rows_of(frame: pd.DataFrame) -> Iterator[tuple[object, ...]]:
     """Yield the rows of a frame as values of Python's own types; None is what is missing."""
     yield from frame.astype(object).where(frame.notna(), None).itertuples(index=False, name=None)
 
 
-def harmless(value: Any) -> Any:
+def harmless(value: object) -> object:
     """Return a value as it may stand in a spreadsheet, a truth value as 0 or 1.
 
     Examples
@@ -342,7 +342,8 @@ def _blocks(titles: Sequence[str], rows: Sequence[Row], width: int) -> list[dict
     if label + sum(1 + wide for wide in whole) <= width:
         return [dict(enumerate(whole))]
     broken = [max(map(len, [*title.split(), *of_cells])) for title, of_cells in pairs]
-    n, label = len(broken), min(label, LABEL)
+    n = len(broken)
+    label = min(label, LABEL)
     for many in range(n, 0, -1):
         blocks = [{i: broken[i] for i in range(k, min(k + many, n))} for k in range(0, n, many)]
         if all(label + sum(1 + wide for wide in block.values()) <= width for block in blocks):

@@ -26,9 +26,10 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ...core.plugins.settings import ScenarioSettings
+from ...core.plugins.words import show
 from ...scenarios import SCENARIOS
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
-from ..errors import SpecError, show
+from ..errors import SpecError
 from ..presentation.figures import styled
 from ..presentation.progress import count
 from ..presentation.tables import tabulate

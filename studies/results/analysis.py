@@ -77,7 +77,8 @@ class Difference:
         """Value, interval, p as it is and adjusted, as text."""
         e = self.estimate
         interval = f"{_signed(e.value)} [{_signed(e.low)}, {_signed(e.high)}]"
-        raw, adjusted = _compared(self.raw), _compared(self.p)
+        raw = _compared(self.raw)
+        adjusted = _compared(self.p)
         return f"{interval}, p {adjusted} ({raw.removeprefix('= ')} unadjusted)"
 
 
@@ -110,7 +111,8 @@ def differences(
     of_rates
         Whether values are rates.
     """
-    names, compared = [], []
+    names = []
+    compared = []
     for group, pairs in groups.items():
         for condition, measure, *values in pairs:
             own, base = shared(values)
@@ -174,7 +176,8 @@ def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Esti
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '1.00 [0.54, 1.00]'
     """
-    a, b = rate(first, level), rate(second, level)
+    a = rate(first, level)
+    b = rate(second, level)
     value = a.value - b.value
     low = value - np.hypot(a.value - a.low, b.high - b.value)
     return Estimate(value, low, value + np.hypot(a.high - a.value, b.value - b.low))
@@ -192,10 +195,12 @@ def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> 
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '0.75 [0.63, 0.92]'
     """
-    a, b = rate(numerator, level), rate(denominator, level)
+    a = rate(numerator, level)
+    b = rate(denominator, level)
     if not b.value > 0.0:
         return exactly(np.nan)
-    product, ends = a.value * b.value, []
+    product = a.value * b.value
+    ends = []
     for own, other, sign, unknown in ((a.low, b.high, -1.0, 0.0), (a.high, b.low, 1.0, np.inf)):
         scale = other * (2.0 * b.value - other)
         root = np.sqrt(np.maximum(product**2 - own * (2.0 * a.value - own) * scale, 0.0))

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import show
+from ...core.plugins.words import show
 
 MOST_WHOLE = 2**53
 """Up to here a float holds every whole number."""

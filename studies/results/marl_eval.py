@@ -17,7 +17,8 @@ from ...core.interface.measures import SUCCESS, Measure
 from .json_values import JsonValue
 from .results import Array, Results, from_arrays
 
-STEP, FINAL = "step_", "absolute_metrics"
+STEP = "step_"
+FINAL = "absolute_metrics"
 KNOWN = ("steps", "return", SUCCESS.name)
 NO_METRICS = ("step_count", "elapsed_time")
 

@@ -95,7 +95,8 @@ def power(effect: float, deviation: float, seeds: int, comparisons: int = 1) -> 
         if extreme <= FEW_PATTERNS:
             return _simulated(abs(effect) / deviation, seeds, extreme)
         level = extreme * 2.0 ** (1 - seeds)
-    shift, freedom = abs(effect) / deviation * math.sqrt(seeds), seeds - 1
+    shift = abs(effect) / deviation * math.sqrt(seeds)
+    freedom = seeds - 1
     return power_of_t(freedom, shift, float(special.stdtrit(freedom, 1.0 - level / 2.0)))
 
 
@@ -109,9 +110,11 @@ def detectable(deviation: float, seeds: int, comparisons: int = 1, wanted: float
     """
     if seeds < seeds_needed(comparisons):
         return math.inf
-    low, high = 0.0, 1.0
+    low = 0.0
+    high = 1.0
     while power(high, 1.0, seeds, comparisons) < wanted:
-        low, high = high, 2.0 * high
+        low = high
+        high = 2.0 * high
     while high - low > 0.002 * high:
         middle = (low + high) / 2.0
         is_enough = power(middle, 1.0, seeds, comparisons) >= wanted
@@ -134,7 +137,8 @@ def seeds_for(
     low = seeds_needed(comparisons)
     high = low
     while power(effect, deviation, high, comparisons) < wanted:
-        low, high = high + 1, 2 * high
+        low = high + 1
+        high = 2 * high
         if high > 2 * MOST_SEEDS:
             return None
     seeds = range(low, high)

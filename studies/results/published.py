@@ -7,10 +7,10 @@ that the run gave.
 
 import json
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -133,7 +133,7 @@ def _counted(seeds: tuple[int, ...]) -> int | list[int]:
     return len(seeds) if many else list(seeds)
 
 
-Packed = list[Any] | dict[str, Any]
+Packed = Sequence[object] | dict[str, object]
 """An array as lists; of many rows, as flags or one value for all, with its shape."""
 
 
@@ -145,7 +145,7 @@ def _packed(values: np.ndarray, *, is_rate: bool) -> Packed:
     return rows if len(rows) < FEW else {"flags": "".join(rows), "shape": list(values.shape)}
 
 
-def _constant(values: np.ndarray) -> dict[str, Any] | None:
+def _constant(values: np.ndarray) -> Packed | None:
     """Return many equal values as one of them and their shape; None of others."""
     if values.size < FEW or not (values == values.flat[0]).all():
         return None

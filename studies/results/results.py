@@ -25,7 +25,7 @@ from ..errors import SpecError
 from ..spec.tables import flat, label
 from ..store.database import EVALUATION
 from ..store.store import Store
-from ..trials.trial import joined as joined_measures
+from ..trials.episodes import join_measures
 
 Array = NDArray[Any]
 
@@ -66,7 +66,8 @@ class Results:
 
     def numbers(self, condition: str) -> dict[str, Array]:
         """Return the numbers of whole trials that a condition has, ``(n_seeds,)`` by name."""
-        own, others = self._finished[condition], {*TRIAL_COLUMNS, *self.columns.get(condition, ())}
+        own = self._finished[condition]
+        others = {*TRIAL_COLUMNS, *self.columns.get(condition, ())}
         return {name: values for name, values in own.items() if name not in others}
 
     def has(self, condition: str, phase: str = "", measure: str = "") -> bool:
@@ -129,7 +130,8 @@ class Results:
 
         None of results without returns: published ones keep a part of what is measured.
         """
-        names, groups = ["seed", "phase", "episode", *self._measured], dict[bytes, list[str]]()
+        names = ["seed", "phase", "episode", *self._measured]
+        groups = dict[bytes, list[str]]()
         for condition, rows in self.episodes.groupby("condition", sort=False)[names]:
             if rows["return"].notna().all():
                 key = pd.util.hash_pandas_object(rows, index=False).to_numpy().tobytes()
@@ -284,7 +286,8 @@ def from_arrays(
     columns, measures
         See `Results`.
     """
-    episodes, trials = [], []
+    episodes = []
+    trials = []
     for condition, own in seeds.items():
         label = {"condition": condition, **columns.get(condition, {})}
         for phase, by_condition in phases.items():
@@ -370,7 +373,8 @@ def chosen(results: Results, choice: str, settings: Mapping[str, Any]) -> Result
     except Exception as error:  # of pandas, of Python's parser, of what is compared
         problem = f"{sources.message(error)}; must be such as robots == 8 and box == 'circle'"
         raise SpecError(f"where = {choice!r}: {problem}") from None
-    keys, trials = ["condition", "seed"], results.trials.loc[keep].reset_index(drop=True)
+    keys = ["condition", "seed"]
+    trials = results.trials.loc[keep].reset_index(drop=True)
     kept = pd.MultiIndex.from_frame(trials[keys])
     is_kept = pd.MultiIndex.from_frame(results.episodes[keys]).isin(kept)
     episodes = results.episodes[is_kept].reset_index(drop=True)
@@ -425,16 +429,15 @@ def together(
         for name, part, new in zip(names, parts, labels, strict=True)
         for condition, row in part.columns.items()
     }
-    frames: dict[str, list[pd.DataFrame]] = {"episodes": [], "trials": []}
-    for part, new in zip(parts, labels, strict=True):
-        of_part = {"episodes": part.episodes, "trials": part.trials}
-        for name, kept in frames.items():
-            frame = of_part[name]
-            label = frame["condition"].map(new)
-            swept = {k: label.map(lambda c, k=k: columns[c][k]) for k in (*keys, DIRECTORY)}
-            kept.append(frame.assign(condition=label, **swept))
+
+    def rename(frame: pd.DataFrame, new: Mapping[str, str]) -> pd.DataFrame:
+        label = frame["condition"].map(new)
+        swept = {k: label.map(lambda c, k=k: columns[c][k]) for k in (*keys, DIRECTORY)}
+        return frame.assign(condition=label, **swept)
+
+    episodes = [rename(part.episodes, new) for part, new in zip(parts, labels, strict=True)]
+    trials = [rename(part.trials, new) for part, new in zip(parts, labels, strict=True)]
     phases = dict.fromkeys(phase for part in parts for phase in part.phases)
     usage = (name for part in parts for name in part.usage)
-    measures = joined_measures(part.measures for part in parts)
-    episodes, trials = frames["episodes"], frames["trials"]
+    measures = join_measures(part.measures for part in parts)
     return assemble(episodes, trials, phases, columns, measures, usage), labels

@@ -95,15 +95,18 @@ def bootstrap(
         raise ValueError(
             f"bootstrap: values of shape {array.shape}, allowed (n_runs,) or (n_runs, n_points)"
         )
-    n_runs, value = len(array), array.copy().T.mean(axis=-1)
+    n_runs = len(array)
+    value = array.copy().T.mean(axis=-1)
     if n_runs < 2:
         return exactly(value)
     if n_runs < FEW:
         reach = special.stdtrit(n_runs - 1, 0.5 + level / 2.0)
         half = reach * np.sqrt(array.var(axis=0, ddof=1) / n_runs)
-        low, high = value - half, value + half
+        low = value - half
+        high = value + half
     else:
-        drawn, means = _drawn(n_runs, resamples, seed), []
+        drawn = _drawn(n_runs, resamples, seed)
+        means = []
         # Memory holds next to each other what the mean runs along fastest: with several points all
         # resamples of a run, else the runs of a resample.
         axis = 0 if array.size > n_runs else 1
@@ -112,7 +115,8 @@ def bootstrap(
         tail = _tail(level, n_runs)
         low, high = np.quantile(np.concatenate(means), [tail, 1.0 - tail], axis=0)
     least, greatest = bounds
-    low, high = np.clip(low, *bounds), np.clip(high, *bounds)
+    low = np.clip(low, *bounds)
+    high = np.clip(high, *bounds)
     if np.isfinite(greatest - least):  # the interval ends at the bounds, but is no point there
         z = float(special.ndtri(0.5 + level / 2.0))
         reach = (greatest - least) * z**2 / (n_runs + z**2)
@@ -278,7 +282,8 @@ def paired_permutation(
     >>> paired_permutation([1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 5])
     0.03125
     """
-    one, other = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    one = np.asarray(first, dtype=float)
+    other = np.asarray(second, dtype=float)
     if one.ndim != 1 or one.shape != other.shape or not len(one):
         raise ValueError(
             f"paired_permutation: values of shape {one.shape} against {other.shape}, allowed: one "
@@ -286,7 +291,8 @@ def paired_permutation(
         )
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
         raise ValueError("paired_permutation: values must be finite")
-    difference, n = one - other, len(one)
+    difference = one - other
+    n = len(one)
     if difference.sum() < 0.0:
         difference = -difference
     # Whole numbers differ exactly; others are off by rounding, some units in the last place each.

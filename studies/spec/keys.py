@@ -8,32 +8,31 @@ walked as well, so a new scenario or learner has its keys here from the first da
 import ast
 import inspect
 import json
-import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
 from textwrap import dedent
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, TypeGuard, Union, get_args, get_origin
 
-from annotated_types import MinLen
+from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
-from ...core.plugins.settings import Settings, near
+from ...core.plugins.models import kinds_at, models_of
+from ...core.plugins.registry import Plugged, SettingsRegistry
+from ...core.plugins.settings import Settings
+from ...core.plugins.words import near
 from .conditions import ConditionSettings, Override, StageSettings
 from .presets import PRESETS
 from .spec import Spec
-from .tables import models_of, registry_of
 
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 """How the text beside a field names its unit."""
 TYPES = {bool: "true or false", int: "whole number", float: "number", str: "text", Any: "any"}
 GREATEST_BOUND = 10**9
 """A bound beyond it is that of a machine's integers, and no help to anybody."""
-SIGNS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
-"""By the attribute of a field's metadata that holds the bound."""
 
 
 class Key(NamedTuple):
@@ -101,7 +100,7 @@ def tables() -> tuple[Table, ...]:
     """
     own = (("", Spec), ("overrides", Override), ("curriculum", StageSettings))
     heads = [_table(name, ("", ""), model, {}) for name, model in own]
-    return (*heads, *_below(ConditionSettings, "", "", set()))
+    return (*heads, *_below(ConditionSettings, "", "", set(), ()))
 
 
 def keys_below(prefix: str) -> tuple[Table, ...]:
@@ -124,39 +123,89 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
     return tuple(below)
 
 
-def _below(model: type[Settings], name: str, within: str, seen: set[Any]) -> Iterator[Table]:
-    """Yield the tables that the fields of a model hold, at any depth, each once."""
+def _below(
+    model: type[Settings],
+    name: str,
+    within: str,
+    seen: set[tuple[str, type[Settings]]],
+    above: tuple[SettingsRegistry, ...],
+) -> Iterator[Table]:
+    """Yield the tables that the fields of a model hold, at any depth, each once.
+
+    What a registry offers is not listed again within what it offers itself: the parts of a team
+    have learners, as the team has one.
+    """
     for field, info in model.model_fields.items():
         place = f"{name}.{field}" if name else field
+        registry = registry_of(info)
+        if registry in above:
+            continue
+        inside = above if registry is None else (*above, registry)
         for kind, held, inherited in _held(info):
-            if (place, held) not in seen:
-                seen.add((place, held))
-                table = _table(place, (kind, within), held, inherited)
-                if table.keys or kind:
-                    yield table
-                yield from _below(held, place, kind or within, seen)
+            if (place, held) in seen:
+                continue
+            seen.add((place, held))
+            table = _table(place, (kind, within), held, inherited)
+            if not kind and (kinds := kinds_of(info)):
+                table = table._replace(keys=(_kind(info, kinds), *table.keys))
+            if table.keys or kind:
+                yield table
+            yield from _below(held, place, kind or within, seen, inside)
+
+
+def settings_of(info: FieldInfo) -> list[type[Settings]]:
+    """Return the settings models that a field's annotation allows, in order."""
+    return [model for model in models_of(info.annotation) if issubclass(model, Settings)]
+
+
+def registry_of(info: FieldInfo) -> SettingsRegistry | None:
+    """Return the registry whose things a field holds, if it does."""
+    mark = kinds_at(info)
+    return mark.registry if isinstance(mark, Plugged) else None
+
+
+def kinds_of(info: FieldInfo) -> dict[str, type[Settings]]:
+    """Return the models of a field that a table's ``kind`` tells apart, by kind."""
+    registry = registry_of(info)
+    if registry is not None:
+        return {kind: registry.model(kind) for kind in registry.built_in}
+    models = settings_of(info)
+    return {m.model_fields["kind"].default: m for m in models if "kind" in m.model_fields}
 
 
 def _held(info: FieldInfo) -> Iterator[tuple[str, type[Settings], Mapping[str, FieldInfo]]]:
     """Yield what a field may hold: kind, model, and fields of the model that it inherits.
 
-    What all kinds inherit comes first, if it has keys.
+    What all kinds inherit comes first.
     """
-    plugged = registry_of(info)
-    models: list[Any] = [m for m in models_of(info.annotation) if issubclass(m, Settings)]
-    kinds = [(m.model_fields["kind"].default, m) for m in models if "kind" in m.model_fields]
-    base: Any = None
-    if plugged is not None:
-        base, models = plugged.base, []
-        kinds = [(kind, plugged.model(kind)) for kind in plugged.built_in]
-    elif kinds:
-        bases = kinds[0][1].__mro__[1:]
-        base = next(cls for cls in bases if all(issubclass(m, cls) for _, m in kinds))
-    inherited = getattr(base, "model_fields", {})
-    if inherited or plugged is not None:
+    registry = registry_of(info)
+    kinds = kinds_of(info)
+    inherited: Mapping[str, FieldInfo] = {}
+    if registry is not None or kinds:
+        base = registry.base if registry is not None else _base(list(kinds.values()))
+        inherited = base.model_fields
         yield "", base, {}
-    yield from ((kind, model, inherited) for kind, model in kinds)
-    yield from (("", model, {}) for model in models if "kind" not in model.model_fields)
+    for kind, model in kinds.items():
+        yield kind, model, inherited if issubclass(model, base) else {}
+    if registry is None:
+        yield from (("", m, {}) for m in settings_of(info) if "kind" not in m.model_fields)
+
+
+def _base(models: Sequence[type[Settings]]) -> type[Settings]:
+    """Return the nearest model that all of some models inherit."""
+    ancestors = (cls for cls in models[0].__mro__[1:] if issubclass(cls, Settings))
+    return next(cls for cls in ancestors if all(issubclass(m, cls) for m in models))
+
+
+def _kind(info: FieldInfo, kinds: Iterable[str]) -> Key:
+    """Return the key that says of which kind a field's table is."""
+    own = "; or one of your own, file.py:NAME" if registry_of(info) is not None else ""
+    default = "required"
+    value = None if info.is_required() else info.get_default(call_default_factory=True)
+    if isinstance(value, Settings):
+        default = json.dumps(value.model_dump().get("kind", ""))
+    meaning = "Which of them it is; what else may stand in the table depends on it."
+    return Key("kind", "text", default, ", ".join(kinds) + own, "", meaning, "")
 
 
 def _table(
@@ -217,7 +266,8 @@ def _docstrings(cls: type) -> Mapping[str, str]:
         source = inspect.getsource(cls)
     except (OSError, TypeError):
         return {}
-    body = ast.parse(dedent(source)).body[0].body  # type: ignore[attr-defined]
+    (definition,) = ast.parse(dedent(source)).body
+    body = definition.body if isinstance(definition, ast.ClassDef) else []
     return {
         field.target.id: str(text.value.value)
         for field, text in pairwise(body)
@@ -226,11 +276,14 @@ def _docstrings(cls: type) -> Mapping[str, str]:
     }
 
 
-def _key(name: str, info: FieldInfo, meaning: str, laid: Any) -> Key:
+def _key(name: str, info: FieldInfo, meaning: str, laid: object) -> Key:
     """Return a key; `laid` is what the preset has in place of its default, if anything."""
-    plugged, default, unit = registry_of(info), _shown(info), UNIT.search(meaning)
-    if plugged is not None:
-        type_, allowed = "table", f"kind: {', '.join(plugged.built_in)}"
+    registry = registry_of(info)
+    default = _default(info)
+    unit = UNIT.search(meaning)
+    if registry is not None:
+        type_ = "table"
+        allowed = f"kind: {', '.join(registry.built_in)}"
     else:
         type_ = _type(info.annotation)
         allowed = ", ".join(dict.fromkeys([*_bounds(info.metadata), *_allowed(info.annotation)]))
@@ -241,14 +294,14 @@ def _key(name: str, info: FieldInfo, meaning: str, laid: Any) -> Key:
     return Key(name, type_, default, allowed, unit[1] if unit else "", meaning, preset)
 
 
-def _shown(info: FieldInfo) -> str:
+def _default(info: FieldInfo) -> str:
     if info.is_required():
         return "required"
     value = info.get_default(call_default_factory=True)
     if value is None:
         return "none"
     if isinstance(value, Settings):
-        kind = getattr(value, "kind", "")
+        kind = value.model_dump().get("kind")
         return json.dumps(kind) if kind else "{}"
     if value == tuple(range(8)):
         return "8"  # the seeds, which are written as their number
@@ -257,7 +310,8 @@ def _shown(info: FieldInfo) -> str:
 
 def _type(annotation: Any) -> str:
     """Return the type of a field in words: alternatives but None, annotations taken off."""
-    origin, given = get_origin(annotation), get_args(annotation)
+    origin = get_origin(annotation)
+    given = get_args(annotation)
     if isinstance(annotation, TypeAliasType):
         return "nested lists of text"
     if origin is Annotated:
@@ -273,22 +327,32 @@ def _type(annotation: Any) -> str:
 
 def _allowed(annotation: Any) -> Iterator[str]:
     """Yield what is allowed beside the type: the words of literals, and bounds, at any depth."""
-    origin, given = get_origin(annotation), get_args(annotation)
+    origin = get_origin(annotation)
+    given = get_args(annotation)
     if origin is Literal:
         yield from (json.dumps(value) for value in given if value is not False)
     elif origin is Annotated:
         yield from _allowed(given[0])
-        yield from _bounds(item for one in given[1:] for item in getattr(one, "metadata", ()))
+        fields = (one for one in given[1:] if isinstance(one, FieldInfo))
+        yield from _bounds(item for field in fields for item in field.metadata)
     elif origin in (Union, UnionType, tuple):
         for one in given:
             yield from _allowed(one)
 
 
-def _bounds(metadata: Any) -> Iterator[str]:
+def _bounds(metadata: Iterable[object]) -> Iterator[str]:
     for item in metadata:
-        for attribute, sign in SIGNS.items():
-            bound = getattr(item, attribute, math.inf)
-            if bound <= GREATEST_BOUND:
-                yield f"{sign} {bound:,}"
+        if isinstance(item, Ge) and _is_short(item.ge):
+            yield f">= {item.ge:,}"
+        if isinstance(item, Gt) and _is_short(item.gt):
+            yield f"> {item.gt:,}"
+        if isinstance(item, Le) and _is_short(item.le):
+            yield f"<= {item.le:,}"
+        if isinstance(item, Lt) and _is_short(item.lt):
+            yield f"< {item.lt:,}"
         if isinstance(item, MinLen):
             yield f"at least {item.min_length} of them"
+
+
+def _is_short(bound: object) -> TypeGuard[float]:
+    return isinstance(bound, int | float) and bound <= GREATEST_BOUND

@@ -28,17 +28,22 @@ from ...core.evaluators import EVALUATORS
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.learners import LEARNERS, LearnerSettings
 from ...core.numerics import nx
+from ...core.plugins.problems import explain
 from ...core.plugins.registry import Registry
-from ...core.plugins.settings import Settings, closest, tuples
-from ...core.plugins.sources import Sources, is_reference, named
+from ...core.plugins.settings import Settings, tuples
+from ...core.plugins.sources import Sources, is_reference, mentions
+from ...core.plugins.trust import modules_in
+from ...core.plugins.words import closest
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ...topologies.builders import join_names
 from ..errors import SpecError, refused
-from .conditions import Condition, Curriculum, Length, Name, Override, below, expand, grid, section
+from ..store.database import DATABASE, SPEC_FILE
+from .conditions import Condition, Curriculum, Length, Name, Override
+from .layers import below, expand, grid, section
 from .presets import PRESETS
 from .studies import STUDIES
-from .tables import TomlTable, assignment, explain, overlay
+from .tables import TomlTable, assignment, overlay
 
 REGISTRIES: dict[str, Registry] = {
     "study": STUDIES,
@@ -95,7 +100,8 @@ def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
         of_neighbours = bool(graph.neighbours)
         relations = {"told": graph.told, "considers": graph.considers}
     else:
-        agents, pairs = list(map(str, graph)), [(str(a), str(b)) for a, b in graph.edges]
+        agents = list(map(str, graph))
+        pairs = [(str(a), str(b)) for a, b in graph.edges]
         of_neighbours = bool(pairs) and not graph.is_directed()
     if of_neighbours:
         return {"kind": "coordination-graph", "edges": tuple(pairs), **relations}
@@ -104,7 +110,7 @@ def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
     return {"kind": "edges", "edges": tuple(pairs), "alone": alone, **relations}
 
 
-def _of_settings(settings: Settings, registry: Registry | None) -> Any:
+def _of_settings(settings: Settings, registry: Registry | None) -> TomlTable:
     """Return the table of settings; what is None leaves what lies below as it is."""
     table = settings.model_dump(exclude_none=True)
     if registry is not None and not table.get("kind"):
@@ -116,13 +122,16 @@ def _of_settings(settings: Settings, registry: Registry | None) -> Any:
     return table
 
 
-def _name(thing: Any, registry: Registry) -> str:
+def _name(thing: object, registry: Registry) -> str:
     with refused(f"{registry.kind}: "):
         return registry.reference_to(thing)
 
 
 MOST_TRIALS = 100_000
 """A larger grid is taken for a mistake."""
+
+MOST_KEYS = 6
+"""A remark names no more of them."""
 
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 
@@ -262,12 +271,20 @@ class Spec(Settings):
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
         spec._conditions = grid(
-            spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations,
-            spec.curriculum,
-        )  # fmt: skip
-        spec._sources = sources.only(
-            named([spec.study, *(condition.tables for condition in spec._conditions)])
+            spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations, spec.curriculum
         )
+        tables = [table for condition in spec._conditions for table in condition.tables]
+        names = dict(mentions([{"study": spec.study}, *tables]))
+        for name, key in names.items():
+            try:
+                sources.text(name)
+            except ValueError as error:
+                problem = str(error).removeprefix(f"{name}: ")
+                raise SpecError(f"{key} = {name!r}: {problem}") from None
+        for module, key in dict(modules_in(tables)).items():
+            with refused(f"{key}: "):
+                sources.permit(module)
+        spec._sources = sources.only(set(names))
         return spec
 
     @classmethod
@@ -285,7 +302,8 @@ class Spec(Settings):
     ) -> Spec:
         """Read a TOML file and lay ``key=value`` changes over it.
 
-        Files of users are looked for beside it, then among the copies of a study.
+        Files of users are looked for beside it, then among the copies of a study. The copy of a
+        spec that stands beside a study's database may be somebody else's, see `trust`.
 
         Raises
         ------
@@ -299,31 +317,33 @@ class Spec(Settings):
             raise SpecError(f"{path}: {error.strerror or error}") from None
         except UnicodeDecodeError:
             raise SpecError(f"{path}: is not UTF-8 text") from None
-        return cls.parse(text, changes, str(path), path.parent, study)
+        is_copy = path.name == SPEC_FILE and (path.parent / DATABASE).exists()
+        brought_by = str(path.parent) if is_copy else None
+        sources = Sources(path.parent, study=study, brought_by=brought_by)
+        return cls.parse(text, changes, str(path), sources)
 
     @classmethod
     def parse(
         cls,
         text: str,
         changes: Iterable[str] = (),
-        source: str = "spec",
-        folder: Path = Path(),
-        study: Path | None = None,
+        title: str = "spec",
+        sources: Sources | None = None,
     ) -> Spec:
-        """Read TOML text and lay ``key=value`` changes over it; see `load`.
+        """Read TOML text and lay ``key=value`` changes over it; see `load`, `of`.
 
-        Files that it names are below `folder`; for those that are gone, copies of a study stand in.
+        Messages call the text by its `title`.
         """
         try:
             table = tomllib.loads(text)
         except ValueError as error:  # also of a number of too many digits
-            raise SpecError(f"{source}: is not valid TOML: {error}") from None
+            raise SpecError(f"{title}: is not valid TOML: {error}") from None
         except RecursionError:
-            raise SpecError(f"{source}: is nested too deeply") from None
+            raise SpecError(f"{title}: is nested too deeply") from None
         for change in changes:
             with refused(f"--set {change}: "):
                 table = _changed(table, assignment(change))
-        return cls.of(table, Sources(folder, study=study))
+        return cls.of(table, sources)
 
     def conditions(self) -> tuple[Condition, ...]:
         """Return the conditions in the order of the overrides and sweeps."""
@@ -336,10 +356,15 @@ class Spec(Settings):
     def warnings(self) -> tuple[str, ...]:
         """Return what looks wrong and is not refused, a line each: sizes in another unit.
 
-        Also which keys are left out: of its learner for controls, see `conditions`, and of its
-        topology for learners that pass nothing down.
+        Also which keys are left out: of its learner for controls, see `conditions`, of its topology
+        for learners that pass nothing down, and of its preset for kinds that have none such.
         """
         lines = []
+        left_out = dict.fromkeys(key for c in self.conditions() for key in c.left_out)
+        if left_out:
+            kinds = dict.fromkeys(kind for c in self.conditions() for kind in c.other_kinds)
+            keys = join_names(left_out, MOST_KEYS)
+            lines.append(f"{keys}: of the preset, left out for {join_names(kinds, MOST_KEYS)}")
         controls = [c for c in self.conditions() if c.settings.learner.kind == "frozen"]
         tuned = self.learner.keys() - LearnerSettings.model_fields.keys() - {"kind"}
         if tuned and controls:

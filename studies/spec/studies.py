@@ -3,9 +3,19 @@
 from ...core.plugins.registry import Registry
 
 NAMES = (
-    "learning-curve", "chain-order", "ablation", "shapes", "wheel-failure", "scaling",
-    "hierarchies", "edges", "fit", "games", "related", "peers",
-)  # fmt: skip
+    "learning-curve",
+    "chain-order",
+    "ablation",
+    "shapes",
+    "wheel-failure",
+    "scaling",
+    "hierarchies",
+    "edges",
+    "fit",
+    "games",
+    "related",
+    "peers",
+)
 STUDIES = Registry(
     "study",
     {name: f"nested_agents.studies.catalogue.{name.replace('-', '_')}" for name in NAMES},

@@ -1,72 +1,25 @@
-"""Tables of a spec: laid over each other, reached by dotted keys, and what is wrong with one.
+"""Tables of a spec: laid over each other, reached by dotted keys; and what conditions are called.
 
 A *table* is a nested dictionary as TOML reads it. Laying one over another replaces values and
 descends into tables. Where the two name a different `kind`, the lower one keeps only what both
 kinds inherit in common: a trace decay says nothing to a learner that has no trace.
 
-What is wrong is said in one line a user can act on: pydantic says where and what; this is turned
-into the path as it stands in the spec, the value found there, what is allowed, and the closest
-known name. Conditions are called by the point of the sweeps that they are.
+Conditions are called by the point of the sweeps that they are.
 """
 
 import hashlib
 import tomllib
 import typing
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import tomli_w
-from pydantic import BaseModel, ValidationError
-from pydantic.fields import FieldInfo
+from pydantic import BaseModel
 
-from ...core.plugins.registry import Plugged, SettingsRegistry
-from ...core.plugins.settings import Keys, closest, dotted, mistaken, near, place, rule
-from ..errors import show
+from ...core.plugins.models import Slot, field_of, kinds_at, model_at
+from ...core.plugins.words import show
 
 TomlTable = dict[str, Any]
-
-
-Slot = type[BaseModel] | FieldInfo | None
-"""What a table is for: a model, or a field that holds one of several."""
-
-
-def models_of(annotation: Any) -> list[type[BaseModel]]:
-    """Return the settings models that a field's annotation allows, in order."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [model for part in typing.get_args(annotation) for model in models_of(part)]
-
-
-def kind_of(model: type[BaseModel]) -> str | None:
-    """Return the `kind` by which a table names this model, if it has one."""
-    field = model.model_fields.get("kind")
-    return None if field is None else field.default or None
-
-
-def registry_of(slot: Slot) -> SettingsRegistry | None:
-    """Return the registry whose things a field holds, if it does."""
-    marks = slot.metadata if isinstance(slot, FieldInfo) else []
-    return next((mark.registry for mark in marks if isinstance(mark, Plugged)), None)
-
-
-def model_at(slot: Slot, table: object) -> type[BaseModel] | None:
-    """Return the model that `table` is for; none if its kind is unknown or missing."""
-    kind = table.get("kind") if isinstance(table, Mapping) else None
-    registry = registry_of(slot)
-    if registry is not None:
-        try:
-            return registry.model(str(kind))
-        except ValueError:
-            return None
-    models = models_of(slot.annotation if isinstance(slot, FieldInfo) else slot)
-    if len(models) == 1:
-        return models[0]
-    return next((m for m in models if kind is not None and kind_of(m) == kind), None)
-
-
-def field_of(model: type[BaseModel] | None, key: str) -> FieldInfo | None:
-    """Return the field that a key of a model's table names."""
-    return None if model is None else model.model_fields.get(key)
 
 
 def overlay(base: Mapping[str, Any], table: Mapping[str, Any], slot: Slot = None) -> TomlTable:
@@ -95,7 +48,7 @@ def overlay(base: Mapping[str, Any], table: Mapping[str, Any], slot: Slot = None
             result[key] = overlay(below, value, field_of(model, key))
         elif isinstance(value, str) and isinstance(below, Mapping) and "kind" in below:
             # A name stands for a table that says its kind and no more.
-            result[key] = {"kind": value} if registry_of(field_of(model, key)) else value
+            result[key] = {"kind": value} if kinds_at(field_of(model, key)) else value
         else:
             result[key] = value
     return result
@@ -134,6 +87,21 @@ def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
             yield from flat(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
+
+
+def without(table: Mapping[str, Any], keys: Collection[str], prefix: str = "") -> TomlTable:
+    """Return a table without what stands at some dotted keys; it is not modified.
+
+    Examples
+    --------
+    >>> without({"a": {"b": 1, "c": 2}}, {"a.c"})
+    {'a': {'b': 1}}
+    """
+    return {
+        key: without(value, keys, f"{prefix}{key}.") if isinstance(value, Mapping) else value
+        for key, value in table.items()
+        if f"{prefix}{key}" not in keys
+    }
 
 
 def assignment(text: str) -> TomlTable:
@@ -192,123 +160,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
     return value
-
-
-def explain(
-    error: ValidationError,
-    model: type[BaseModel],
-    data: Mapping[str, Any],
-    below: tuple[type[BaseModel], Mapping[str, Any]] | None = None,
-) -> str:
-    """Return one line on the first thing that `error` found wrong with `data`.
-
-    Parameters
-    ----------
-    error
-        What pydantic raised when it validated `data` as `model`.
-    model
-        The model of the outermost table.
-    data
-        The table as the user gave it.
-    below
-        Model and table of all that a misplaced key may belong to; none: `model` and `data`.
-    """
-    problems = [(place(e["loc"], data), e) for e in error.errors(include_url=False)]
-    # Where a name or a table may stand and a table does, what is wrong is in the table.
-    start = problems[0][0]
-    inside = [f for f in problems if len(f[0]) > len(start) and f[0][: len(start)] == start]
-    (keys, first) = (inside or problems)[0]
-    path = dotted(keys) or "spec"
-    if first["type"] == "extra_forbidden":
-        owner = model_at(*_reach(keys[:-1], model, data))
-        kind = f" for kind {kind_of(owner)!r}" if owner is not None and kind_of(owner) else ""
-        known = set() if owner is None else set(owner.model_fields)
-        misspelt = near(keys[-1], known, cutoff=0.85)
-        hint = misspelt or misplaced(path, *(below or (model, data))) or closest(keys[-1], known)
-        return f"{path} = {show(first['input'])}: unknown key{kind}; {hint}"
-    if first["type"] == "missing":
-        name = str(first["loc"][-1])
-        return f"{path}: missing" if keys == (name,) else f"{path}.{name}: missing"
-    value = first["input"]
-    if first["type"] == "plugged_kind":
-        return f"{_kind(path, value)}{first['msg']}"
-    if first["type"].startswith("union_tag"):
-        slot, _ = _reach(keys, model, data)
-        kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
-        kind = value.get("kind")
-        hint = closest(kind, [k for k in kinds if k]) + _pointer(keys, kind, model, data)
-        return f"{_kind(path, value)}{hint}"
-    # The members of a union complain one by one about the same place: say what any would take.
-    text = ", or ".join(dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys))
-    owner = model_at(*_reach(keys[:-1], model, data)) if keys else None
-    is_other_type = ("string" in text) is not isinstance(value, str)
-    other = mistaken(keys[-1], owner.model_fields, first) if owner and is_other_type else ""
-    return f"{path} = {show(value)}: {text}{other or _pointer(keys, value, model, data)}"
-
-
-def _kind(path: str, value: object) -> str:
-    """Return how a line begins on the kind of a table, or on the name that stands for one."""
-    if isinstance(value, Mapping) and "kind" in value:
-        return f"{path}.kind = {show(value['kind'])}: "
-    return f"{path} = {show(value)}: " + "kind is missing; " * isinstance(value, Mapping)
-
-
-def _pointer(keys: Keys, value: object, model: type[BaseModel], data: Mapping[str, Any]) -> str:
-    """Return "; did you mean ...?" if a key of the same name in another table takes a word."""
-    places = _places(str(keys[-1]), model, data) if keys and isinstance(value, str) else ()
-    match = next((n for n, field in places if value in typing.get_args(field.annotation)), None)
-    return f"; did you mean {match} = {value!r}?" if match and match != dotted(keys) else ""
-
-
-def misplaced(path: str, model: type[BaseModel], data: Mapping[str, Any]) -> str:
-    """Return "did you mean ...?" if the last part of a dotted key is a key of some other table.
-
-    Parameters
-    ----------
-    path
-        The key as it stands in the spec.
-    model
-        The model whose tables are looked through, at any depth.
-    data
-        The table that it is of, as the user gave it: where it says a kind, no others are looked
-        through.
-    """
-    key = path.rpartition(".")[2]
-    places = (name for name, _ in _places(key, model, data) if not f".{path}".endswith(f".{name}"))
-    matches = dict.fromkeys(places)
-    return f"did you mean {' or '.join(map(repr, matches))}?" if matches and key != "kind" else ""
-
-
-def _places(
-    key: str, model: type[BaseModel], data: object, name: str = ""
-) -> Iterator[tuple[str, FieldInfo]]:
-    """Yield the dotted names that a key has in the tables below a model, and its fields."""
-    for field, info in model.model_fields.items():
-        table = data.get(field) if isinstance(data, Mapping) else None
-        registry, own = registry_of(info), model_at(info, table)
-        if own is not None:
-            held = [own]
-        elif registry is None:
-            held = models_of(info.annotation)
-        else:
-            held = [registry.model(kind) for kind in registry.built_in]
-        for inner in held:
-            if key in inner.model_fields:
-                yield f"{name}{field}.{key}", inner.model_fields[key]
-            yield from _places(key, inner, table, f"{name}{field}.")
-
-
-def _reach(
-    keys: Sequence[int | str], model: type[BaseModel], data: Mapping[str, Any]
-) -> tuple[Slot, Any]:
-    """Return the model or field that the value at `keys` is for, and the value."""
-    slot: Slot = model
-    value: Any = data
-    for key in keys:
-        if isinstance(key, str):  # an item of a list is one of the models that the list may hold
-            slot = field_of(model_at(slot, value), key)
-        value = value[key]
-    return slot, value
 
 
 LONGEST_TABLE = 40

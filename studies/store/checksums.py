@@ -6,7 +6,6 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from itertools import chain, groupby
 from operator import itemgetter
-from typing import Any
 
 
 def study_checksum(db: sqlite3.Connection) -> str:
@@ -42,14 +41,15 @@ def trial_checksums(
         yield key, _sha256(parts)
 
 
-Rows = Iterator[tuple[str, Iterable[tuple[Any, ...]]]]
+Rows = Iterator[tuple[str, Iterable[tuple[object, ...]]]]
 """The identity of each trial, with its rows of a table."""
 
 
 def _by_identity(
     db: sqlite3.Connection, identity: str | None, table: str, order: str = "", columns: str = "*"
 ) -> Rows:
-    where, values = ("", ()) if identity is None else ("WHERE identity = ?", (identity,))
+    where = "" if identity is None else "WHERE identity = ?"
+    values = () if identity is None else (identity,)
     query = f"SELECT {columns} FROM {table} {where} ORDER BY identity{order}"
     return groupby(db.execute(query, values), itemgetter(0))
 

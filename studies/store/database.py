@@ -173,8 +173,10 @@ def prepare(db: sqlite3.Connection, noted: Noted) -> None:
     ]
     insert(db, "planned", planned)
     db.execute("DELETE FROM meta")
-    meta = {"results_version": RESULTS_VERSION, "measures": tables(noted.measures)}
-    meta |= {k: getattr(noted, k) for k in ("spec", "conditions", "sources", "code")}
+    meta: dict[str, object] = {"results_version": RESULTS_VERSION}
+    meta["measures"] = tables(noted.measures)
+    meta |= {"spec": noted.spec, "conditions": noted.conditions}
+    meta |= {"sources": noted.sources, "code": noted.code}
     insert(db, "meta", [(key, json.dumps(value)) for key, value in meta.items()])
     insert(db, "meta", [("sha256", study_checksum(db))])
     if db.execute("SELECT 1 FROM ledger").fetchone() is None:

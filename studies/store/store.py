@@ -32,7 +32,7 @@ NO_LOG = (
     "this file system shares no memory (as NFS, Lustre, GPFS), so results are kept with a rollback "
     "journal; the same results, written more slowly"
 )
-NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
+NamesAndRows = tuple[list[str], Iterable[tuple[object, ...]]]
 """The names of columns, and rows of values, which may be read one by one."""
 
 
@@ -187,7 +187,7 @@ class Store:
         swept = [column[0] for column in cursor.description][2:]
         return {row[1]: dict(zip(swept, row[2:], strict=True)) for row in cursor}
 
-    def episodes(self) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
+    def episodes(self) -> tuple[list[str], Iterator[tuple[object, ...]]]:
         """Return the column names and the rows of all phases, by condition, seed and episode.
 
         Rows are read one by one, as long as the study is open: there may be millions.
@@ -195,7 +195,7 @@ class Store:
         cursor = self._db.execute("SELECT * FROM results")
         return [column[0] for column in cursor.description], cursor
 
-    def trials(self) -> tuple[list[str], list[tuple[Any, ...]]]:
+    def trials(self) -> tuple[list[str], list[tuple[object, ...]]]:
         """Return the column names and one row per trial, by condition and seed.
 
         After the swept keys and the seed: its state, its identity, the last line of its traceback
@@ -214,7 +214,8 @@ class Store:
             "ORDER BY position, seed"
         )
         columns = [column[0] for column in cursor.description]
-        identity, error = columns.index("identity"), columns.index("error")
+        identity = columns.index("identity")
+        error = columns.index("error")
         rows = []
         for row in cursor:
             last = (row[error] or "").rstrip().rpartition("\n")[2] or None
@@ -312,7 +313,7 @@ class Store:
     def save(
         self,
         trial: Planned,
-        episodes: Sequence[tuple[Any, ...]],
+        episodes: Sequence[tuple[object, ...]],
         seconds: Mapping[str, float],
         numbers: Sequence[tuple[str, float, bool]],
         recordings: Mapping[str, Recording],
@@ -371,7 +372,7 @@ class Store:
             (after,) = self._db.execute(count).fetchone()
             self._db.execute("UPDATE ledger SET trials = trials + ?", (after - before,))
 
-    def _insert(self, table: str, rows: list[tuple[Any, ...]]) -> None:
+    def _insert(self, table: str, rows: list[tuple[object, ...]]) -> None:
         database.insert(self._db, table, rows)
 
     def _note(self, trial: Planned, state: str, error: str | None, digest: str | None) -> None:

@@ -106,7 +106,8 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
     except OSError:
         return None
     try:
-        mark, now = json.loads((directory / MARK).read_text()), time.time()
+        mark = json.loads((directory / MARK).read_text())
+        now = time.time()
         seconds = {identity: max(now - begun, 0.0) for identity, begun in mark["begun"].items()}
         return mark["processes"], seconds
     except (OSError, ValueError, KeyError, TypeError, AttributeError):

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ...core.interface.measures import Measure
-from ...core.plugins.settings import closest
 from ...core.plugins.sources import FOLDER, Sources, kept_name
-from ..errors import SpecError, show
+from ...core.plugins.words import closest, show
+from ..errors import SpecError
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import aliases, dumps, flat, named
@@ -19,10 +19,21 @@ from ..store.connection import DamageError
 from ..store.database import DATABASE, SPEC_FILE, NoStudyError, Noted
 from ..store.store import Store
 from ..store.writer import locked
-from .trial import AS_IN_SPEC, Trial, column_of, trials_of
+from .episodes import column_of
+from .trial import Trial, trials_of
 
-SAME = (*AS_IN_SPEC, "evaluations")
+SAME = (
+    "study",
+    "episodes",
+    "steps",
+    "evaluation",
+    "evaluation_steps",
+    "keep_teams",
+    "evaluations",
+)
 """What of a spec must be the same for a study to go on."""
+ABSENT = object()
+"""In place of the value of a key that is not there."""
 
 
 @contextmanager
@@ -45,7 +56,7 @@ def open_to_run(
     trials
         All its trials.
     measures
-        What it measures of its episodes, see `nested_agents.studies.trials.session.check`.
+        What it measures of its episodes, see `arrangement.check_conditions`.
     accept_code
         Whether to go on although the installed code has changed since.
 
@@ -55,7 +66,7 @@ def open_to_run(
         If it cannot be written, holds a study that differs by more than additional seeds, or
         another process is writing to it. Nothing has been changed then.
     """
-    noted = noted_of(spec, measures, trials)
+    noted = notes_of(spec, measures, trials)
     _examine(directory, spec, noted, accept_code=accept_code)  # what is refused leaves nothing
     with locked(directory):
         # Again: nobody else writes from here on.
@@ -116,7 +127,7 @@ def check_teams(store: Store, identities: Container[str] = ()) -> None:
             raise SpecError(f"{line}; nested-agents run runs it again")
 
 
-def noted_of(spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Trial] = ()) -> Noted:
+def notes_of(spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Trial] = ()) -> Noted:
     """Return what a store notes of a study."""
     return Noted(
         spec=json.loads(json.dumps(spec.table())),
@@ -147,10 +158,12 @@ def _examine(
     SpecError
         If the directory holds another study, or something that is none.
     """
-    damage, code = None, None
+    damage: str | None = None
+    code: Code | None = None
     try:
         with Store.open(directory) as store:
-            mismatch, code = _mismatch_of_study(store, spec, noted, accept_code), store.code()
+            mismatch = _mismatch_of_study(store, spec, noted, accept_code)
+            code = store.code()
     except (NoStudyError, DamageError) as error:
         damage = error.reason
         mismatch = _mismatch_of_file(directory / SPEC_FILE, spec, noted, damage)
@@ -175,7 +188,7 @@ def _mismatch_of_file(path: Path, spec: Spec, noted: Noted, damage: str | None) 
     if damage is None:
         raise SpecError(f"{path}: is in the way of this study's own copy") from None
     try:
-        return difference(noted_of(Spec.load(path)), noted)
+        return difference(notes_of(Spec.load(path)), noted)
     except SpecError as error:
         raise SpecError(
             f"{path}: is no spec, and {DATABASE} beside it is damaged: which study this is cannot "
@@ -210,19 +223,18 @@ def difference(old: Noted, new: Noted) -> str | None:
 
 
 def _differences(old: Noted, new: Noted) -> Iterator[str]:
-    files = Sources(None, old.sources), Sources(None, new.sources)
-    for name in sorted(old.sources):
-        if name not in new.sources:
-            yield f"{name} is part of it, not of this one"
-        elif files[0].digest(name) != files[1].digest(name):
-            yield f"{name} has changed since"
+    yield from _changed_files(old.sources, new.sources)
     for name in SAME:
-        yield from _unequal(name, old.spec.get(name, "absent"), new.spec.get(name, "absent"))
-    written = old.spec["seeds"], new.spec["seeds"]
-    seeds, more_seeds = (list(range(s)) if isinstance(s, int) else s for s in written)
+        yield from _unequal(name, old.spec.get(name, ABSENT), new.spec.get(name, ABSENT))
+    seeds = _seeds(old.spec["seeds"])
+    more_seeds = _seeds(new.spec["seeds"])
     if not set(seeds) <= set(more_seeds):
         yield f"seeds = {show(seeds)} there, {show(more_seeds)} here"
-    yield from _unequal("conditions", list(old.conditions), list(new.conditions))
+    if [*old.conditions] != [*new.conditions]:
+        there = show([*old.conditions])
+        here = show([*new.conditions])
+        written = next(_written(old.spec, new.spec), "")
+        yield f"conditions = {there} there, {here} here{written and f', by {written}'}"
     for stages, new_stages in zip(_curricula(old), _curricula(new), strict=False):
         yield from _unequal("curriculum", stages, new_stages)
     # What tells conditions apart are the columns of every table.
@@ -234,13 +246,37 @@ def _differences(old: Noted, new: Noted) -> Iterator[str]:
     for label in [label for label in new.conditions if label in old.conditions]:
         before, after = (dict(flat(noted.conditions[label])) for noted in (old, new))
         for key in sorted(before.keys() | after.keys()):
-            there, here = before.get(key, "absent"), after.get(key, "absent")
+            there = before.get(key, ABSENT)
+            here = after.get(key, ABSENT)
             yield from _unequal(f"condition {label!r}: {key}", there, here)
 
 
-def _unequal(name: str, there: Any, here: Any) -> Iterator[str]:
+def _changed_files(old: Mapping[str, str], new: Mapping[str, str]) -> Iterator[str]:
+    there = Sources(None, old)
+    here = Sources(None, new)
+    for name in sorted(old):
+        if name not in new:
+            yield f"{name} is part of it, not of this one"
+        elif there.digest(name) != here.digest(name):
+            yield f"{name} has changed since"
+
+
+def _seeds(written: int | Sequence[int]) -> Sequence[int]:
+    """Return the seeds of a spec, which it may give by their number."""
+    return list(range(written)) if isinstance(written, int) else written
+
+
+def _written(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Yield which keys of two specs differ, besides seeds."""
+    before, after = (dict(flat(spec)) for spec in (old, new))
+    for key in sorted((before.keys() | after.keys()) - {"seeds"}):
+        yield from _unequal(key, before.get(key, ABSENT), after.get(key, ABSENT))
+
+
+def _unequal(name: str, there: object, here: object) -> Iterator[str]:
     if there != here:
-        yield f"{name} = {show(there)} there, {show(here)} here"
+        texts = ["absent" if value is ABSENT else show(value) for value in (there, here)]
+        yield f"{name} = {texts[0]} there, {texts[1]} here"
 
 
 def _curricula(noted: Noted) -> list[Sequence[Mapping[str, Any]]]:

@@ -4,12 +4,15 @@
 trial, in which nothing moves: the module need not be installed, a `Still` stands in for it. A
 kernel is compiled for the types of its arguments, which are the same as ever. The trials then take
 it from the cache, and compile what else they call.
+
+It takes 19 s of processor time, and the demo takes 64 s after it, not 78 s (means of two runs of
+each). So it saves no work: it does the compiler's work while Box2D is built on the other core, for
+which a fresh ``./dev demo`` would have to wait otherwise.
 """
 
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..spec.spec import Spec
 from .trial import trials_of
@@ -26,7 +29,7 @@ class Still(float):
         """Return the same."""
         return self
 
-    def __call__(self, *args: Any, **named: Any) -> "Still":
+    def __call__(self, *args: object, **named: object) -> "Still":
         """Return the same."""
         return self
 

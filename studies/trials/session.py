@@ -6,11 +6,10 @@ that read results import nothing that learns.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,183 +17,18 @@ from ...core.agents.loop import (
     EpisodeSummary,
     StepRecord,
     control_loop,
-    policy_seed,
     world_seed,
 )
 from ...core.agents.team import Team
-from ...core.interface.experience import Observation
-from ...core.interface.measures import Measure, measures_of
+from ...core.interface.measures import measures_of
 from ...core.interface.plain import as_scenario
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario
-from ...core.plugins.sources import format_error, place
-from ..errors import SpecError
-from ..spec.conditions import Condition, ConditionSettings, Stage
-from ..spec.spec import Spec
 from ..store.database import EVALUATION, STAGE
 from ..store.durable import TEAM, Recording
-from .trial import EpisodeMeter, EpisodeRow, Trial, TrialResult, joined
-
-Evaluations = Sequence[tuple[str, ConditionSettings]]
-"""Names and settings under which a trained team is evaluated beside its own."""
-
-
-class Arrangement(NamedTuple):
-    """A world and those who act in it."""
-
-    world: Scenario
-    """As the settings describe it."""
-    scenario: Scenario
-    """The same as the agents see it, which may be as one agent."""
-    team: Team
-    """The agents."""
-
-
-def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
-    """Return the world of a condition and its untrained team.
-
-    Raises
-    ------
-    ValueError
-        If the settings do not fit together; one line.
-    """
-    world = as_scenario(settings.scenario.build())
-    scenario, hierarchy = settings.arrange(world)
-    failures = settings.topology.failures
-    team = Team(settings.learner, scenario, hierarchy, policy_seed(seed), failures)
-    return Arrangement(world, scenario, team)
-
-
-def teach(
-    own: Arrangement, settings: ConditionSettings, curriculum: Sequence[Stage], seed: int
-) -> Iterator[tuple[Stage, Arrangement]]:
-    """Yield each stage with its arrangement, which is trained before the next is asked for.
-
-    Its team continues from that of the stage before; after the last, the team of `own` continues.
-
-    Raises
-    ------
-    ValueError
-        If a stage cannot be built, or what is learned in one means nothing in the next.
-    """
-    reached: Arrangement | None = None
-    for stage in curriculum:
-        with _naming(f"curriculum.{stage.name}"):
-            there = arrange(settings.model_copy(update={"scenario": stage.scenario}), seed)
-            if reached is not None:
-                there.team.continue_from(reached.team)
-        yield stage, there
-        reached = there
-    if reached is not None:
-        with _naming("curriculum"):
-            own.team.continue_from(reached.team)
-
-
-def transfer(
-    own: Arrangement, settings: ConditionSettings, evaluations: Evaluations, seed: int
-) -> Iterator[tuple[str, Arrangement]]:
-    """Yield the name and the arrangement of each further evaluation: to be evaluated, not to learn.
-
-    Its team is that of `own` itself if the same agents decide in the same way, else one that
-    continues from it.
-
-    Raises
-    ------
-    ValueError
-        If a scenario or a team cannot be built, or what was learned means nothing there.
-    """
-    for name, other in evaluations:
-        with _naming(f"evaluations.{name}"):
-            there = arrange(other, seed)
-            if other.acts_as(settings) and there.scenario.agents == own.scenario.agents:
-                own.team.check_world(there.scenario)
-                there = there._replace(team=own.team)
-            else:
-                there.team.continue_from(own.team)
-        yield name, there
-
-
-@contextmanager
-def _naming(key: str) -> Iterator[None]:
-    try:
-        yield
-    except ValueError as error:
-        raise ValueError(f"{key}: {error}") from error
-
-
-def check(
-    spec: Spec, chosen: Container[str] | None = None, *, may_fail: bool = False
-) -> tuple[Measure, ...]:
-    """Return what a study measures of its episodes, if all its conditions can be built.
-
-    Parameters
-    ----------
-    spec
-        The study.
-    chosen
-        Labels of the conditions that matter; None: all.
-    may_fail
-        Whether code of the user's may fail in some conditions: their trials will fail, others run.
-
-    Raises
-    ------
-    SpecError
-        If one cannot be, or their measures do not fit together; before anything is run or written.
-    """
-    failing: SpecError | None = None
-    conditions = [c for c in spec.conditions() if chosen is None or c.label in chosen]
-    measures: list[Sequence[Measure]] = []
-    with spec.sources.active():
-        for condition in conditions:
-            where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
-            try:
-                measures += [
-                    measures_of(there.world.measures) for there in _arrangements(condition)
-                ]
-                if spec.keep_teams:
-                    _check_saved(condition.settings)
-            except ValueError as error:
-                refusal = SpecError(f"{error}{where}")
-                if isinstance(error.__cause__, ValueError | None):
-                    raise refusal from None
-                failing = failing or refusal
-            except KeyboardInterrupt:
-                raise
-            except BaseException as error:
-                if isinstance(error, Exception) and not place(error):
-                    raise  # no code of the user's
-                problem = f"the scenario or topology raises {format_error(error)}{place(error)}"
-                failing = failing or SpecError(f"{problem}{where}")
-    if failing and not (measures and may_fail):
-        raise failing
-    return joined(measures, conditions[0].columns)
-
-
-def _check_saved(settings: ConditionSettings) -> None:
-    """Refuse a team that arrays cannot bring back."""
-    team = arrange(settings, 0).team
-    try:
-        arrays = {name: np.array(array) for name, array in team.arrays().items()}
-        if objects := [name for name, array in arrays.items() if array.dtype.hasobject]:
-            raise TypeError(f"its array {objects[0]!r} holds objects")
-        team.restore(arrays)
-    except Exception as error:  # a learner may be anybody's
-        raise ValueError(
-            f"keep_teams = true: a team of learner.kind = {settings.learner.kind!r} cannot be "
-            f"saved, {error}; needs `arrays` of numbers, and `restore` that takes them"
-        ) from None
-
-
-def _arrangements(condition: Condition) -> Iterator[Arrangement]:
-    """Yield a condition's own arrangement and those of its stages and evaluations."""
-    settings = condition.settings
-    own = arrange(settings, 0)
-    stages = teach(own, settings, condition.curriculum, 0)
-    evaluations = transfer(own, settings, condition.evaluations, 0)
-    for there in (own, *(a for _, a in stages), *(a for _, a in evaluations)):
-        if settings.learner.needs_rewards:
-            there.team.check(Observation(there.scenario.reset(0), there.scenario))
-        yield there
+from .arrangement import Arrangement, arrange, teach, transfer
+from .episodes import EpisodeMeter, EpisodeRow, join_measures
+from .trial import Trial, TrialResult
 
 
 class Stopwatch:
@@ -407,7 +241,7 @@ class Session:
         the steps, whole episodes may be run `at_once`, compiled.
         """
         measures = measures_of(there.world.measures)
-        self._measures = joined((self._measures, measures))
+        self._measures = join_measures((self._measures, measures))
         if at_once and self._at_once(there, phase, counted_from, **loop):
             return
         for record in control_loop(there.scenario, there.team, seed=self.trial.seed, **loop):

@@ -58,7 +58,7 @@ def call_alike(
     return function(*arguments)
 
 
-class DaskWorkers(Workers):
+class DaskWorkers(Workers[Future]):
     """Workers of a Dask cluster; see `Workers`. Use `DaskWorkers.local` or `DaskWorkers.at`.
 
     Parameters

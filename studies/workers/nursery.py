@@ -18,9 +18,10 @@ import signal
 import subprocess
 import sys
 import traceback
+from collections.abc import Callable
 from functools import cache
 from multiprocessing.connection import Connection, Pipe, wait
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -59,7 +60,9 @@ class Word(NamedTuple):
     """What it had imported and loaded in the end."""
 
 
-def call_for(run_trial: RunTrial, trial: Trial) -> tuple[Any, ...]:
+def call_for(
+    run_trial: RunTrial, trial: Trial
+) -> tuple[Callable[..., Outcome | Answer], *tuple[object, ...]]:
     """Return a function and its arguments by which a worker runs a trial.
 
     One that names Python files of a user's has a process of its own, and is pickled: whoever hands

@@ -19,7 +19,7 @@ from multiprocessing import resource_tracker
 from pathlib import Path
 from platform import python_version
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Generic, Literal, NamedTuple, Protocol, Self, TypeVar
 
 from ..store.store import Store
 from ..store.writer import Running
@@ -82,7 +82,9 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
     A scenario that calls ``sys.exit``, or raises KeyboardInterrupt, has failed like any other: a
     worker ignores Ctrl-C, so that neither can come from anybody else.
     """
-    begin, error, result = time.perf_counter(), None, None
+    begin = time.perf_counter()
+    error = None
+    result = None
     try:
         with trial.sources.active():
             result = run_trial(trial)
@@ -178,7 +180,7 @@ class Observer:
 
 
 def run_trials(
-    trials: Sequence[Trial], store: Store, run_trial: RunTrial, workers: Workers
+    trials: Sequence[Trial], store: Store, run_trial: RunTrial, workers: Workers[F]
 ) -> Generator[Outcome]:
     """Run trials in parallel; store, then yield each as it finishes.
 
@@ -208,7 +210,7 @@ def run_trials(
                     yield outcome
 
 
-def _alone(trial: Trial, run_trial: RunTrial, workers: Workers, running: Running) -> Outcome:
+def _alone(trial: Trial, run_trial: RunTrial, workers: Workers[F], running: Running) -> Outcome:
     for _ in range(ATTEMPTS):
         with closing(workers.arrivals([trial], run_trial, running.begin)) as arriving:
             (outcome,) = arriving
@@ -240,16 +242,29 @@ def save(store: Store, trial: Trial, result: TrialResult, total: float) -> None:
     numbers = [(name, value, True) for name, value in result.numbers.items()]
     numbers += [(name, value, False) for name, value in result.usage.items()]
     store.save(
-        trial.planned, [row.flat(names) for row in result.rows],
-        {**result.seconds, "total": total}, numbers, result.recordings,
-    )  # fmt: skip
+        trial.planned,
+        episodes=[row.flat(names) for row in result.rows],
+        seconds={**result.seconds, "total": total},
+        numbers=numbers,
+        recordings=result.recordings,
+    )
 
 
 POLL = 1.0
 """How often to look for workers while no trial finishes [s]."""
 
 
-class Workers(ABC):
+class Submitted(Protocol):
+    """A trial that a worker has been handed: a future of a backend."""
+
+    def add_done_callback(self, fn: Callable[[Self], object], /) -> object:
+        """Call a function with it when it is done."""
+
+
+F = TypeVar("F", bound=Submitted)
+
+
+class Workers(ABC, Generic[F]):
     """Processes that run trials; what their backends have in common."""
 
     @property
@@ -258,15 +273,15 @@ class Workers(ABC):
         """How many trials run at a time."""
 
     @abstractmethod
-    def submit(self, run_trial: RunTrial, trial: Trial) -> Any:
+    def submit(self, run_trial: RunTrial, trial: Trial) -> F:
         """Hand a trial to a worker that is free, and return its future."""
 
     @abstractmethod
-    def fetch(self, future: Any, trial: Trial) -> Outcome | None:
+    def fetch(self, future: F, trial: Trial) -> Outcome | None:
         """Return what became of a trial whose future is done; None if it runs once more."""
 
     @abstractmethod
-    def stop(self, futures: Sequence[Any]) -> None:
+    def stop(self, futures: Sequence[F]) -> None:
         """End the trials that are running."""
 
     def arrivals(
@@ -283,9 +298,10 @@ class Workers(ABC):
         started
             Called with the identity of each trial when it is handed to a worker.
         """
-        waiting, left = iter(trials), len(trials)
-        running: dict[Any, Trial] = {}
-        finished: SimpleQueue[Any] = SimpleQueue()
+        waiting = iter(trials)
+        left = len(trials)
+        running: dict[F, Trial] = {}
+        finished: SimpleQueue[F] = SimpleQueue()
         try:
             while left:
                 for trial in islice(waiting, max(self.processes - len(running), 0)):

@@ -17,7 +17,7 @@ from typing import Any, get_args
 from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from ...core.plugins.settings import closest
+from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..trials.trial import Trial
 from .nursery import Answer, call_for, describe_exit
@@ -33,7 +33,7 @@ def check_jobs(jobs: int) -> None:
 @contextmanager
 def start_workers(
     backend: Backend, jobs: int | None, address: str | None, trials: int
-) -> Iterator[Workers]:
+) -> Iterator[Workers[Any]]:
     """Start workers, which end with the context, or connect to those of a cluster.
 
     Parameters
@@ -107,7 +107,7 @@ def _describe(death: TerminatedWorkerError) -> str:
     return ", ".join(describe_exit(int(code)) for code in codes) or "it has not said how"
 
 
-class LokyWorkers(Workers):
+class LokyWorkers(Workers[Future[Outcome | Answer]]):
     """Processes of this machine, which end with their parent; see `Workers`.
 
     Workers are separate processes even for one job: a crash in native code costs one trial, and

@@ -42,7 +42,7 @@ from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.studies import STUDIES
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 POINTS = Path(__file__).resolve().parents[2] / "examples" / "worlds" / "pushing_points.py"
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "claims.md"
@@ -207,7 +207,7 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
             assert wanted <= labels
             assert study != "edges" or {*RELATIONS} <= {*spec.evaluations}
             if folder is QUICK:
-                check(spec)
+                check_conditions(spec)
 
 
 def test_published_results_give_the_table_that_the_run_gave() -> None:

@@ -10,7 +10,7 @@ from nested_agents.studies.catalogue.games import analyse
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 GAMES = (DOCS / "games.md").read_text(encoding="utf-8")
@@ -24,7 +24,7 @@ def games():
 @pytest.mark.parametrize("text", [GAMES, GRAPHS], ids=["games", "coordination graphs"])
 def test_specs(text: str) -> None:
     for spec in re.findall(r"```toml\n(.*?)```", text, re.DOTALL):
-        check(Spec.parse(spec))
+        check_conditions(Spec.parse(spec))
 
 
 def test_the_grids_are_those_of_the_published_rows() -> None:
@@ -45,5 +45,5 @@ def test_a_wide_graph_is_refused_in_the_words_of_the_page() -> None:
     (spec,) = re.findall(r"```toml\n(.*?)```", GRAPHS, re.DOTALL)
     wide = re.sub(r'kind = "coordination-graph"\nshape = .*', 'kind = "simultaneous"', spec)
     with pytest.raises(SpecError) as refused:
-        check(Spec.parse(wide, ["scenario.carts=16"]))
+        check_conditions(Spec.parse(wide, ["scenario.carts=16"]))
     assert str(refused.value) == " ".join(said.split())

@@ -7,7 +7,7 @@ import pytest
 from published_tables import print_table
 
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "kinematic_chain.md").read_text(encoding="utf-8")
@@ -34,9 +34,9 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
 
 @pytest.mark.parametrize("spec", re.findall(r"```toml\n(.*?)```", TEXT, flags=re.DOTALL))
 def test_specs_can_be_built(spec: str) -> None:
-    check(Spec.parse(spec))
+    check_conditions(Spec.parse(spec))
 
 
 @pytest.mark.parametrize("path", re.findall(r"nested-agents run ((?:studies|results)/\S+)", TEXT))
 def test_the_catalogue_has_what_it_names(path: str) -> None:
-    check(Spec.load(ROOT / path))
+    check_conditions(Spec.load(ROOT / path))

@@ -8,7 +8,7 @@ from published_tables import print_table
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "no_predictor.md").read_text(encoding="utf-8")
@@ -17,7 +17,7 @@ COLUMNS = ("evaluation success", "messages")
 
 def test_specs_can_be_run() -> None:
     for spec in re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL):
-        check(Spec.parse(spec))
+        check_conditions(Spec.parse(spec))
 
 
 @pytest.mark.parametrize(

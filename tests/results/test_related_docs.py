@@ -9,7 +9,7 @@ from nested_agents.results import ROWS, SPECS
 from nested_agents.results.commands import CATALOGUE
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "related.md").read_text(encoding="utf-8")
@@ -17,12 +17,12 @@ TEXT = (ROOT / "docs" / "related.md").read_text(encoding="utf-8")
 
 @pytest.mark.parametrize("spec", re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL))
 def test_specs(spec: str) -> None:
-    check(Spec.parse(spec))
+    check_conditions(Spec.parse(spec))
 
 
 @pytest.mark.parametrize("path", re.findall(r"nested-agents run (\S+\.toml)", TEXT))
 def test_commands_name_specs_that_can_be_built(path: str) -> None:
-    check(Spec.load(ROOT / path))
+    check_conditions(Spec.load(ROOT / path))
 
 
 def test_specs_that_are_named_exist() -> None:

@@ -10,7 +10,7 @@ from nested_agents.scenarios.checking.predictions import MOST_JOINT_ACTIONS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TEXT = (DOCS / "worlds.md").read_text(encoding="utf-8")
@@ -19,7 +19,7 @@ TUTORIAL = (DOCS / "tutorials" / "scenario.md").read_text(encoding="utf-8")
 
 @pytest.mark.parametrize("spec", re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL))
 def test_specs(spec: str) -> None:
-    check(Spec.parse(spec))
+    check_conditions(Spec.parse(spec))
 
 
 @pytest.mark.parametrize("code", re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL))

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies.trials.trial import EpisodeRow, TrialResult
+from nested_agents.studies.trials.episodes import EpisodeRow
+from nested_agents.studies.trials.trial import TrialResult
 
 
 def measure(trial):

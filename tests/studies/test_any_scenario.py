@@ -27,8 +27,9 @@ from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import database
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.keeping import pending
-from nested_agents.studies.trials.session import Session, check, run_trial
+from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save
 
@@ -64,7 +65,7 @@ def carts(monkeypatch):
 def study(carts, tmp_path):
     """A study of two scenarios whose measures differ, run and kept."""
     directory = tmp_path / "study"
-    with made_up.opened(directory, SPEC, check(SPEC)) as store:
+    with made_up.opened(directory, SPEC, check_conditions(SPEC)) as store:
         for trial in trials_of(SPEC):
             save(store, trial, run_trial(trial), 1.0)
     return directory
@@ -160,7 +161,7 @@ def test_studies_of_success_need_no_more(study, name):
 
 def test_scaling_leaves_out_contact(carts, tmp_path):
     spec = Spec.of(SPEC.table() | {"study": "scaling"})
-    with made_up.opened(tmp_path, spec, check(spec)) as store:
+    with made_up.opened(tmp_path, spec, check_conditions(spec)) as store:
         for trial in trials_of(spec):
             result = scaling.measure(trial)
             assert result.numbers["robots"] == trial.settings.scenario.robots
@@ -192,7 +193,7 @@ def test_a_study_whose_scenarios_now_tell_something_else_is_not_continued(study)
     changed = (SUCCESS, SPREAD)
     with pytest.raises(SpecError, match="use another directory"):
         made_up.opened(study, SPEC, changed).__enter__()
-    with made_up.opened(study, SPEC, check(SPEC)) as store:
+    with made_up.opened(study, SPEC, check_conditions(SPEC)) as store:
         assert pending(store, trials_of(SPEC)) == []
 
 
@@ -213,7 +214,7 @@ def test_a_measure_that_two_scenarios_mean_otherwise_is_refused(carts, monkeypat
 
     monkeypatch.setattr(BoxPushingSettings, "build", build)
     with pytest.raises(SpecError, match="measure 'far': is declared as"):
-        check(SPEC)
+        check_conditions(SPEC)
 
 
 def test_results_of_an_older_version_are_not_read(study, monkeypatch):

@@ -14,7 +14,8 @@ from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.session import check, run_trial
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save
 
@@ -38,7 +39,7 @@ SPEC = Spec.of(
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     directory = tmp_path_factory.mktemp("study")
-    with made_up.opened(directory, SPEC, check(SPEC)) as store:
+    with made_up.opened(directory, SPEC, check_conditions(SPEC)) as store:
         for trial in trials_of(SPEC):
             save(store, trial, run_trial(trial), 1.0)
     return directory

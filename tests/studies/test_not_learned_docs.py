@@ -10,7 +10,7 @@ from nested_agents.studies.api.tuning import USUAL
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
@@ -51,7 +51,7 @@ def test_the_results_are_of_the_specs() -> None:
 def test_the_example_keeps_its_promises(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(EXAMPLES / "pursuit.py:Pursuit")]) == 0
     assert capsys.readouterr().out.startswith("passed  Pursuit: ")
-    check(Spec.load(EXAMPLES / "pursuit_steps.toml"))
+    check_conditions(Spec.load(EXAMPLES / "pursuit_steps.toml"))
 
 
 def test_specs_of_the_page() -> None:

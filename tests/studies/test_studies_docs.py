@@ -6,7 +6,7 @@ from pathlib import Path
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.studies import STUDIES
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
@@ -34,7 +34,7 @@ def test_the_toml_is_as_it_says() -> None:
     labels = [condition.label for condition in Spec.parse(conditions).conditions()]
     assert len(labels) == 10
     assert (labels[0], labels[-1]) == ("default, robots=2", "as printed, robots=3")
-    check(Spec.parse(evaluations))
+    check_conditions(Spec.parse(evaluations))
 
 
 def test_the_curriculum_runs_as_it_says(tmp_path, monkeypatch, capsys) -> None:

@@ -231,7 +231,11 @@ def test_graph_files(tmp_path: Path, name: str) -> None:
     [
         ("x.json", "{", "holds no graph: Expecting"),
         ("x.json", "[]", "holds no graph: it must be a table"),
-        ("x.json", '{"edges": [], "names": []}', "names = .*: unknown key; known: alone, "),
+        (
+            "x.json",
+            '{"edges": [], "names": []}',
+            "names = .*: unknown key for kind 'edges'; known: alone, ",
+        ),
         ("x.json", '{"edges": [["a", "b"], ["a", "b"]]}', "edge a -> b is given more than once"),
         ("x.json", '{"edges": [["a"]]}', "edges.0.: missing"),
         ("x.graphml", "nothing", "holds no graph: syntax error"),

@@ -107,6 +107,8 @@ def test_a_bad_function_is_refused_in_one_line(written, source: str, message: st
         build(parse(text), AGENTS, ROBOTS)
     assert message in str(refusal.value)
     assert str(refusal.value).startswith(f"topology {text!r}: ")
+    is_run = "has no" not in message and "cannot be run" not in message
+    assert str(refusal.value).endswith(" (given 4 agents of 2 bodies)") == is_run
     assert "\n" not in str(refusal.value)
 
 

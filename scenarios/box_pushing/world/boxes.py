@@ -30,7 +30,7 @@ from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
 from ....core.numerics import FloatArray, nx, quadrature
-from ....core.plugins.settings import closest
+from ....core.plugins.words import closest
 from .geometry import Outline, ring_edges
 from .settings import GRAVITY, BoxSettings
 

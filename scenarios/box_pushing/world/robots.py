@@ -36,7 +36,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit
-from ....core.plugins.settings import closest, tuples
+from ....core.plugins.settings import tuples
+from ....core.plugins.words import closest
 from .settings import RobotSettings
 
 E_PUCK_SENSORS = tuple(radians(a) for a in (-17.2, -45.9, -90.0, -151.5, 151.2, 90.0, 45.9, 17.2))

@@ -28,7 +28,8 @@ from ...results.results import Results
 from ...results.statistics import BLOCK, NOT_NEGATIVE, REGAINED, Array, bootstrap, rate, recovery
 from ...spec.spec import Spec
 from ...spec.tables import label_but
-from ...trials.session import Session, arrange
+from ...trials.arrangement import arrange
+from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases, distinct
 

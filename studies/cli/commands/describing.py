@@ -33,10 +33,10 @@ def presets(name: str | None) -> int:
         for key, preset in PRESETS.items():
             print_wrapped(preset.summary, f"{key:<{left}}", left)
         return 0
-    from ...spec.conditions import resolve
+    from ...spec.layers import resolve
     from ...spec.tables import dumps
 
-    settings = resolve(name, {}, {})
+    settings = resolve(name, {}, {}).settings
     if defaults := settings.scenario.scenario_defaults(name):
         print_text("# What this scenario lays over the preset, as it is set here:")
         print_text(*(f"# {line}" for line in dumps(defaults).splitlines() if line), "")

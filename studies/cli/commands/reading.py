@@ -10,7 +10,7 @@ from typing import Literal, TypedDict, Unpack
 import click
 
 from ...errors import SpecError, printable, refused
-from ...spec.outline import StudyOutline
+from ...spec.outline import StudyOutline, sources_of
 from ...store import durable
 from ...store.store import Store
 from .. import options
@@ -178,7 +178,7 @@ def results(directory: Path, form: Literal["table", "csv", "json"], phase: str) 
 
     DIR is where the study is kept.
     """
-    from ....core.plugins.settings import closest
+    from ....core.plugins.words import closest
     from ...presentation.tables import write_rows
     from ...results.results import read
 
@@ -207,13 +207,16 @@ Files = Literal["csv", "json", "marl-eval"]
 )
 @options.out("Folder of the files; by default export in the study's own.", "PATH")
 @click.option("--overwrite", is_flag=True, help="Replace files that are there.")
-def export(directory: Path, form: Files, out: Path | None, overwrite: bool) -> int:
+@options.trust
+def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trust: bool) -> int:
     """Write one file with a row for every episode, and one with a row for every trial.
 
     DIR is where the study is kept. JSON is one small file of spec, seeds and rounded measures, fit
     to be published with a paper; `nested-agents table` reads it.
     """
     folder = directory / "export" if out is None else out
+    if trust:
+        trust_files(directory)
     with opened(directory) as store:
         store.verify()
         paths = {folder / name: text for name, text in _texts(store, form).items()}
@@ -244,7 +247,8 @@ def _texts(store: Store, form: Files) -> dict[str, str]:
     results = read(store)
     outline = StudyOutline.kept(store)
     if form == "json":
-        kept = select_published(outline.study, results)
+        with sources_of(store).active():
+            kept = select_published(outline.study, results)
         return {"results.json": published.dumps(outline, kept)}
     if form == "marl-eval":
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}

@@ -18,7 +18,8 @@ from nested_agents.core.networks.inputs import FARTHEST, Inputs, RewardScale
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import Session, check, run_trial
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 TABLE: dict[str, Any] = {
@@ -93,7 +94,7 @@ def test_rewards_are_scaled_by_the_spread_of_returns() -> None:
 def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.networks.policies", None)
     with pytest.raises(SpecError, match=r"'ippo': needs the extra peers, pip install") as raised:
-        check(spec_of("ippo"))
+        check_conditions(spec_of("ippo"))
     assert "\n" not in str(raised.value)
 
 
@@ -164,7 +165,7 @@ def test_arrays_act_as_the_networks_do(kind: str) -> None:
 def test_dqn_needs_one_agent() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     with pytest.raises(SpecError, match=r"dqn': acts for one agent, there are 2; use agents"):
-        check(spec_of("dqn", agents="actuator"))
+        check_conditions(spec_of("dqn", agents="actuator"))
 
 
 def test_what_needs_rule_bases_says_so() -> None:

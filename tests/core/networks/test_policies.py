@@ -19,7 +19,8 @@ from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import Session, arrange, check, run_trial
+from nested_agents.studies.trials.arrangement import arrange, check_conditions
+from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.topologies.config import parse
 
@@ -335,7 +336,7 @@ def test_what_cannot_be_passed_down_is_refused() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     problem = "neighbours decide at the same time and tell each other nothing"
     with pytest.raises(SpecError, match=problem) as raised:
-        check(spec_of("simultaneous"))
+        check_conditions(spec_of("simultaneous"))
     assert "\n" not in str(raised.value)
 
 

@@ -8,7 +8,8 @@ from acting import look
 
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import Session, arrange, check, run_trial
+from nested_agents.studies.trials.arrangement import arrange, check_conditions
+from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 pytest.importorskip("stable_baselines3", reason="extra [peers]")
@@ -145,7 +146,7 @@ def test_teams_are_evaluated_and_taught_elsewhere(name: str) -> None:
         {"name": "three", "episodes": 2, "scenario": {"carts": 3}},
     ]
     spec = spec_of(name, episodes=2, evaluations=ELSEWHERE, curriculum=stages)
-    check(spec)
+    check_conditions(spec)
     (trial,) = trials_of(spec)
     rows = run_trial(trial).rows
     phases = {row.phase for row in rows}
@@ -200,7 +201,7 @@ def weights_into(agents: Any) -> Any:
 def test_whose_weights_are_their_own_meet_no_other_agents() -> None:
     spec = spec_of("own weights", evaluations={"more": {"carts": 4}})
     with pytest.raises(SpecError, match=r"evaluations.more: .*'own'; with 'all', all") as raised:
-        check(spec)
+        check_conditions(spec)
     assert "\n" not in str(raised.value)
 
 
@@ -211,5 +212,5 @@ def test_whose_weights_are_their_own_meet_no_other_agents() -> None:
 def test_who_acts_for_all_meets_no_other_agents(name: str, problem: str) -> None:
     spec = spec_of(name, evaluations={"more": {"carts": 3}})
     with pytest.raises(SpecError, match=f"evaluations.more: .*{problem}") as raised:
-        check(spec)
+        check_conditions(spec)
     assert "\n" not in str(raised.value)

@@ -4,9 +4,11 @@ import pickle
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from nested_agents.core.plugins import sources
-from nested_agents.core.plugins.sources import Sources, active
+from nested_agents.core.plugins import trust
+from nested_agents.core.plugins.sources import Sources, active, former_kept_name, kept_name
 
 TEXT = "LINKS = 3\n\n\ndef twice(x):\n    return 2 * x\n"
 
@@ -107,7 +109,7 @@ def test_the_copy_of_a_study_stands_in_for_a_file_that_is_gone(tmp_path: Path) -
     (copies / "links.py").write_text("LINKS = 3")
     with pytest.raises(ValueError, match=r"^links\.py came with .*out and was not run from a spec"):
         Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS")
-    sources.trust("LINKS = 3")
+    trust.trust("LINKS = 3")
     assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 3
     (tmp_path / "links.py").write_text("LINKS = 4")
     assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 4
@@ -123,3 +125,29 @@ def test_a_file_that_needs_another_one_is_refused(tmp_path: Path, beside: str) -
     (tmp_path / beside).write_text("LINKS = 3")
     with pytest.raises(ValueError, match=r"links\.py: imports shared, which stands beside it"):
         Sources(tmp_path).load("links.py:links")
+
+
+@given(st.lists(st.text("ab_/%\\", min_size=1, max_size=8), min_size=2, max_size=2, unique=True))
+def test_copies_of_different_files_have_different_names(names: list[str]) -> None:
+    one, other = map(kept_name, names)
+    assert one != other
+    assert "/" not in one
+
+
+def test_a_copy_under_the_name_of_an_earlier_version_is_read(tmp_path: Path) -> None:
+    copies = tmp_path / "sources"
+    copies.mkdir()
+    (copies / former_kept_name("arms/my__arm.py")).write_text(TEXT)
+    assert kept_name("arms/my__arm.py") != former_kept_name("arms/my__arm.py")
+    assert Sources(tmp_path).text("arms/my__arm.py") == TEXT
+    (copies / kept_name("arms/my__arm.py")).write_text("LINKS = 4")
+    assert Sources(tmp_path).text("arms/my__arm.py") == "LINKS = 4"
+
+
+def test_one_copy_of_two_files_is_none(tmp_path: Path) -> None:
+    (tmp_path / "sources").mkdir()
+    (tmp_path / "sources" / "a__b.py").write_text(TEXT)
+    sources = Sources(tmp_path)
+    assert sources.text("a__b.py") == TEXT
+    with pytest.raises(ValueError, match=r"^a/b\.py: the copy a__b\.py in .* is that of a__b\.py"):
+        sources.text("a/b.py")

@@ -17,7 +17,8 @@ from nested_agents.scenarios.box_pushing.world.geometry import surface
 from nested_agents.scenarios.checking.checker import check_scenario
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import Session, arrange, check
+from nested_agents.studies.trials.arrangement import arrange, check_conditions
+from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
 
 WORLDS = Path(__file__).resolve().parents[3] / "examples" / "worlds"
@@ -140,7 +141,7 @@ def test_what_is_learned_on_a_square_is_evaluated_on_other_boxes(sources: Source
         },
         sources,
     )
-    check(spec)
+    check_conditions(spec)
     session = Session(trials_of(spec)[0])
     session.train(1)
     session.evaluate()
@@ -152,4 +153,4 @@ def test_what_is_learned_on_a_square_is_evaluated_on_other_boxes(sources: Source
 def test_a_team_with_too_many_joint_choices_is_refused_in_one_line(sources: Sources) -> None:
     spec = Spec.of({"scenario": {**SCENARIO, "observed": "joint", "robots": 8}}, sources)
     with pytest.raises(SpecError, match=r"12 bearings x 8 \*\* 8 joint choices, allowed: 1,000,00"):
-        check(spec)
+        check_conditions(spec)

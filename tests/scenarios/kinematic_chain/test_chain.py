@@ -14,7 +14,7 @@ from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES, COMPILED, ChainView
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.trial import trials_of
 
 FAILURES = (
@@ -168,7 +168,7 @@ def test_it_brings_what_learns_best_and_a_spec_has_the_last_word() -> None:
 )
 def test_what_cannot_be_is_refused_in_one_line(table: dict[str, object], said: str) -> None:
     with pytest.raises(SpecError, match=said) as refused:
-        check(Spec.of({"scenario": {"kind": "kinematic-chain", **table}}))
+        check_conditions(Spec.of({"scenario": {"kind": "kinematic-chain", **table}}))
     assert "\n" not in str(refused.value)
 
 

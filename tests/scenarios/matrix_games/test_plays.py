@@ -10,7 +10,7 @@ from nested_agents.core.agents.loop import control_loop, world_seed
 from nested_agents.core.decision.exploration import BoltzmannExploration, PaperExploration
 from nested_agents.scenarios.matrix_games.plays import parts_of, whole_episode
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.trials.session import arrange
+from nested_agents.studies.trials.arrangement import arrange
 
 PLAYS = 40
 FULL = {"joint": 2, "own": 1, "above": 2}

@@ -13,7 +13,8 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.durable import TEAM
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.session import check, run_trial
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import run_trials, save
 from nested_agents.studies.workers.workers import start_workers
@@ -36,7 +37,7 @@ SPEC = Spec.of(TABLE)
 def kept_at(directory, spec=SPEC):
     """Run a study here, one trial after the other."""
     trials = trials_of(spec)
-    measures = check(spec)
+    measures = check_conditions(spec)
     with made_up.opened(directory, spec, measures) as store:
         for trial in trials:
             save(store, trial, run_trial(trial), 1.0)
@@ -57,7 +58,7 @@ def recordings(directory):
 def test_workers_of_all_kinds_keep_the_same_bytes(backend, place, tmp_path):
     trials = trials_of(SPEC)
     with (
-        made_up.opened(tmp_path, SPEC, check(SPEC)) as store,
+        made_up.opened(tmp_path, SPEC, check_conditions(SPEC)) as store,
         start_workers(backend, 2, None, len(trials)) as workers,
     ):
         assert [o.error for o in run_trials(trials, store, run_trial, workers)] == [None] * 6
@@ -168,7 +169,7 @@ def test_a_team_that_is_not_as_it_was_written_is_told_everywhere(damage, place, 
     assert line in capsys.readouterr().err
     main(["status", str(directory)])
     assert line in capsys.readouterr().out
-    with made_up.opened(directory, SPEC, check(SPEC)) as store:
+    with made_up.opened(directory, SPEC, check_conditions(SPEC)) as store:
         assert trial.identity not in store.states()
         save(store, trial, run_trial(trial), 1.0)
     assert recordings(directory) == recordings(place)
@@ -217,7 +218,7 @@ def test_a_learner_that_acts_by_itself_is_kept_if_it_can_be_restored(tmp_path):
     table = {**TABLE, "seeds": [3], "curriculum": [], "overrides": [],
              "learner": {"kind": "mine.py:Mine"}}  # fmt: skip
     with pytest.raises(na.SpecError, match=r"keep_teams = true: a team of .* no method rest"):
-        check(Spec.of(table, Sources(texts={"mine.py": PEER})))
+        check_conditions(Spec.of(table, Sources(texts={"mine.py": PEER})))
     spec = Spec.of(table, Sources(texts={"mine.py": PEER + RESTORE}))
     with spec.sources.active():
         study = na.load(kept_at(tmp_path, spec))
@@ -232,7 +233,7 @@ def test_a_learner_that_acts_by_itself_is_kept_if_it_can_be_restored(tmp_path):
 def test_arrays_of_objects_are_no_arrays_that_are_kept(monkeypatch):
     monkeypatch.setattr(na.Team, "arrays", lambda team: {"seen": np.array([{}])})
     with pytest.raises(na.SpecError, match="its array 'seen' holds objects"):
-        check(SPEC)
+        check_conditions(SPEC)
 
 
 @pytest.mark.slow

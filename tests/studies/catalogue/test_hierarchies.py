@@ -16,7 +16,7 @@ from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.power import seeds_needed
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check as measures_of
+from nested_agents.studies.trials.arrangement import check_conditions as measures_of
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers import runner
 

@@ -10,7 +10,8 @@ from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of,
 from nested_agents.studies.catalogue.study import draw_figures, load_study
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import arrange, check, run_trial
+from nested_agents.studies.trials.arrangement import arrange, check_conditions
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SIZES = {2: 0.9, 8: 0.9, 64: 0.5}
@@ -166,4 +167,4 @@ def test_the_spec_reaches_from_2_to_64_robots() -> None:
         assert sizes <= {c.settings.scenario.robots for c in conditions}
     spec = specs[0]
     small = spec.model_copy(update={"overrides": spec.overrides[:1]})
-    check(small)
+    check_conditions(small)

@@ -5,9 +5,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
-from nested_agents.core.plugins import sources
+from nested_agents.core.plugins import trust
+from nested_agents.core.plugins.sources import Sources
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import SPEC_FILE
 
 SPEC = """
@@ -66,7 +70,7 @@ def mark(theirs: Path) -> Path:
 def foreign(theirs: Path, mark: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A study that somebody else has run."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "ours"))
-    monkeypatch.setattr(sources, "_here", set())
+    monkeypatch.setattr(trust, "_noted", set())
     forget_modules()
     return shutil.copytree(theirs / "study", tmp_path / "study")
 
@@ -103,7 +107,7 @@ def test_trust_is_said_once_and_kept(
     assert main(["explain", str(foreign), "--trust"]) == 0
     assert f"mine.py, which came with {foreign}, is trusted" in capsys.readouterr().err
     assert mark.exists()
-    monkeypatch.setattr(sources, "_here", set())  # as in another process
+    monkeypatch.setattr(trust, "_noted", set())  # as in another process
     forget_modules()
     for command in RUNNING:
         assert main([command, str(foreign)]) == 0, command
@@ -124,10 +128,10 @@ def test_without_a_list_trust_lasts_as_long_as_the_process(
 ) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
-    assert not sources.is_trusted("x = 8")
-    sources.trust("x = 8")
-    assert sources.is_trusted("x = 8")
-    assert not sources.is_trusted("x = 9")
+    assert not trust.is_trusted("x = 8")
+    trust.trust("x = 8")
+    assert trust.is_trusted("x = 8")
+    assert not trust.is_trusted("x = 9")
 
 
 def test_the_kept_spec_runs_elsewhere_with_the_copies_beside_it(
@@ -137,3 +141,169 @@ def test_the_kept_spec_runs_elsewhere_with_the_copies_beside_it(
     assert main(again) == 2
     assert f"mine.py came with {foreign}" in capsys.readouterr().err
     assert main([*again, "--trust"]) == 0
+
+
+PAYLOAD = """
+from nested_agents.core.decision.exploration import BurstExploration
+from nested_agents.scenarios.line_up import LineUp, LineUpSettings
+
+
+class Carts(LineUp):
+    class Settings(LineUpSettings):
+        pass
+
+
+class Bursts(BurstExploration):
+    pass
+
+
+def ring(agents, bodies):
+    return list(zip(agents, agents[1:]))
+"""
+SMALL = """
+seeds = 2
+episodes = 1
+steps = 2
+evaluation = 1
+sweep.preset = ["frozen", "random"]
+"""
+NAMING = {
+    "scenario.kind": '[scenario]\nkind = "payload.parts:Carts"\n',
+    "topology.kind": '[topology]\nkind = "payload.parts:ring"\n[scenario]\nkind = "line-up"\n',
+    "learner.exploration.kind": '[learner.exploration]\nkind = "payload.parts:Bursts"\n'
+    '[scenario]\nkind = "line-up"\n',
+}
+"""Tables that name a module, by the key that does."""
+READING = {
+    "status": ["status"],
+    "results": ["results"],
+    "table": ["table"],
+    "compare": ["compare"],
+    "watch": ["watch", "--once"],
+    "export csv": ["export", "--format", "csv"],
+    "export json": ["export", "--format", "json"],
+    "export marl-eval": ["export", "--format", "marl-eval"],
+    "report": ["report"],
+    "explain": ["explain"],
+    "retry": ["retry", "--jobs", "1"],
+}
+BUILDING = ("explain", "retry")
+"""Those that need what the spec names."""
+
+
+def forget_payload() -> None:
+    """Let this process and its workers find the package anew."""
+    get_reusable_executor().shutdown(wait=True, kill_workers=True)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "payload"]:
+        del sys.modules[name]
+
+
+@pytest.fixture(scope="module", params=NAMING)
+def naming(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, Path]:
+    """A key that names a module, and a folder with the study of who has written the module."""
+    folder = tmp_path_factory.mktemp("naming")
+    (folder / "payload").mkdir()
+    (folder / "payload" / "__init__.py").touch()
+    (folder / "payload" / "parts.py").write_text(PAYLOAD)
+    (folder / "spec.toml").write_text(SMALL + NAMING[request.param])
+    forget_payload()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        patch.setenv("PYTHONPATH", str(folder))  # of workers
+        patch.setenv("XDG_STATE_HOME", str(folder / "state"))
+        line = ["run", str(folder / "spec.toml"), "--out", str(folder / "study"), "--jobs", "1"]
+        assert main(line) == 0
+        assert main(["table", str(folder / "study")]) == 0
+        forget_payload()
+        assert main(["explain", str(folder / "study")]) == 0  # one has run it oneself
+    return request.param, folder
+
+
+@pytest.fixture
+def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of somebody who has run nothing yet."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "ours"))
+    monkeypatch.setattr(trust, "_noted", set())
+    forget_payload()
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", READING)
+def test_no_command_imports_what_somebody_elses_study_names(
+    command: str,
+    naming: tuple[str, Path],
+    reader: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    key, folder = naming
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    study = shutil.copytree(folder / "study", reader / "study")
+    shutil.rmtree(study / "explain", ignore_errors=True)
+    name, *options = READING[command]
+    status = main([name, str(study), *options])
+    _, error = capsys.readouterr()
+    assert status == (2 if command in BUILDING else 0)
+    assert "payload.parts" not in sys.modules
+    if status:
+        assert error.count("\n") == 1
+        assert f"{key} = 'payload.parts:" in error
+        assert "--trust" in error
+        assert main([name, str(study), *options, "--trust"]) == 0
+        assert f"payload.parts, which {study} names, is trusted" in capsys.readouterr().err
+        assert main([name, str(study), *options]) == 0
+
+
+@pytest.mark.parametrize("command", ["table", "compare"])
+def test_a_file_of_results_that_names_a_module_is_refused(
+    command: str, reader: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spec, out = reader / "spec.toml", reader / "study"
+    spec.write_text(SMALL + "scenario.kind = 'line-up'\n")
+    assert main(["run", str(spec), "--out", str(out), "--jobs", "1"]) == 0
+    assert main(["export", str(out), "--format", "json", "--out", str(reader)]) == 0
+    (reader / "payload").mkdir()
+    (reader / "payload" / "__init__.py").touch()
+    (reader / "payload" / "study.py").write_text(
+        "from nested_agents.studies.catalogue import learning_curve as PART\n"
+    )
+    text = (reader / "results.json").read_text()
+    (reader / "results.json").write_text(text.replace('"learning-curve"', '"payload.study:PART"'))
+    monkeypatch.syspath_prepend(reader)
+    capsys.readouterr()
+    assert main([command, str(reader / "results.json")]) == (2 if command == "table" else 0)
+    assert "payload.study" not in sys.modules
+    if command == "table":
+        _, error = capsys.readouterr()
+        assert error.count("\n") == 1
+        assert "study = 'payload.study:PART': payload.study is a module that" in error
+        assert "--trust" in error
+        assert main([command, str(reader / "results.json"), "--trust"]) == 0
+
+
+def test_an_environment_of_somebody_elses_module_is_refused() -> None:
+    table = {"scenario": {"kind": "gymnasium", "id": "payload.worlds:World-v0"}}
+    with pytest.raises(SpecError, match=r"^scenario\.id: payload\.worlds is a module that theirs"):
+        Spec.of(table, Sources(None, brought_by="theirs"))
+    Spec.of(
+        {"scenario": {"kind": "pettingzoo", "id": "mpe2/simple_spread_v3"}},
+        Sources(None, brought_by="theirs"),
+    )
+
+
+def test_a_module_of_ones_own_spec_is_trusted_where_it_is(
+    reader: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder in ("one", "other"):
+        (reader / folder / "payload").mkdir(parents=True)
+        (reader / folder / "payload" / "__init__.py").touch()
+    with monkeypatch.context() as patch:
+        patch.syspath_prepend(reader / "one")
+        Sources(reader).permit("payload.parts")
+        Sources(None, brought_by="theirs").permit("payload.parts")
+    monkeypatch.syspath_prepend(reader / "other")
+    with pytest.raises(ValueError, match=r"payload\.parts is a module that theirs names"):
+        Sources(None, brought_by="theirs").permit("payload.parts")

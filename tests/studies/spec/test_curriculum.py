@@ -4,7 +4,7 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.conditions import StageSettings
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.tables import dumps
-from nested_agents.studies.trials.keeping import difference, noted_of
+from nested_agents.studies.trials.keeping import difference, notes_of
 
 TWO_STAGES = """
 [scenario]
@@ -78,11 +78,11 @@ def test_what_is_wrong_is_said_in_one_line(text):
 
 
 def test_another_curriculum_is_another_study():
-    there = noted_of(Spec.parse(TWO_STAGES))
-    assert difference(there, noted_of(Spec.parse(TWO_STAGES))) is None
+    there = notes_of(Spec.parse(TWO_STAGES))
+    assert difference(there, notes_of(Spec.parse(TWO_STAGES))) is None
     other = Spec.parse(TWO_STAGES.replace("episodes = 6", "episodes = 7"))
-    assert difference(there, noted_of(other)).startswith("curriculum = [{name = 'two'")
-    without = noted_of(Spec.parse("scenario.robots = 8"))
+    assert difference(there, notes_of(other)).startswith("curriculum = [{name = 'two'")
+    without = notes_of(Spec.parse("scenario.robots = 8"))
     assert "curriculum = [] there" in difference(without, there)
 
 

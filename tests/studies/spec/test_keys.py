@@ -4,11 +4,17 @@ from pkgutil import resolve_name
 
 import pytest
 
-from nested_agents.core.plugins.registry import Plugged
+from nested_agents.core.decision.exploration import EXPLORATIONS
+from nested_agents.core.evaluators import EVALUATORS
+from nested_agents.core.learners import LEARNERS
+from nested_agents.core.networks.settings import PeerSettings
+from nested_agents.core.plugins.registry import Plugged, Registry
 from nested_agents.core.plugins.settings import Settings
+from nested_agents.scenarios import SCENARIOS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.spec.keys import Key, Table, keys_below, tables
+from nested_agents.topologies import TOPOLOGIES
 
 TABLES = tables()
 
@@ -22,9 +28,9 @@ def built_in_models() -> set[type[Settings]]:
 
     Not those of controllers of one scenario, which are named by module and class, nor those of
     faults of other environments, nor entries of a benchmark; nor those that other tests have made
-    of a function.
+    of a function; nor those of peers, which only learners of users inherit.
     """
-    found = subclasses(Settings) - {Settings, ConditionSettings}
+    found = subclasses(Settings) - {Settings, ConditionSettings, PeerSettings}
     return {
         model
         for model in found
@@ -36,7 +42,8 @@ def built_in_models() -> set[type[Settings]]:
 
 
 def test_the_fields_of_all_models_are_the_keys_that_are_listed() -> None:
-    told = {(table.model, key.name) for table in TABLES for key in table.keys}
+    of_kinds = {"kind"}  # of a table whose models it tells apart, which need not inherit one
+    told = {(t.model, key.name) for t in TABLES for key in t.keys if key.name not in of_kinds}
     listed = {table.model for table in TABLES}
     for model in built_in_models():
         below = {m for m in listed if issubclass(m, model)}  # an heir may share its base's table
@@ -82,11 +89,30 @@ def the_key(name: str) -> Key:
         ("learner.rule_base.memberships", "whole number", "none", ">= 2, <= 15", ""),
         ("topology.members", "nested lists of text", "none", "", ""),
         ("overrides.name", "text", "required", "", ""),
+        ("learner.predictor.kind", "text", '"given"', "given, static, learned", ""),
     ],
 )
 def test_a_key(name: str, kind: str, default: str, allowed: str, unit: str) -> None:
     key = the_key(name)
     assert (key.type, key.default, key.allowed, key.unit) == (kind, default, allowed, unit)
+
+
+@pytest.mark.parametrize(
+    ("name", "known"),
+    [
+        ("scenario.kind", SCENARIOS),
+        ("learner.kind", LEARNERS),
+        ("topology.kind", TOPOLOGIES),
+        ("learner.exploration.kind", EXPLORATIONS),
+        ("learner.decision.evaluator.kind", EVALUATORS),
+    ],
+)
+def test_a_kind_is_a_key(name: str, known: Registry) -> None:
+    key = the_key(name)
+    kinds, _, own = key.allowed.partition("; ")
+    assert kinds.split(", ") == list(known.built_in)
+    assert own == "or one of your own, file.py:NAME"
+    assert key.default.strip('"') in known.built_in
 
 
 def test_the_command(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from nested_agents import studies
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check
+from nested_agents.studies.trials.arrangement import check_conditions
 
 EXAMPLES = int(os.environ.get("FUZZED_SPECS", "200"))
 
@@ -141,7 +141,7 @@ def test_a_mutated_spec_is_accepted_or_refused_in_one_line(table):
     try:
         spec = Spec.of(table)
         if len(spec.conditions()) <= 12:
-            check(spec)
+            check_conditions(spec)
         event("accepted")
     except SpecError as error:
         event("refused")

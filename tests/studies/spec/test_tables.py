@@ -1,8 +1,9 @@
 import pytest
 
+from nested_agents.core.plugins.models import kind_of, models_of
 from nested_agents.scenarios.box_pushing.world.settings import Failure
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.spec.tables import assignment, flat, kind_of, models_of, nested, overlay
+from nested_agents.studies.spec.tables import assignment, flat, nested, overlay
 
 LEARNER = ConditionSettings.model_fields["learner"]
 

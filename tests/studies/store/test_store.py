@@ -140,7 +140,8 @@ def test_seeds_may_be_added(finished):
         ({"seeds": 2}, "seeds = [0, 1, 2] there, [0, 1] here"),
         ({"learner": {"discount": 0.5}}, "learner.discount = 0.97 there, 0.5 here (and 1 more)"),
         ({"sweep": {"preset": ["default"]}}, "conditions = ['default', 'frozen'] there"),
-        ({"sweep": {"learner.kind": ["batch-td", "frozen"]}}, "conditions"),
+        ({"sweep": {"preset": ["default"]}}, "['default'] here, by sweep.preset = ['default', 'f"),
+        ({"sweep": {"learner.kind": ["batch-td", "frozen"]}}, "here, by sweep.learner.kind = abs"),
         ({"evaluation": 3, "steps": 6}, "steps = 5 there, 6 here (and 1 more)"),
     ],
 )

@@ -11,7 +11,8 @@ from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.line_up import LineUp
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import CURRICULUM_WORLDS, Session, check, run_trial
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.session import CURRICULUM_WORLDS, Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SHORT = {
@@ -181,14 +182,14 @@ REFUSED = {
 def test_what_cannot_be_handed_on_is_refused_before_anything_runs(what):
     table, said = REFUSED[what]
     with pytest.raises(SpecError, match=said) as caught:
-        check(Spec.of(SHORT | table))
+        check_conditions(Spec.of(SHORT | table))
     assert "\n" not in str(caught.value)
 
 
 def test_own_weights_are_handed_on_between_the_same_agents():
     stages = [{"name": "again", "episodes": 1}]
     trial = only(curriculum=stages, learner={}, evaluations={"same": {}})
-    check(Spec.of(SHORT | {"curriculum": stages, "learner": {}}))
+    check_conditions(Spec.of(SHORT | {"curriculum": stages, "learner": {}}))
     assert len(run_trial(trial).rows) == 7
 
 
@@ -211,7 +212,7 @@ def test_a_scenario_of_a_users_file_has_stages_and_evaluations_too():
         "evaluations": {"four": {"carts": 4}},
     }
     spec = Spec.of(table, Sources(texts={"mine.py": WORLD}))
-    assert check(spec)[0].name == "success"
+    assert check_conditions(spec)[0].name == "success"
     (trial,) = trials_of(spec)
     with trial.sources.active():
         rows = run_trial(pickle.loads(pickle.dumps(trial))).rows

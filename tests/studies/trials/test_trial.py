@@ -10,17 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.core.interface.recording import EpisodeRecorder
-from nested_agents.core.interface.scenario import Transition
-from nested_agents.scenarios.box_pushing.scenario import MEASURES, BoxPushing
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import RESULTS_VERSION
 from nested_agents.studies.trials import trial as trial_module
-from nested_agents.studies.trials.session import check, run_trial
-from nested_agents.studies.trials.trial import EpisodeMeter, EpisodeRow, trials_of
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.trial import trials_of
 
 SHORT = {"seeds": [7], "episodes": 2, "steps": 6, "evaluation": 1}
 
@@ -173,14 +171,14 @@ def test_everything_that_matters_is_in_the_identity(monkeypatch):
 )
 def test_settings_that_do_not_fit_are_refused_before_anything_runs(table, said):
     with pytest.raises(SpecError, match=said) as caught:
-        check(Spec.of(SHORT | table))
+        check_conditions(Spec.of(SHORT | table))
     assert "\n" not in str(caught.value)
 
 
 def test_which_condition_does_not_fit_is_named():
     spec = Spec.of(SHORT | {"sweep": {"learner.rule_base.order": [1, 9]}})
     with pytest.raises(SpecError, match=r"\(condition '9'\)"):
-        check(spec)
+        check_conditions(spec)
 
 
 def test_further_evaluations_leave_the_rest_of_a_trial_as_it_is(result):
@@ -208,114 +206,7 @@ OWN = SHORT | {"preset": "own-value"}
 )
 def test_a_team_is_not_evaluated_where_it_cannot_act(change):
     with pytest.raises(SpecError, match=r"evaluations\.other: a team trained with 4 agents"):
-        check(Spec.of(OWN | {"evaluations": {"other": change}}))
+        check_conditions(Spec.of(OWN | {"evaluations": {"other": change}}))
     several = OWN | {"sweep": {"learner.ridge": [1.0, 2.0]}, "evaluations": {"other": change}}
     with pytest.raises(SpecError, match=r"evaluations\.other: .* \(condition '1.0'\)$"):
-        check(Spec.of(several))
-
-
-def transition(reward=0.5, terminated=False, **info):
-    measured = {
-        "distance_m": 0.3, "orientation_error_rad": 0.2, "contact_fraction": 0.75,
-        "stopped_at_goal": False,
-        "robot_poses": np.zeros((2, 3)), "box_pose": np.ones(3), "goal_pose": np.ones(3),
-        "wheel_speeds": np.zeros(4), "contact": np.array([True, False]),
-        "failed": np.zeros(4, dtype=bool),
-    }  # fmt: skip
-    return Transition(np.zeros((4, 7)), reward, terminated, False, measured | info)
-
-
-def test_an_episode_is_summed_up_by_hand():
-    meter = EpisodeMeter("training", 3, MEASURES)
-    last = transition(0.25, terminated=True, contact_fraction=0.25)
-    for step in (transition(0.5), last):
-        meter.add(step)
-    assert meter.row() == EpisodeRow(
-        "training", 3, 2,
-        {
-            "success": True, "stopped_at_goal": False, "final_distance_m": 0.3,
-            "final_orientation_rad": 0.2, "contact_fraction": 0.5,
-        },
-        0.75,
-    )  # fmt: skip
-
-
-def test_stopping_at_the_goal_is_what_the_scenario_says():
-    meter = EpisodeMeter("training", 0, MEASURES)
-    meter.add(transition(terminated=True, stopped_at_goal=True))
-    assert meter.row().measures["stopped_at_goal"] is True
-
-
-@pytest.mark.parametrize(
-    ("gathering", "is_rate", "expected"),
-    [("last", False, -1.0), ("mean", False, -1.5), ("sum", False, -4.5), ("max", False, -0.5),
-     ("max", True, True), ("last", True, True)],
-)  # fmt: skip
-def test_the_steps_of_an_episode_make_one_number(gathering, is_rate, expected):
-    measure = Measure("x", "x", source="here", gathering=gathering, is_rate=is_rate)
-    meter = EpisodeMeter("training", 0, [measure])
-    for value in (-0.5, -3.0, np.float64(-1.0)):
-        meter.add(transition(here=value))
-    (value,) = meter.row().measures.values()
-    assert value == expected
-    assert type(value) is type(expected)
-
-
-def test_agents_that_are_rewarded_one_by_one_return_their_mean():
-    meter = EpisodeMeter("training", 0, [SUCCESS])
-    for _ in range(2):
-        meter.add(transition(np.array([1.0, 2.0])))
-    assert meter.row().return_ == 3.0
-
-
-@pytest.mark.parametrize(
-    ("source", "said"),
-    [
-        ("nowhere", "measure 'x': its source 'nowhere' is not in the info of a step"),
-        ("box_pose", "measure 'x': its source 'box_pose' must be one number at every step"),
-    ],
-)
-def test_what_a_measure_is_not_taken_from_is_told(source, said):
-    meter = EpisodeMeter("training", 0, [Measure("x", "x", source=source)])
-    with pytest.raises(ValueError, match=said) as caught:
-        meter.add(transition())
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("what", [{"reward": np.nan}, {"distance_m": np.inf}])
-def test_what_is_not_finite_fails_the_trial(what):
-    meter = EpisodeMeter("training", 4, MEASURES)
-    meter.add(transition(**what))
-    with pytest.raises(FloatingPointError, match=r"= (nan|inf) in training episode 4"):
-        meter.row()
-
-
-class Recorded:
-    """What a recorder asks of a scenario."""
-
-    recorded = ("box_pose", "contact")
-
-    def measure(self):
-        return transition().info
-
-    def constants_of_episode(self):
-        return {"dt": 0.5, "box": "square"}
-
-
-def test_frames_are_copies():
-    recorder = EpisodeRecorder(Recorded())
-    step = transition()
-    recorder.add(step)
-    step.info["box_pose"][:] = 9.0
-    recording = recorder.recording()
-    assert list(recording) == ["box_pose", "contact", "reward", "dt", "box"]
-    assert (recording["box_pose"] == 1.0).all()
-    assert recording["box_pose"].shape == (2, 3)
-    assert float(recording["dt"]) == 0.5
-
-
-def test_rewards_of_each_agent_are_recorded_one_by_one():
-    recorder = EpisodeRecorder(Recorded())
-    for _ in range(3):
-        recorder.add(transition(np.array([1.0, 2.0])))
-    assert recorder.recording()["reward"].shape == (3, 2)
+        check_conditions(Spec.of(several))

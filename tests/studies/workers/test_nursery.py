@@ -148,9 +148,9 @@ class Stateful(LineUp):
         self.dies = settings.dies
 
     def reset(self, seed, episode=0):
-        if self.dies == "exit" and seed == 1:
+        if self.dies == "exit":
             os._exit(7)
-        if self.dies == "killed" and seed == 1:
+        if self.dies == "killed":
             os.kill(os.getpid(), signal.SIGABRT)
         super().reset(seed, episode)
         shape = self._places.shape
@@ -160,12 +160,12 @@ class Stateful(LineUp):
 """
 
 
-def write(folder: Path, dies: str = "") -> Path:
+def write(folder: Path, more: str = "seeds = 4") -> Path:
     (folder / "state.py").write_text(STATE)
     path = folder / "spec.toml"
     path.write_text(
-        'study = "learning-curve"\nseeds = 4\nepisodes = 2\nsteps = 5\nevaluation = 1\n'
-        f'scenario = {{kind = "state.py:Stateful", dies = "{dies}"}}\n'
+        'study = "learning-curve"\nepisodes = 2\nsteps = 5\nevaluation = 1\n'
+        f'scenario.kind = "state.py:Stateful"\n{more}\n'
     )
     return path
 
@@ -199,9 +199,10 @@ def test_rows_do_not_depend_on_who_runs_what_after_what(options, alone, tmp_path
     ("dies", "reason"), [("exit", "exit code 7"), ("killed", "killed by SIGABRT")]
 )
 def test_a_trial_that_dies_costs_no_other(dies, reason, tmp_path, capsys) -> None:
-    assert main(["run", str(write(tmp_path, dies)), "--out", str(tmp_path / "out")]) == 1
+    spec = write(tmp_path, f'seeds = [1]\nsweep."scenario.dies" = ["", "{dies}"]')
+    assert main(["run", str(spec), "--out", str(tmp_path / "out")]) == 1
     with Store.open(tmp_path / "out") as store:
-        assert store.counts() == {"done": 3, "failed": 1}
+        assert store.counts() == {"done": 1, "failed": 1}
         ((_, seed, error),) = store.failed()
     assert (seed, error) == (1, f"its worker died {ATTEMPTS} times: {reason}")
 

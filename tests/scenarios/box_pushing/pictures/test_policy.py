@@ -4,7 +4,7 @@ from acting import fuzzy, joint_of
 
 from nested_agents.scenarios.box_pushing.pictures.policy import Field
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.trials.session import arrange
+from nested_agents.studies.trials.arrangement import arrange
 
 
 @pytest.mark.parametrize(("slope", "to_the_box"), [(-1.0, True), (1.0, False)])

@@ -14,7 +14,8 @@ from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, Robo
 from nested_agents.scenarios.checking.checker import check_scenario
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import check, run_trial
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 
 SPEC = """
@@ -41,7 +42,7 @@ def test_an_e_puck_described_is_an_e_puck() -> None:
 
 def test_a_spec_that_describes_its_box_and_robot_runs_and_can_be_drawn() -> None:
     spec = Spec.parse(SPEC)
-    check(spec)
+    check_conditions(spec)
     settings = spec.conditions()[0].settings.scenario
     assert isinstance(settings.box, BoxSettings)
     assert "predictions" in check_scenario(lambda: BoxPushing(settings), steps=10).passed
@@ -78,7 +79,7 @@ def test_a_spec_that_describes_its_box_and_robot_runs_and_can_be_drawn() -> None
 )
 def test_refusals(change: str, complaint: str) -> None:
     with pytest.raises(SpecError) as error:
-        check(Spec.parse(SPEC, [change]))
+        check_conditions(Spec.parse(SPEC, [change]))
     assert complaint in str(error.value)
 
 

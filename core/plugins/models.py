@@ -1,0 +1,78 @@
+"""Which settings model a table of a spec is for: by the fields of models, and the kinds of tables.
+
+A *slot* is what a table is for: a model, or a field of a model, which may hold one of several.
+"""
+
+from __future__ import annotations
+
+import typing
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+Slot = type[BaseModel] | FieldInfo | None
+"""What a table is for; None: nothing is known of it."""
+
+
+class Kinds(ABC):
+    """Marks a field that holds settings of one of several kinds, which a table names."""
+
+    @abstractmethod
+    def model(self, kind: str) -> type[BaseModel]:
+        """Return the settings model of a kind.
+
+        Raises
+        ------
+        ValueError
+            If there is none; one line.
+        """
+
+    @abstractmethod
+    def built_in(self) -> Iterable[str]:
+        """Return the kinds that are built in."""
+
+
+def annotation_of(slot: Slot) -> object:
+    """Return the type of what a slot holds."""
+    return slot.annotation if isinstance(slot, FieldInfo) else slot
+
+
+def models_of(annotation: object) -> list[type[BaseModel]]:
+    """Return the settings models that a field's annotation allows, in order."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in typing.get_args(annotation) for model in models_of(part)]
+
+
+def kind_of(model: type[BaseModel]) -> str | None:
+    """Return the `kind` by which a table names this model, if it has one."""
+    field = model.model_fields.get("kind")
+    return None if field is None else field.default or None
+
+
+def kinds_at(slot: Slot) -> Kinds | None:
+    """Return the kinds that a field is marked with, if it is."""
+    marks = slot.metadata if isinstance(slot, FieldInfo) else []
+    return next((mark for mark in marks if isinstance(mark, Kinds)), None)
+
+
+def model_at(slot: Slot, table: object) -> type[BaseModel] | None:
+    """Return the model that a table is for; none if its kind is unknown or missing."""
+    kind = table.get("kind") if isinstance(table, Mapping) else None
+    kinds = kinds_at(slot)
+    if kinds is not None:
+        try:
+            return kinds.model(str(kind))
+        except ValueError:
+            return None
+    models = models_of(annotation_of(slot))
+    if len(models) == 1:
+        return models[0]
+    return next((m for m in models if kind is not None and kind_of(m) == kind), None)
+
+
+def field_of(model: type[BaseModel] | None, key: str) -> FieldInfo | None:
+    """Return the field that a key of a model's table names."""
+    return None if model is None else model.model_fields.get(key)

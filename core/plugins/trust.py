@@ -1,0 +1,105 @@
+"""Which code of users may be run: what a spec of the reader's own has run, or --trust has allowed.
+
+A study keeps the files that its spec names, and runs them again when it is explained or continued;
+it may also name modules of installed packages. Of a study that came from somebody else, nothing may
+be run unasked, and no module imported: that code can do whatever the reader can. A digest inside
+the study would protect nobody. So whatever is run from a spec in hand is noted, by a SHA-256, in a
+list outside of all studies: ``$XDG_STATE_HOME/nested-agents/trusted``, by default below
+``~/.local/state``. What a study brings along, or names, is run if the list has it.
+
+Of a file its text is noted; of a module, its name and where its package is, see `module_text`.
+"""
+
+import contextlib
+import hashlib
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+
+LIBRARIES = ("gymnasium", "mpe2", "pettingzoo")
+"""Packages that anybody may name: the toolkit itself offers their environments."""
+
+_noted: set[str] = set()
+"""Digests of what this process trusts, also where no list can be written."""
+
+
+def trusted_list() -> Path:
+    """Return where the list is."""
+    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    return Path(state) / "nested-agents" / "trusted"
+
+
+def is_trusted(text: str) -> bool:
+    """Tell whether a file of this text may be run, or a module of this `module_text` imported."""
+    digest = sha256(text)
+    if digest in _noted:
+        return True
+    with contextlib.suppress(OSError, ValueError):
+        return digest in trusted_list().read_text(encoding="ascii").split()
+    return False
+
+
+def trust(text: str) -> None:
+    """Allow what has this text from now on; if no list can be written, only for now."""
+    if is_trusted(text):
+        return
+    digest = sha256(text)
+    _noted.add(digest)
+    path = trusted_list()
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "a", encoding="ascii") as file:
+            file.write(f"{digest}\n")
+
+
+def module_text(module: str) -> str:
+    """Return what stands for a module in the list: its name, and where its package is.
+
+    Nothing is imported for it.
+    """
+    return f"module {module} of {_place_of(module.partition('.')[0])}"
+
+
+def _place_of(package: str) -> str | None:
+    """Return where a package or module at the top is; None if there is none."""
+    known = sys.modules.get(package)
+    spec = getattr(known, "__spec__", None)
+    try:
+        spec = spec or find_spec(package)
+    except (ImportError, ValueError):
+        return None
+    if spec is None:
+        return None
+    folders = list(spec.submodule_search_locations or ())
+    return spec.origin or (folders[0] if folders else None)
+
+
+def modules_in(value: object, key: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the modules that settings name, at any depth, each with the dotted key that does.
+
+    They stand as ``"package.module:Name"``; the ``id`` of an environment names one without a colon.
+
+    Examples
+    --------
+    >>> list(modules_in({"kind": "arms.seven:Arm", "id": "games/chess", "of": "chain:reversed"}))
+    [('arms.seven', 'kind'), ('games.chess', 'id')]
+    """
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from modules_in(inner, f"{key}.{name}".lstrip("."))
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from modules_in(inner, key)
+    elif isinstance(value, str):
+        module, colon, _ = value.replace("/", ".").partition(":")
+        is_id = key.rpartition(".")[2] == "id"
+        is_named = is_id or (bool(colon) and "." in module)
+        if is_named and all(part.isidentifier() for part in module.split(".")):
+            yield module, key
+
+
+def sha256(text: str) -> str:
+    """Return the digest by which the list knows a text."""
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,46 @@
+"""Words of messages: names that may have been meant, and values as TOML writes them."""
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from decimal import Decimal
+
+
+def near(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """Return "did you mean ...?" if a known name is near, else nothing.
+
+    Examples
+    --------
+    >>> near("chian", ["chain", "tree"]), near("ring", ["chain", "tree"])
+    ("did you mean 'chain'?", '')
+    """
+    matches = difflib.get_close_matches(str(name), list(known), n=1, cutoff=cutoff)
+    return f"did you mean {matches[0]!r}?" if matches else ""
+
+
+def closest(name: object, known: Iterable[str]) -> str:
+    """Return "did you mean ...?" if a known name is near, and the known names in any case.
+
+    Examples
+    --------
+    >>> closest("chian", ["chain", "tree"])
+    "did you mean 'chain'? known: chain, tree"
+    """
+    known = sorted(known)
+    return f"{near(name, known)} known: {', '.join(known) or 'none'}".lstrip()
+
+
+def show(value: object, width: int | None = 60) -> str:
+    """Return a value as TOML would write it, shortened to `width` characters if that is given."""
+    if isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, int) and abs(value) >= 10**100:
+        text = f"{Decimal(value):.3e}"  # Python writes some thousand digits at most
+    elif isinstance(value, str):
+        text = repr(value)
+    elif isinstance(value, Mapping):
+        text = "{" + ", ".join(f"{k} = {show(v, width)}" for k, v in value.items()) + "}"
+    elif isinstance(value, Sequence):
+        text = "[" + ", ".join(show(v, width) for v in value) + "]"
+    else:
+        text = str(value)
+    return text if width is None or len(text) <= width else text[: width - 3] + "..."

@@ -1,0 +1,395 @@
+"""How the settings of conditions come about: a preset, tables, overrides and sweeps, in layers.
+
+Every override by name is crossed with its own sweep and with the spec's; without overrides the
+spec's tables alone are. Layers, each over the one before: the defaults of the settings, the preset,
+what the scenario lays over it, the spec's tables, the override's tables, the point of the sweeps.
+
+Keys of the preset and of the scenario give way to a kind that a user has chosen and that has not,
+or refuses, what they say; keys that the user wrote are refused.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+from pydantic import ValidationError
+
+from ...core.agents.joint import Granularity
+from ...core.decision.settings import DecisionSettings
+from ...core.evaluators.best_response import BestResponseSettings
+from ...core.evaluators.coordination import MaxPlusSettings, VariableEliminationSettings
+from ...core.learners import LearnerSettings, TeamSettings
+from ...core.learners.batch import MOST_RULES, BatchTDSettings
+from ...core.learners.fitted_q import FittedQSettings
+from ...core.plugins.problems import explain, misplaced, problems_of
+from ...core.plugins.settings import ScenarioSettings, Settings, tuples
+from ...core.plugins.words import closest, show
+from ...topologies.config import parse
+from ..errors import SpecError, refused
+from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings
+from .presets import PRESETS
+from .tables import TomlTable, flat, label, nested, overlay, scalar, without
+
+SECTIONS = ("scenario", "topology", "learner")
+
+Layer = Mapping[str, Any]
+"""A table, or a point of a sweep, that is laid over what is below it."""
+Layers = Sequence[Layer]
+"""Tables, each over the one before."""
+
+
+class Sections(Protocol):
+    """What has tables of its own: a spec, or an override."""
+
+    @property
+    def scenario(self) -> Layer:
+        """Laid over the scenario below."""
+
+    @property
+    def topology(self) -> Layer:
+        """Laid over the topology below."""
+
+    @property
+    def learner(self) -> Layer:
+        """Laid over the learner below."""
+
+    @property
+    def agents(self) -> Granularity | None:
+        """In place of those below; None: those below."""
+
+
+def layer_of(own: Sections) -> TomlTable:
+    """Return what a spec or an override lays over what is below it: its sections and agents."""
+    layer: TomlTable = {
+        "scenario": dict(own.scenario),
+        "topology": dict(own.topology),
+        "learner": dict(own.learner),
+    }
+    return layer if own.agents is None else layer | {"agents": own.agents}
+
+
+def below(table: Layer) -> tuple[type[Settings], TomlTable]:
+    """Return the model of conditions, and what they have at least of a spec's table and preset.
+
+    Nothing is known of the kinds of an override's, whose table is empty here.
+    """
+    preset = PRESETS.get(str(table.get("preset", "default")), PRESETS["default"])
+    own = {name: table[name] for name in SECTIONS if isinstance(table.get(name), Mapping)}
+    return ConditionSettings, _lay([preset.table, own]) if table else {}
+
+
+def grid(
+    preset: str,
+    spec: Sections,
+    sweep: Mapping[str, Sequence[Any]],
+    overrides: Sequence[Override] = (),
+    evaluations: Mapping[str, Layer] | None = None,
+    curriculum: Sequence[StageSettings] = (),
+) -> tuple[Condition, ...]:
+    """Return the conditions: override by override, the last key of the sweeps varying fastest.
+
+    Parameters
+    ----------
+    preset
+        Name of the preset under conditions that name none.
+    spec
+        What has sections of its own, which lie over the preset.
+    sweep
+        Lists of values by dotted key.
+    overrides
+        Crossed with `sweep`; none: the tables as they are.
+    evaluations
+        By name, what is laid over each condition's scenario, and under ``topology`` and
+        ``learner.decision`` over those.
+    curriculum
+        Stages before the training of conditions whose override names none.
+
+    Raises
+    ------
+    SpecError
+        If a condition is invalid, or two are the same.
+    """
+    conditions: list[Condition] = []
+    points: dict[str, tuple[str, Layer]] = {}
+    labels: set[str] = set()
+    keys = list(dict.fromkeys([*(key for o in overrides for key in o.sweep), *sweep]))
+    for override, point in _points(overrides, sweep):
+        name = label(point, override.name if override else "") or preset
+        where = f" (condition {name!r})" if point or override else ""
+        resolved = resolve(preset, layer_of(spec), point, where, override)
+        settings = resolved.settings
+        own = override.curriculum if override else None
+        stages = tuple(
+            Stage(s.name, s.episodes, _stage(settings, s.scenario, f" (stage {s.name!r}){where}"))
+            for s in (curriculum if own is None else own)
+        )
+        content = json.dumps([settings.canonical(), *(stage.table() for stage in stages)])
+        other, other_point = points.setdefault(content, (name, point))
+        if other_point is not point or name in labels:
+            raise SpecError(
+                f"{_differing(point, other_point) or ('overrides' if overrides else 'sweep')}: "
+                f"conditions {other!r} and {name!r} are the same"
+            )
+        labels.add(name)
+        columns: dict[str, Any] = {"name": override.name} if override else {}
+        columns |= {key: scalar(point[key]) if key in point else "" for key in keys}
+        evaluated = tuple(
+            (other, _reevaluation(settings, changes, f" (evaluation {other!r}){where}"))
+            for other, changes in (evaluations or {}).items()
+        )
+        columns = columns or {"preset": preset}
+        left_out = resolved.left_out, resolved.other_kinds
+        conditions.append(Condition(name, columns, settings, evaluated, stages, *left_out))
+    return tuple(conditions)
+
+
+def _differing(point: Layer, other: Layer) -> str:
+    """Return the keys of a sweep in which two points of it differ."""
+    texts, other_texts = ({k: show(v, width=None) for k, v in p.items()} for p in (point, other))
+    keys = [key for key in texts if texts[key] != other_texts.get(key, texts[key])]
+    return ", ".join(f"sweep.{key}" for key in keys)
+
+
+def _points(
+    overrides: Sequence[Override], sweep: Mapping[str, Sequence[Any]]
+) -> Iterator[tuple[Override | None, dict[str, Any]]]:
+    for override in overrides or (None,):
+        crossed = {**(override.sweep if override else {}), **sweep}
+        for values in itertools.product(*crossed.values()):
+            yield override, dict(zip(crossed, values, strict=True))
+
+
+class Resolved(NamedTuple):
+    """The settings of a condition, and what its preset says to no effect."""
+
+    settings: ConditionSettings
+    left_out: tuple[str, ...] = ()
+    """See `Condition`."""
+    other_kinds: tuple[str, ...] = ()
+    """See `Condition`."""
+
+
+def resolve(
+    preset: str,
+    tables: Layer,
+    point: Layer,
+    where: str = "",
+    override: Override | None = None,
+) -> Resolved:
+    """Return the settings of one condition, layer by layer."""
+    own_preset = override.preset if override else None
+    name = point.get("preset", preset if own_preset is None else own_preset)
+    if not isinstance(name, str) or name not in PRESETS:
+        raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
+    if own_preset is not None or "preset" in point:
+        tables = _for_preset(name, tables)
+    own = [tables, layer_of(override) if override else {}]
+    own += [nested(key, value) for key, value in point.items() if key != "preset"]
+    own = [_expand(layer) for layer in own]
+    given = PRESETS[name].table
+    scenario = _settle([_part("scenario", given)], [_part("scenario", t) for t in own], where)
+    defaults = _expand(scenario.settings.scenario.scenario_defaults(name))
+    return _settle([given, defaults], own, where)
+
+
+def _part(name: str, table: Layer) -> TomlTable:
+    """Return a section of a layer alone."""
+    return {name: table[name]} if name in table else {}
+
+
+def _for_preset(name: str, tables: Layer) -> Layer:
+    """Return a spec's tables without what tunes learning, if a preset is a control: it has not."""
+    learner = tables.get("learner", {})
+    if "kind" in learner or PRESETS[name].table["learner"]["kind"] != "frozen":
+        return tables
+    kept = {key: v for key, v in learner.items() if key in LearnerSettings.model_fields}
+    return {**tables, "learner": kept}
+
+
+def _settle(given: Layers, own: Layers, where: str) -> Resolved:
+    """Return what layers come to, those that are given without what the kinds refuse of them.
+
+    Parameters
+    ----------
+    given
+        What the user did not write: the preset, and what the scenario lays over it.
+    own
+        What the user wrote; lies over what is given.
+    where
+        Which condition it is, for messages.
+
+    Raises
+    ------
+    SpecError
+        If what the user wrote is refused, or lacks something.
+    """
+    dropped: set[str] = set()
+    while True:
+        table = _lay([*(without(layer, dropped) for layer in given), *own])
+        try:
+            settings = ConditionSettings.model_validate(tuples(table), strict=True)
+        except ValidationError as error:
+            refused_keys = [_key(problem.keys) for problem in problems_of(error, table)]
+            line = explain(error, ConditionSettings, table) + where
+        else:
+            refused_keys = [*_refused(settings.learner)]
+            line = ""
+        giving_way = {k for k in refused_keys if _says(given, k) and not _says(own, k)} - dropped
+        if giving_way:
+            dropped |= giving_way
+        elif line:
+            raise SpecError(line)
+        else:
+            return Resolved(settings, *_left_out(given, table, dropped))
+
+
+def _key(keys: Sequence[int | str]) -> str:
+    """Return the dotted key of a value, or of the list that it stands in."""
+    names = itertools.takewhile(lambda key: isinstance(key, str), keys)
+    return ".".join(map(str, names))
+
+
+def _says(layers: Layers, key: str) -> bool:
+    """Return whether any layer says something of a key, of what is in its table, or around it."""
+    written = (other for layer in layers for other, value in flat(layer) if value != {})
+    return any(f"{key}.".startswith(f"{k}.") or f"{k}.".startswith(f"{key}.") for k in written)
+
+
+def _refused(learner: TeamSettings) -> Iterator[str]:
+    """Yield the keys of a learner whose values its kinds refuse when a team is built."""
+    if not isinstance(learner, LearnerSettings):
+        return
+    usual = dict(DecisionSettings())
+    for key, value in learner.decision:
+        if key in _refused_of_decision(learner) and value != usual[key]:
+            yield f"learner.decision.{key}"
+    order = learner.rule_base.order
+    memberships = learner.rule_base.memberships
+    is_batch = isinstance(learner, BatchTDSettings | FittedQSettings)
+    if is_batch and isinstance(order, int) and (memberships or 0) ** order > MOST_RULES:
+        yield "learner.rule_base.order"
+
+
+def _refused_of_decision(learner: LearnerSettings) -> tuple[str, ...]:
+    """Return the keys of a learner's decision that must have their defaults."""
+    decision = learner.decision
+    if isinstance(learner, FittedQSettings):
+        rule = () if decision.rule == "random" else ("rule",)
+        return (*rule, "teammates", "value_of", "plan", "evaluator")
+    if decision.rule == "random":  # nothing is evaluated
+        return ()
+    if isinstance(decision.evaluator, MaxPlusSettings | VariableEliminationSettings):
+        return ("rule", "teammates", "value_of")
+    return ("teammates",) if isinstance(decision.evaluator, BestResponseSettings) else ()
+
+
+def _left_out(
+    given: Layers, table: Layer, dropped: Container[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the keys of given layers that a table is without, and the kinds that are why."""
+    written = {key for layer in given for key, value in flat(layer) if value != {}}
+    there = dict(flat(table))
+    keys = sorted(key for key in written if key in dropped or key not in there)
+    usual = dict(flat(_lay(given))) if keys else {}
+    changed = [k for k, v in there.items() if k.endswith(".kind") and usual.get(k, v) != v]
+    kinds = [kind for key in keys if (kind := _cause(key, changed)) is not None]
+    return tuple(keys), tuple(f"{kind} = {there[kind]!r}" for kind in dict.fromkeys(kinds))
+
+
+def _cause(key: str, kinds: Iterable[str]) -> str | None:
+    """Return which of some kinds a key is left out for: of its table, or else of its section."""
+    around = [kind for kind in kinds if key.startswith(kind.removesuffix("kind"))]
+    section_of_key = key.partition(".")[0]
+    beside = [kind for kind in kinds if kind.partition(".")[0] == section_of_key]
+    return max(around or beside, key=len, default=None)
+
+
+def _expand(layer: Layer) -> TomlTable:
+    """Return a layer whose sections are tables."""
+    return {key: section(key, v) if key in SECTIONS else v for key, v in layer.items()}
+
+
+def _lay(layers: Layers) -> TomlTable:
+    """Return the table of layers, each over the one before, the first over the defaults."""
+    table = ConditionSettings().model_dump()
+    for layer in layers:
+        table = overlay(table, layer, ConditionSettings)
+    return table
+
+
+def _stage(settings: ConditionSettings, changes: Layer, where: str) -> ScenarioSettings:
+    """Return a condition's scenario with changes laid over it."""
+    table = overlay(settings.model_dump(), {"scenario": dict(changes)}, ConditionSettings)
+    return _validated(table, where).scenario
+
+
+def _reevaluation(settings: ConditionSettings, changes: Layer, where: str) -> ConditionSettings:
+    """Return a condition's settings with changes laid over scenario, topology and decision."""
+    parts: TomlTable = {"scenario": dict(changes)}
+    for name in ("topology", "learner"):
+        if name in parts["scenario"]:
+            parts[name] = section(name, parts["scenario"].pop(name))
+    other = next((key for key in parts.get("learner", {}) if key != "decision"), None)
+    if other is not None:
+        raise SpecError(f"learner.{other}: a trained team may change its decision alone{where}")
+    return _validated(overlay(settings.model_dump(), parts, ConditionSettings), where)
+
+
+def _validated(table: TomlTable, where: str) -> ConditionSettings:
+    try:
+        return ConditionSettings.model_validate(tuples(table), strict=True)
+    except ValidationError as error:
+        raise SpecError(explain(error, ConditionSettings, table) + where) from None
+
+
+def section(name: str, value: object) -> TomlTable:
+    """Return the table of a section: from a table, or for a topology a string.
+
+    Examples
+    --------
+    >>> section("topology", "chain:reversed")
+    {'kind': 'chain', 'order': 'reversed'}
+    """
+    if isinstance(value, Mapping):
+        return dict(value)
+    is_topology = name.rpartition(".")[2] == "topology"
+    if not is_topology or not isinstance(value, str):
+        allowed = "a name or a table" if is_topology else "a table"
+        raise SpecError(f"{name} = {show(value)}: must be {allowed}")
+    with refused(name.removesuffix("topology")):
+        return parse(value).model_dump()
+
+
+def expand(table: Layer, where: str) -> TomlTable:
+    """Return a spec's or an override's table with its sections and sweep spelled out."""
+    table = dict(table)
+    for name in SECTIONS:
+        if name in table:
+            table[name] = section(f"{where}{name}", table[name])
+    reach = below({} if where else table)
+    for name in ("sweep", "tune"):
+        if isinstance(table.get(name), Mapping):
+            table[name] = dict(_sweep(table[name], f"{where}{name}", reach))
+    return table
+
+
+def _sweep(
+    table: Layer, where: str, reach: tuple[type[Settings], TomlTable]
+) -> Iterable[tuple[str, Any]]:
+    for key, values in flat(table):
+        head, _, tail = key.partition(".")
+        if key not in ("preset", "agents", "topology") and not (head in SECTIONS and tail):
+            known = [*(f"{name}.*" for name in SECTIONS), "preset", "agents", "topology"]
+            hint = misplaced(key, *reach) or closest(key, known)
+            raise SpecError(f"{where}.{key}: unknown key; {hint}")
+        if not isinstance(values, list | tuple) or not values:
+            raise SpecError(f"{where}.{key} = {show(values)}: must be a list of at least one value")
+        times = Counter(show(value, width=None) for value in values)
+        twice = next((value for value, number in times.items() if number > 1), None)
+        if twice is not None:
+            raise SpecError(f"{where}.{key} = {show(values)}: holds the same value twice, {twice}")
+        yield key, values
