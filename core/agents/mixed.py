@@ -12,6 +12,7 @@ from fnmatch import fnmatchcase
 from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from ..hierarchy.failures import Names
 from ..hierarchy.hierarchy import Hierarchy

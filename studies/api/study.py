@@ -32,7 +32,6 @@ from ..errors import SpecError
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import published
 from ..results.contrasts import contrasts
-from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
 from ..results.results import Results, chosen, read, together
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..spec.tables import TomlTable
@@ -147,12 +146,9 @@ class StudyResults:
 
     @property
     def power(self) -> tuple[str, ...]:
-        """What comparisons with the first condition can find, supposing a usual deviation."""
-        comparisons = len(self.conditions) - 1
-        if comparisons < 1:
-            return ()
-        seeds = min(len(self.results.seeds(condition)) for condition in self.conditions)
-        return tuple(power_text(seeds, comparisons, USUAL_DEVIATION, SMALLEST))
+        """What comparisons with the first condition can find, as `compare` says it."""
+        is_measured = SUCCESS.name in (measure.name for measure in self.results.measures)
+        return contrasts(self.results).power if is_measured else ()
 
     @cached_property
     def analysis(self) -> Any:

@@ -248,6 +248,11 @@ class Analysis:
 
 
 NOTHING = "Nothing to compare: no two conditions share two seeds."
+TWO_TESTS = (
+    "An interval is of one difference alone, and p is of permuted signs and adjusted over all: "
+    "where they seem to disagree about 0, p decides."
+)
+"""Said once where an interval and p seem to contradict each other."""
 
 
 def verdict_lines(
@@ -268,12 +273,14 @@ def verdict_lines(
 def verdicts(
     groups: Mapping[str, Sequence[Difference]],
     better: str | None = "higher",
+    measure: str = "",
     *,
     of_rates: bool = True,
 ) -> list[str]:
     """Return the verdicts of groups below their heads, how p is adjusted, and `power_lines`.
 
-    No lines if nothing is compared. p must be adjusted over all groups.
+    No lines if nothing is compared. p must be adjusted over all groups. Of what the power is, a
+    `measure` says; without, those of the differences.
     """
     compared = [d for group in groups.values() for d in group]
     lines = []
@@ -284,7 +291,17 @@ def verdicts(
     if compared:
         counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
         lines.append(f"p: permutation of signs over seeds, adjusted over {counted} (Holm).")
-    return lines + power_lines([d.sample for d in compared], of_rates=of_rates)
+    if any(map(_seems_contradicted, compared)):
+        lines += wrap(TWO_TESTS, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    measure = measure or " or ".join(dict.fromkeys(d.measure for d in compared))
+    return lines + power_lines([d.sample for d in compared], measure, of_rates=of_rates)
+
+
+def _seems_contradicted(difference: Difference) -> bool:
+    """Return whether an interval and p seem to say different things of a difference."""
+    e = difference.estimate
+    is_beside_zero = bool(e.low > 0.0 or e.high < 0.0)
+    return is_beside_zero != (difference.p < LEVEL)
 
 
 def judged(

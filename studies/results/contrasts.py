@@ -9,6 +9,7 @@ from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
 from .analysis import NOTHING, BySeed, Difference, Summary, differences, identity_lines, verdicts
+from .power import power_lines
 from .results import SECONDS, Results, shown
 from .statistics import Array, Estimate, bootstrap, rate
 
@@ -68,8 +69,20 @@ class Contrasts(NamedTuple):
         for group in self.groups:
             head = ": ".join(filter(None, (group.setting, self.title)))
             groups[f"{head}, less that of {group.reference}"] = group.differences
-        lines = verdicts(groups, self.measure.better, of_rates=self.measure.is_rate) or [NOTHING]
-        return (*lines, *identity_lines(self.identical))
+        is_rate = self.measure.is_rate
+        lines = verdicts(groups, self.measure.better, self._of_phase, of_rates=is_rate)
+        return (*(lines or [NOTHING]), *identity_lines(self.identical))
+
+    @property
+    def _of_phase(self) -> str:
+        """What is compared, to be read in a sentence."""
+        return f"{self.phase} {self.measure.heading}".strip()
+
+    @property
+    def power(self) -> tuple[str, ...]:
+        """What the comparisons could have detected, line by line."""
+        samples = [d.sample for d in self.differences]
+        return tuple(power_lines(samples, self._of_phase, of_rates=self.measure.is_rate))
 
 
 def contrasts(

@@ -19,6 +19,7 @@ from ..errors import SpecError
 from ..spec.outline import StudyOutline
 from ..store.database import RESULTS_VERSION, tables
 from ..store.database import SECONDS as PARTS
+from ..store.durable import read_text
 from . import marl_eval
 from .json_values import JsonValue, parse
 from .results import SECONDS, Array, Results, from_arrays
@@ -122,7 +123,7 @@ def load(path: Path) -> Published:
         If it is not what `dumps` writes.
     """
     try:
-        return loads(path.read_text(encoding="utf-8"))
+        return loads(read_text(path))
     except (OSError, ValueError, RecursionError) as error:
         raise SpecError(f"{path}: holds no published results: {error}") from None
 

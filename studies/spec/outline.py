@@ -19,6 +19,7 @@ from ...core.plugins.sources import Sources, meaning
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..store.database import DATABASE, SPEC_FILE
+from ..store.durable import read_text
 from ..store.store import Store
 
 if TYPE_CHECKING:
@@ -123,14 +124,16 @@ def other_spec(store: Store) -> str | None:
     if not path.exists():
         return None
     try:
-        copy = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        copy = tomllib.loads(read_text(path))
         if copy != own:
             from .spec import Spec
             from .tables import dumps
 
             copy = tomllib.loads(dumps(Spec.of(copy, sources_of(store)).table()))
             own = tomllib.loads(dumps(own))  # without what is None
-    except (OSError, ValueError, RecursionError) as error:
+    except OSError as error:
+        return f"{path}: is not the spec of {DATABASE} beside it: {error.strerror or error}"
+    except (ValueError, RecursionError) as error:
         return f"{path}: is not the spec of {DATABASE} beside it: {error}"
     for key in sorted(own.keys() | copy.keys()):
         here = copy.get(key, "absent")

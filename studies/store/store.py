@@ -281,7 +281,7 @@ class Store:
             for name, content in files.items():
                 kept = directory / name
                 kept.parent.mkdir(exist_ok=True)
-                if not kept.exists() or kept.read_bytes() != content:
+                if not kept.exists() or durable.read_bytes(kept) != content:
                     durable.write(kept, content)
             store._code = noted.code_digest
             yield store

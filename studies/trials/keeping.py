@@ -17,6 +17,7 @@ from ..spec.spec import Spec
 from ..spec.tables import aliases, dumps, flat, named
 from ..store.connection import DamageError
 from ..store.database import DATABASE, SPEC_FILE, NoStudyError, Noted
+from ..store.durable import read_text
 from ..store.store import Store
 from ..store.writer import locked
 from .episodes import column_of
@@ -175,7 +176,7 @@ def _examine(
 def is_copy(path: Path, spec: Spec, noted: Noted) -> bool:
     """Tell whether a file holds a spec; what the spec names of users' files is not read again."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        table = tomllib.loads(read_text(path))
         return table == noted.spec or Spec.of(table, spec.sources) == spec
     except (OSError, ValueError, RecursionError):
         return False

@@ -54,7 +54,7 @@ def analyse(results: Results) -> Analysis:
                 e = d.estimate
                 interval = f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
                 notes.append(f"  {d.condition}: {interval}, p = {d.p:.2g} (adjusted)")
-            notes += power_lines([d.sample for d in compared])
+            notes += power_lines([d.sample for d in compared], "evaluation success")
     return Analysis(tuple(table), tuple(notes), ratios)
 
 
