@@ -126,7 +126,8 @@ class Plan:
                 f"differences of single seeds are taken to deviate by {self.deviation:g}."
             )
             yield from wrap(text, WIDTH)
-        yield from self.warnings
+        for warning in self.warnings:
+            yield from wrap(warning, WIDTH)
 
 
 def plan(
