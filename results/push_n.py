@@ -33,6 +33,7 @@ from ..studies.results.analysis import Summary
 from ..studies.results.results import Results
 from ..studies.results.statistics import NOT_NEGATIVE, bootstrap, rate
 from ..studies.spec.spec import Spec
+from ..studies.store import durable
 from ..studies.trials.session import EVALUATION_WORLDS
 from . import ROWS
 
@@ -110,7 +111,7 @@ def load_entry(path: Path) -> Entry:
         If it cannot be read or breaks a rule; one line.
     """
     try:
-        return Entry(**tuples(json.loads(path.read_text(encoding="utf-8"))))
+        return Entry(**tuples(json.loads(durable.read_text(path))))
     except TypeError:  # it is a list
         raise SpecError(f"{path}: must be one table with the keys of an entry") from None
     except (ValueError, RecursionError) as error:  # of JSON, or of a rule

@@ -29,8 +29,8 @@ def printable(text: str) -> str:
 
     Examples
     --------
-    >>> print(printable("plain\N{NO-BREAK SPACE}text, \x1b[31mred, \u202edesrever\r"))
-    plain\xa0text, \x1b[31mred, \u202edesrever\r
+    >>> print(printable("plain, \x1b[31mred, \u202ereversed\r"))
+    plain, \x1b[31mred, \u202ereversed\r
     """
     if text.isprintable():
         return text

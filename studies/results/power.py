@@ -276,9 +276,7 @@ def power_text(
     return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 
 
-def power_lines(
-    samples: Sequence[Array], measure: str = "", *, of_rates: bool = True
-) -> list[str]:
+def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool = True) -> list[str]:
     """Return lines on which differences comparisons could find, and how many seeds it takes.
 
     Parameters

@@ -39,6 +39,7 @@ from ...topologies import TOPOLOGIES
 from ...topologies.builders import join_names
 from ..errors import SpecError, refused
 from ..store.database import DATABASE, SPEC_FILE
+from ..store.durable import read_text
 from .conditions import Condition, Curriculum, Length, Name, Override
 from .layers import below, expand, grid, section
 from .presets import PRESETS
@@ -312,7 +313,7 @@ class Spec(Settings):
         """
         path = Path(path)
         try:
-            text = path.read_text(encoding="utf-8-sig")
+            text = read_text(path)
         except OSError as error:
             raise SpecError(f"{path}: {error.strerror or error}") from None
         except UnicodeDecodeError:

@@ -1,8 +1,10 @@
 """Files that are there whole or not at all, and recordings kept in them."""
 
+import errno
 import hashlib
 import io
 import os
+import stat
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -27,6 +29,51 @@ TEAM = "team"
 
 class NotRecordedError(SpecError):
     """A file of recordings is sound, and holds none of this name."""
+
+
+MOST_BYTES = 2**30
+"""Of a file that is read whole."""
+
+
+def check_file(path: Path) -> None:
+    """Refuse what has no end or makes its reader wait: a pipe, a device, a file of a terabyte.
+
+    Raises
+    ------
+    OSError
+        If it is such, or is not there.
+    """
+    status = path.stat()
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+        raise OSError(errno.EINVAL, "is a pipe, a socket or a device, not a file", str(path))
+    if status.st_size > MOST_BYTES:
+        raise OSError(errno.EFBIG, f"is larger than allowed, {MOST_BYTES} bytes", str(path))
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file.
+
+    Raises
+    ------
+    OSError
+        If it is none, see `check_file`, or cannot be read.
+    """
+    check_file(path)
+    return path.read_bytes()
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file in UTF-8; a mark of the order of bytes is left out.
+
+    Raises
+    ------
+    OSError
+        If it is none, see `check_file`, or cannot be read.
+    UnicodeDecodeError
+        If it is no such text.
+    """
+    check_file(path)
+    return path.read_text(encoding="utf-8-sig")
 
 
 def write(path: Path, content: bytes) -> None:
@@ -74,7 +121,7 @@ def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str:
 def sha256(path: Path) -> str | None:
     """Return the SHA-256 of a file; none if it cannot be read."""
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return hashlib.sha256(read_bytes(path)).hexdigest()
     except OSError:
         return None
 
@@ -100,7 +147,7 @@ def read_recording(path: Path, name: str, digest: str | None = None) -> Recordin
     """
     prefix = f"{name}/"
     try:
-        content = path.read_bytes()
+        content = read_bytes(path)
         if digest not in (None, hashlib.sha256(content).hexdigest()):
             raise SpecError(f"{path}: is damaged")
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ..errors import SpecError
+from . import durable
 from .connection import NO_LOCKS, NoLocksError
 
 LOCK = ".lock"
@@ -19,7 +20,7 @@ MARK = "running.json"
 
 
 @contextmanager
-def locked(directory: Path) -> Iterator[None]:
+def lock_directory(directory: Path) -> Iterator[None]:
     """Keep others from writing to a directory, which is made if it does not exist.
 
     Raises
@@ -30,6 +31,8 @@ def locked(directory: Path) -> Iterator[None]:
     try:
         for folder in (directory, directory / "recordings"):
             folder.mkdir(parents=True, exist_ok=True)
+        if (directory / LOCK).exists():
+            durable.check_file(directory / LOCK)
         lock = open(directory / LOCK, "w")  # noqa: SIM115 - held until the context ends
     except OSError as error:
         raise SpecError(f"{error.filename}: {error.strerror or error}") from None
@@ -98,6 +101,7 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
         How many trials run at a time, and by identity how long each has been running so far [s].
     """
     try:
+        durable.check_file(directory / LOCK)
         with open(directory / LOCK) as lock:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
         return None
@@ -106,7 +110,7 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
     except OSError:
         return None
     try:
-        mark = json.loads((directory / MARK).read_text())
+        mark = json.loads(durable.read_text(directory / MARK))
         now = time.time()
         seconds = {identity: max(now - begun, 0.0) for identity, begun in mark["begun"].items()}
         return mark["processes"], seconds

@@ -8,6 +8,7 @@ import pytest
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.td import FrozenSettings
 from nested_agents.core.networks.settings import DQNSettings
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
@@ -79,14 +80,15 @@ def test_settings_say_whether_they_need_predictions() -> None:
 class Unpredicted(LineUp):
     """Carts of which nothing is predicted."""
 
-    predict = property()  # type: ignore[assignment]  # which raises AttributeError
-    with_exact_prediction = property()  # type: ignore[assignment]
+    predict = Scenario.predict
+    with_exact_prediction = Scenario.with_exact_prediction
 
 
 def test_joint_agents_predict_what_their_scenario_predicts() -> None:
     mute = Unpredicted(LineUpSettings())
-    assert hasattr(join_agents(LineUp(LineUpSettings()), "team"), "predict")
-    assert not hasattr(join_agents(mute, "team"), "predict")
+    assert join_agents(LineUp(LineUpSettings()), "team").predicts
+    assert not join_agents(mute, "team").predicts
+    assert join_agents(mute, "team").predict() is None
     findings = check_scenario(lambda: Unpredicted(LineUpSettings()))
     assert set(CHECKS) - set(findings.passed) == {"predictions", "sensed and predicted"}
     with pytest.raises(ValueError, match="has no method predict"):

@@ -8,7 +8,7 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 import numpy as np
 
-from ...results.analysis import Analysis, Difference, Figures, Summary, adjusted, ratio
+from ...results.analysis import Analysis, Difference, Figures, Summary, adjust, ratio
 from ...results.power import power_lines
 from ...results.results import Results
 from ...results.statistics import bootstrap, rate
@@ -68,7 +68,7 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
         outcomes = results.success(condition, phase)
         estimate = ratio(outcomes, base)
         pairs.append((box, "ratio", outcomes.mean(axis=1), base.mean(axis=1), estimate))
-    return adjusted(pairs)
+    return adjust(pairs)
 
 
 def draw(analysis: Analysis) -> Figures:
