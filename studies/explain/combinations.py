@@ -25,7 +25,7 @@ Table = Mapping[str, Any]
 """A spec, or what is laid over it."""
 
 
-class World(NamedTuple):
+class Setting(NamedTuple):
     """Where the cells of a learner are run."""
 
     scenario: Table
@@ -39,10 +39,10 @@ class World(NamedTuple):
 
 
 BOX: Table = {"kind": "box-pushing", "robots": 2}
-LINE = World({"kind": "line-up", "carts": 3}, "carts", "cart1", BOX)
+LINE = Setting({"kind": "line-up", "carts": 3}, "carts", "cart1", BOX)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "worlds"
 PLAYERS: Table = {"kind": f"{EXAMPLES / 'levers.py'}:Levers", "players": 3}
-LEVERS = World(PLAYERS, "players", "player1", PLAYERS)
+LEVERS = Setting(PLAYERS, "players", "player1", PLAYERS)
 """For Q-learning: a state holds what was done. Every player is a body."""
 NETWORK: Table = {"hidden": [8], "batch_size": 4}
 POLICY: Table = {**NETWORK, "rollout": 4, "epochs": 1}
@@ -142,7 +142,7 @@ NO_PREDICTOR = "learner.predictor: networks predict nothing, so there is nothing
 """Said of a key that settings of networks do not have."""
 
 
-class Outcome(NamedTuple):
+class Found(NamedTuple):
     """What has come of a cell."""
 
     verdict: Literal["yes", "left out", "no"]
@@ -151,13 +151,13 @@ class Outcome(NamedTuple):
     """Why, unless it runs."""
 
 
-class Cell(NamedTuple):
+class Combination(NamedTuple):
     """A learner, a case of an axis, and what has come of it."""
 
     axis: str
     case: str
     learner: str
-    outcome: Outcome
+    outcome: Found
 
 
 def spec_of(learner: str, changes: Table) -> dict[str, Any]:
@@ -202,7 +202,7 @@ def _filled(value: Any, words: Mapping[str, Any]) -> Any:
     return words.get(value, value) if isinstance(value, str) else value
 
 
-def attempt(table: Table) -> Outcome:
+def attempt(table: Table) -> Found:
     """Run a cell.
 
     Raises
@@ -216,7 +216,7 @@ def attempt(table: Table) -> Outcome:
     except SpecError as error:
         message = str(error)
         is_unknown = message.startswith("learner.predictor") and "unknown key" in message
-        return Outcome("no", NO_PREDICTOR if is_unknown else message)
+        return Found("no", NO_PREDICTOR if is_unknown else message)
     (trial,) = trials_of(spec)
     result = run_trial(trial)
     if trial.keep_teams:
@@ -227,10 +227,10 @@ def attempt(table: Table) -> Outcome:
             raise RuntimeError(f"{trial.settings.learner.kind}: the kept team acts otherwise")
     others = [other for _, other in trial.evaluations]
     warnings = [line for each in (trial.settings, *others) for line in each.warnings()]
-    return Outcome("left out", warnings[0]) if warnings else Outcome("yes")
+    return Found("left out", warnings[0]) if warnings else Found("yes")
 
 
-def cells(learners: Sequence[str] = ()) -> Iterator[Cell]:
+def cells(learners: Sequence[str] = ()) -> Iterator[Combination]:
     """Run the cells of some learners, or of all that are built in, and yield them axis by axis.
 
     Raises
@@ -244,4 +244,4 @@ def cells(learners: Sequence[str] = ()) -> Iterator[Cell]:
     for axis, cases in AXES.items():
         for learner in learners or LEARNERS.built_in:
             for case, changes in cases.items():
-                yield Cell(axis, case, learner, attempt(spec_of(learner, changes)))
+                yield Combination(axis, case, learner, attempt(spec_of(learner, changes)))
