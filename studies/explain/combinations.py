@@ -236,8 +236,10 @@ def cells(learners: Sequence[str] = ()) -> Iterator[Combination]:
     Raises
     ------
     SpecError
-        If there is no such learner.
+        If there is no such learner, or this is no checkout: a world is one of the examples.
     """
+    if not EXAMPLES.is_dir():
+        raise SpecError(f"{EXAMPLES}: is not there; combine runs in a checkout alone")
     unknown = [name for name in learners if name not in LEARNERS.built_in]
     if unknown:
         raise SpecError(f"{unknown[0]}: unknown learner; {closest(unknown[0], LEARNERS.built_in)}")

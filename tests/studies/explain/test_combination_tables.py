@@ -7,16 +7,16 @@ import pytest
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import WIDTH
 from nested_agents.studies.explain.combination_tables import write
-from nested_agents.studies.explain.combinations import AXES, Cell, Outcome
+from nested_agents.studies.explain.combinations import AXES, Combination, Found
 
 
 def test_sentences_are_numbered_once_for_all_learners() -> None:
     left_out = [f"topology: left out, learner.kind = {name!r} tells nobody" for name in "ab"]
     made = [
-        Cell("predictor", "given", "a", Outcome("yes")),
-        Cell("predictor", "static", "a", Outcome("left out", left_out[0])),
-        Cell("predictor", "given", "b", Outcome("left out", left_out[1])),
-        Cell("predictor", "static", "b", Outcome("no", "other")),
+        Combination("predictor", "given", "a", Found("yes")),
+        Combination("predictor", "static", "a", Found("left out", left_out[0])),
+        Combination("predictor", "given", "b", Found("left out", left_out[1])),
+        Combination("predictor", "static", "b", Found("no", "other")),
     ]
     lines = list(write(made))
     assert [line.split() for line in lines[:3]] == [
