@@ -7,7 +7,7 @@ from itertools import groupby
 from textwrap import fill
 
 from ..errors import WIDTH
-from .combinations import AXES, Cell
+from .combinations import AXES, Combination
 
 MARKS = {"yes": "yes", "left out": "out", "no": "no"}
 LEGEND = (
@@ -16,7 +16,7 @@ LEGEND = (
 )
 
 
-def write(cells: Iterable[Cell], *, markdown: bool = False) -> Iterator[str]:
+def write(cells: Iterable[Combination], *, markdown: bool = False) -> Iterator[str]:
     """Yield the tables, axis by axis, and the sentences, line by line."""
     sentences: dict[str, int] = {}
     for axis, of_axis in groupby(cells, lambda cell: cell.axis):
@@ -33,7 +33,7 @@ def write(cells: Iterable[Cell], *, markdown: bool = False) -> Iterator[str]:
         yield line if markdown else fill(line, WIDTH, subsequent_indent="    ")
 
 
-def _mark(cell: Cell, sentences: dict[str, int]) -> str:
+def _mark(cell: Combination, sentences: dict[str, int]) -> str:
     """Return what stands in a cell; its sentence is numbered, once for all learners alike."""
     verdict, sentence = cell.outcome
     if not sentence:
