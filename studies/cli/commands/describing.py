@@ -190,7 +190,7 @@ def combine(learners: tuple[str, ...], form: str) -> int:
 
     say("running a few decisions of every combination, first compiling what is not")
     for line in write(cells(learners), markdown=form == "markdown"):
-        print(line)
+        print_text(line)
     return 0
 
 
