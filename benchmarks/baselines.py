@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.learners.td import TDLambda
 from nested_agents.core.numerics import FloatArray, IntArray
 
@@ -30,7 +31,7 @@ class Baselines:
     """
 
     def __init__(self, situation: Moment) -> None:
-        learner = situation.team.learner
+        learner = situation.team.only(FuzzyAgents).learner
         assert isinstance(learner, TDLambda)
         self.situation, self.settings, self.rules = situation, learner.settings, learner.rules
         self.theta = aligned(learner.theta)

@@ -16,6 +16,8 @@ from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import policy_seed, world_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.interface.experience import Experience, Observation
+from nested_agents.core.interface.prediction import EmbodiedPrediction
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -43,34 +45,32 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
     )
     hierarchy = build(parse("chain"), scenario.agents, scenario.groups)
     team = Team(settings, scenario, hierarchy, policy_seed(SEED))
-    assert team.only(FuzzyAgents).foresight.calibration is not None
+    foresight = team.only(FuzzyAgents).foresight
+    assert foresight.calibration is not None
     load_per_stiffness = belief["load"] / belief["stiffness"]
     right = -np.log([load_per_stiffness, load_per_stiffness, belief["contact_friction"]])
     beliefs, errors = [], []
     for episode in range(episodes):
-        scenario.reset(world_seed(SEED, episode), episode)
+        states = scenario.reset(world_seed(SEED, episode), episode)
         team.begin_episode()
-        prediction = team.predict(scenario)
         for step in range(STEPS):
-            joint = team.act(prediction)
-            tried = np.array(
-                [np.zeros(3), team.only(FuzzyAgents).foresight.calibration.constants, right]
-            )
-            predicted = prediction.outcomes(joint, tried)  # type: ignore[attr-defined]
-            transition = scenario.step(joint)
-            team.adapt(prediction, joint, transition)
+            seen = Observation(states, scenario)
+            prediction = foresight.predict(seen)
+            assert isinstance(prediction, EmbodiedPrediction)
+            decision = team.act(seen)
+            tried = np.array([np.zeros(3), foresight.calibration.constants, right])
+            predicted = prediction.outcomes(decision.joint_action, tried)
+            transition = scenario.step(decision.joint_action)
+            last = transition.terminated or transition.truncated or step == STEPS - 1
+            team.learn(Experience(seen, decision, transition, last))
             box, *bodies = transition.twists
             if len(bodies) == len(scenario.groups) and np.hypot(*box[:2]) > 0.002:
                 off = np.hypot(*(predicted[:, 0] - box)[:, :2].T)
                 errors.append(1000 * off * scenario.settings.action_repeat * 0.064)
-                beliefs.append(
-                    np.exp(team.only(FuzzyAgents).foresight.calibration.constants - right)
-                )
-            prediction = team.predict(scenario)
-            team.learn(transition)
-            if transition.terminated or transition.truncated or step == STEPS - 1:
+                beliefs.append(np.exp(foresight.calibration.constants - right))
+            states = transition.states
+            if last:
                 break
-        team.end_episode()
     return np.array(beliefs), np.array(errors)
 
 

@@ -15,14 +15,13 @@ from time import process_time, thread_time
 from typing import Any, NamedTuple
 
 import numpy as np
-from acting import joint_of
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.core.agents.team import of_fuzzy_agents
+from nested_agents.core.interface.experience import Observation
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
@@ -51,17 +50,18 @@ def timed(settings: dict[str, Any], number: int) -> Timed:
     begun = process_time()
     (trial,) = trials_of(Spec.of({"seeds": 1, **settings}))
     session = Session(trial)
-    scenario, team = session.scenario, of_fuzzy_agents(session.team)
+    scenario = session.scenario
+    team = session.team
     built = process_time() - begun
     theta = team.only(FuzzyAgents).learner.theta
     theta[:] = np.random.default_rng(0).normal(size=theta.shape)
-    scenario.reset(world_seed(0, 0), 0)
+    states = scenario.reset(world_seed(0, 0), 0)
     deciding, stepping = [], []
     for _ in range(WARM + number):
         begun = thread_time()
-        actions = joint_of(team, scenario)
+        actions = team.act(Observation(states, scenario)).joint_action
         decided = thread_time()
-        scenario.step(actions)
+        states = scenario.step(actions).states
         deciding.append(decided - begun)
         stepping.append(thread_time() - decided)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

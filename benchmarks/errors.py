@@ -68,7 +68,7 @@ def errors(
     samples: dict[str, list[tuple[float, float]]] = {}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         team = Team(BatchTDSettings(decision=decision), scenario, hierarchy, policy_seed(seed))
-        rules = team.only(FuzzyAgents).learner.rules  # type: ignore[attr-defined]
+        rules = team.only(FuzzyAgents).rules
         problem = DecisionProblem(
             rules, hierarchy, len(scenario.action_set), scenario.groups, "value", teammates, 0.95,
         )  # fmt: skip
@@ -79,7 +79,7 @@ def errors(
         for record in control_loop(scenario, team, episodes=TRAINING + 1, steps=steps, seed=seed):
             if record.episode < TRAINING or record.step % EVERY or record.last:
                 continue
-            prediction = team.predict(scenario)
+            prediction = scenario.predict()
             for agent in range(n):
                 known = np.full(n, neutral)
                 known[:agent] = record.joint_action[:agent]

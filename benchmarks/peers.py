@@ -12,11 +12,12 @@ from time import thread_time
 from typing import Any
 
 import numpy as np
-from acting import joint_of
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from nested_agents.core.interface.experience import Experience, Observation
+from nested_agents.core.networks.policies import HierarchyPPO
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
@@ -40,7 +41,8 @@ def acting(joints: int, topology: str) -> tuple[Any, Any, Any]:
 def decisions(joints: int, topology: str, number: int) -> list[float]:
     """Return the processor's time [s] of so many decisions."""
     scenario, team, states = acting(joints, topology)
-    seen, taken = team.predict(scenario, states), []
+    seen = Observation(states, scenario)
+    taken = []
     for _ in range(number):
         begun = thread_time()
         team.act(seen)
@@ -53,13 +55,16 @@ def updates(rounds: int) -> dict[str, list[float]]:
     teams, taken = {name: acting(UPDATED, name) for name in TOPOLOGIES}, {}
     for _ in range(rounds):
         for name, (scenario, team, states) in teams.items():
-            buffer = team.parts["all"].model.rollout_buffer
-            while not buffer.full:
-                joint_of(team, scenario, states)
-                team.learn(transition := scenario.step(np.zeros(UPDATED, dtype=int)))
+            buffer = team.only(HierarchyPPO).policies["all"].model.rollout_buffer
+            last = False
+            while not last:
+                last = buffer.pos == buffer.buffer_size - 1
+                seen = Observation(states, scenario)
+                decision = team.act(seen)
+                transition = scenario.step(np.zeros(UPDATED, dtype=int))
                 states = transition.states
-            begun = thread_time()
-            team.end_episode()
+                begun = thread_time()
+                team.learn(Experience(seen, decision, transition, last))
             taken.setdefault(name, []).append(thread_time() - begun)
     return taken
 

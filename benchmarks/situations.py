@@ -12,6 +12,7 @@ import numpy as np
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.experience import Observation
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.td import TDLambda
@@ -45,6 +46,8 @@ class Moment:
     states: FloatArray
     """Two successive states ``(2, n, d)`` and the rewards ``(2,)`` on entering them."""
     rewards: FloatArray
+    side: int = 0
+    """Which of the two has been entered last."""
 
     @property
     def joint_actions(self) -> int:
@@ -53,7 +56,8 @@ class Moment:
 
     def act(self) -> IntArray:
         """Decide greedily in the moment, from the tables that the prediction already holds."""
-        return self.team.act(self.prediction, explore=False)
+        seen = Observation(self.states[1], self.scenario, imagined=self.prediction)
+        return self.team.act(seen, explore=False).joint_action
 
     def predict_and_act(self) -> IntArray:
         """Predict anew and decide."""
@@ -64,8 +68,8 @@ class Moment:
         """Make one TD update of all agents."""
         learner = self.team.only(FuzzyAgents).learner
         assert isinstance(learner, TDLambda)
-        self._side = 1 - getattr(self, "_side", 0)
-        learner.observe(self.states[self._side], float(self.rewards[self._side]), False)
+        self.side = 1 - self.side
+        learner.observe(self.states[self.side], float(self.rewards[self.side]), False)
 
     def step(self) -> None:
         """Decide and learn."""

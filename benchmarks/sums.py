@@ -24,6 +24,7 @@ import numpy as np
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.coordination.graphs import Elimination, MaxPlus, Scope
+from nested_agents.core.interface.experience import Observation
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.numerics import FloatArray, IntArray
 from nested_agents.studies.spec.spec import Spec
@@ -107,13 +108,16 @@ def situations(robots: int, seed: int, episodes: int) -> Iterator[tuple[Session,
     session = Session(trial)
     session.train(episodes)
     for episode in range(2):
-        session.scenario.reset(world_seed(seed, EVALUATION_WORLDS + episode), episode)
+        world = world_seed(seed, EVALUATION_WORLDS + episode)
+        states = session.scenario.reset(world, episode)
         for step in range(100):
-            prediction = session.team.predict(session.scenario)
+            seen = Observation(states, session.scenario)
             if step % EVERY == 0:
-                yield session, prediction
-            joint_action = session.team.act(prediction, explore=False)
-            if session.scenario.step(joint_action).terminated:
+                yield session, session.scenario.predict()
+            decision = session.team.act(seen, explore=False)
+            transition = session.scenario.step(decision.joint_action)
+            states = transition.states
+            if transition.terminated:
                 break
 
 

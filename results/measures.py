@@ -21,7 +21,7 @@ from ..studies.results.analysis import (
     difference,
     paired_difference,
     ratio,
-    shared,
+    select_shared,
 )
 from ..studies.results.results import Results, Sizes
 from ..studies.results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate
@@ -162,7 +162,7 @@ def gained_by_edges(results: Results, edges: str, less: str) -> Measured | None:
     pairs = [(of[edges], of[less]) for of in by_game.values() if {edges, less} <= of.keys()]
     if not pairs:
         return None
-    success_of = shared([results.means(c, "evaluation") for pair in pairs for c in pair])
+    success_of = select_shared([results.means(c, "evaluation") for pair in pairs for c in pair])
     own = np.mean(success_of[::2], axis=0)
     other = np.mean(success_of[1::2], axis=0)
     return Measured(paired_difference(own, other, of_rates=True), len(own)) if len(own) else None
@@ -200,7 +200,7 @@ def lost_without(results: Results, evaluation: str) -> Measured | None:
     if not cases:
         return None
     whole, part = (
-        np.hstack(shared([results.by_seed(c, phase) for c in cases]))
+        np.hstack(select_shared([results.by_seed(c, phase) for c in cases]))
         for phase in ("evaluation", other)
     )
     return Measured(difference(whole, part), len(whole), note=f"{len(cases)} sizes")
@@ -251,7 +251,7 @@ def _paired(
     own: BySeed, base: BySeed, estimate: Callable[[Array, Array], Estimate], note: str = ""
 ) -> Measured | None:
     """Return an estimate from values and those of a reference; None if they share no seed."""
-    values = shared([own, base])
+    values = select_shared([own, base])
     return Measured(estimate(*values), len(values[0]), note=note) if len(values[0]) else None
 
 

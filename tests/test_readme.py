@@ -57,7 +57,13 @@ def test_the_table_of_the_readme_is_published(capsys: pytest.CaptureFixture[str]
         main(["table", str(edges), "--columns", "evaluation success", "--format", "markdown"]) == 0
     )
     cells = dict(re.findall(r"\| (.*?) \| 20 \| (.*?) \|", capsys.readouterr().out))
-    entries = ("as trained", "considered only, private plans", "told only", "neither")
+    entries = (
+        "as trained",
+        "considered only",
+        "told only",
+        "neither",
+        "considered only, private plans",
+    )
     for robots in (2, 4, 8):
         rates = [cells[f"{robots} robots, own, {entry}"] for entry in entries]
         assert f"| {robots} | {2 * robots} | {' | '.join(rates)} |" in PAGES["README.md"]

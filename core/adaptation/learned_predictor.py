@@ -268,9 +268,16 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         ranges[1] = np.maximum(ranges[1], present.max(axis=0))
         passes = PASSES if self.settings.midpoint else 1
         moved = driven_states(
-            present, np.ascontiguousarray(drivers), m["weights"], m["keep"],
-            ranges, self.periods[columns], self.horizon, passes, bodies.rules.layout,
-        )  # fmt: skip
+            present,
+            np.ascontiguousarray(drivers),
+            m["weights"],
+            m["keep"],
+            ranges,
+            self.periods[columns],
+            self.horizon,
+            passes,
+            bodies.rules.layout,
+        )
         body, place = bodies.places
         return np.ascontiguousarray(np.moveaxis(moved[:, body, place], 0, 1))
 

@@ -216,10 +216,17 @@ class DrivenBodies:
 
 
 @njit(cache=True)
-def driven_states(  # type: ignore[no-untyped-def]
-    present, drivers: FloatArray, weights: FloatArray, keep: FloatArray, ranges: FloatArray,
-    periods: FloatArray, horizon: int, passes: int, packed: Packed,
-) -> FloatArray:  # fmt: skip
+def driven_states(
+    present: FloatArray,
+    drivers: FloatArray,
+    weights: FloatArray,
+    keep: FloatArray,
+    ranges: FloatArray,
+    periods: FloatArray,
+    horizon: int,
+    passes: int,
+    packed: Packed,
+) -> FloatArray:
     """Return the states ``(m, b, v)`` of bodies some decisions ahead, the drivers being held.
 
     Parameters

@@ -12,6 +12,7 @@ from fnmatch import fnmatchcase
 from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from ..hierarchy.failures import Names
 from ..hierarchy.hierarchy import Hierarchy
@@ -38,7 +39,7 @@ class MixedSettings(TeamSettings):
 
     kind: Literal["mixed"] = "mixed"
     uses_hierarchy = True
-    parts: tuple[PartOfTeam, ...] = ()
+    parts: Annotated[tuple[PartOfTeam, ...], Field(min_length=1)]
     """The parts; an agent is of the first one that names it."""
 
     @property

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.interface.prediction import Exploring
 from ...core.numerics import SAME, FloatArray, IntArray, njit
 
 SMALL = 0.1
@@ -63,7 +64,7 @@ class _Bearings(NamedTuple):
 
 
 @njit(cache=True)
-def _between(x, knots, values):  # type: ignore[no-untyped-def]
+def _between(x: float, knots: FloatArray, values: FloatArray) -> float:
     """Return the value at x, linear between knots and constant beyond them."""
     if x <= knots[0]:
         return values[0]
@@ -75,11 +76,13 @@ def _between(x, knots, values):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _look_up(i, options, bearings):  # type: ignore[no-untyped-def]
+def _look_up(i: int, options: Options, bearings: _Bearings) -> None:
     """Write value, slope and neighbouring centres of the bearing of joint i."""
     knots, values, (angle, value, slope, ahead, behind, kink_ahead, kink_behind, _) = (
-        options.knots, options.of_bearing[i], bearings,
-    )  # fmt: skip
+        options.knots,
+        options.of_bearing[i],
+        bearings,
+    )
     x = angle[i] - 2.0 * np.pi * np.floor((angle[i] + np.pi) / (2.0 * np.pi))
     k = 2
     while knots[k] <= x:
@@ -93,7 +96,18 @@ def _look_up(i, options, bearings):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_FAST)
-def _angles_between(x, y, to_x, to_y, by_x, by_y, sign, first, last, change):  # type: ignore[no-untyped-def]
+def _angles_between(
+    x: FloatArray,
+    y: FloatArray,
+    to_x: float,
+    to_y: float,
+    by_x: float,
+    by_y: float,
+    sign: float,
+    first: int,
+    last: int,
+    change: FloatArray,
+) -> None:
     """Write by what angle a point moves that moves `by` a vector, seen from joints first to last.
 
     Angles are times `sign`.
@@ -122,7 +136,9 @@ def _angles_between(x, y, to_x, to_y, by_x, by_y, sign, first, last, change):  #
 
 
 @njit(cache=True)
-def _turn(x, y, goal, joint, angle, change):  # type: ignore[no-untyped-def]
+def _turn(
+    x: FloatArray, y: FloatArray, goal: FloatArray, joint: int, angle: float, change: FloatArray
+) -> tuple[float, float]:
     """Write by how much all bearings change if a joint turns; return where the tip goes."""
     n = len(x) - 1
     cos, sin = np.cos(angle) - 1.0, np.sin(angle)
@@ -137,7 +153,7 @@ def _turn(x, y, goal, joint, angle, change):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_FAST)
-def _gain(options, bearings):  # type: ignore[no-untyped-def]
+def _gain(options: Options, bearings: _Bearings) -> float:
     """Return by how much the bearings' value changes with them."""
     angle, value, slope, ahead, behind, kink_ahead, kink_behind, change = bearings
     gain, wide = 0.0, 0
@@ -159,7 +175,15 @@ def _gain(options, bearings):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _accept(x, y, goal, joint, angle, options, bearings):  # type: ignore[no-untyped-def]
+def _accept(
+    x: FloatArray,
+    y: FloatArray,
+    goal: FloatArray,
+    joint: int,
+    angle: float,
+    options: Options,
+    bearings: _Bearings,
+) -> None:
     """Turn a joint."""
     n, change = len(x) - 1, bearings.change
     if angle == 0.0:
@@ -181,7 +205,7 @@ def _accept(x, y, goal, joint, angle, options, bearings):  # type: ignore[no-unt
 
 
 @njit(cache=True)
-def _draw(worths, rng):  # type: ignore[no-untyped-def]
+def _draw(worths: FloatArray, rng: np.random.Generator) -> int:
     """Return the action that is worth most as `greatest` does."""
     top = worths.max()
     least, ties = top - SAME * max(1.0, abs(top)), 0
@@ -197,7 +221,16 @@ def _draw(worths, rng):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def respond(places, goal, before, plan, order, options, exploring, rng):  # type: ignore[no-untyped-def]
+def respond(
+    places: FloatArray,
+    goal: FloatArray,
+    before: float,
+    plan: IntArray,
+    order: IntArray,
+    options: Options,
+    exploring: Exploring,
+    rng: np.random.Generator,
+) -> IntArray:
     """Improve a plan by one sweep of best responses, then let every joint decide; return `plan`.
 
     Parameters
@@ -220,9 +253,15 @@ def respond(places, goal, before, plan, order, options, exploring, rng):  # type
     n, n_actions = options.turns.shape
     x, y = places[:, 0].copy(), places[:, 1].copy()
     bearings = _Bearings(
-        np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
         np.empty(n),
-    )  # fmt: skip
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+    )
     for i in range(n):
         ux, uy, vx, vy = x[n] - x[i], y[n] - y[i], goal[0] - x[i], goal[1] - y[i]
         bearings.angle[i] = np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy)
@@ -244,7 +283,17 @@ def respond(places, goal, before, plan, order, options, exploring, rng):  # type
 
 
 @njit(cache=True)
-def _compare(x, y, goal, before, plan, joint, options, bearings, worths):  # type: ignore[no-untyped-def]
+def _compare(
+    x: FloatArray,
+    y: FloatArray,
+    goal: FloatArray,
+    before: float,
+    plan: IntArray,
+    joint: int,
+    options: Options,
+    bearings: _Bearings,
+    worths: FloatArray,
+) -> None:
     """Write what the actions of a joint are worth to the mean joint, but for a constant."""
     n = len(x) - 1
     for a in range(len(worths)):
@@ -265,7 +314,9 @@ def _compare(x, y, goal, before, plan, joint, options, bearings, worths):  # typ
 
 
 @njit(cache=True)
-def _explored(joint, worths, exploring, rng):  # type: ignore[no-untyped-def]
+def _explored(
+    joint: int, worths: FloatArray, exploring: Exploring, rng: np.random.Generator
+) -> int:
     """Return the action that a joint takes, as `Bursts.choose` does."""
     (memory, chance, stop), at = exploring, 1 + 2 * joint
     if chance >= 0.0:
@@ -276,5 +327,5 @@ def _explored(joint, worths, exploring, rng):  # type: ignore[no-untyped-def]
             action = rng.integers(0, len(worths))
             memory[at] = rng.geometric(stop) - 1
             memory[at + 1] = action
-            return action
+            return action  # type: ignore[return-value]  # compiled: an int
     return _draw(worths, rng)

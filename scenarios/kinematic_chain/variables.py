@@ -27,7 +27,7 @@ from math import pi
 import numpy as np
 
 from ...core.interface.spaces import Variable
-from ...core.numerics import FloatArray, njit
+from ...core.numerics import FloatArray, IntArray, njit
 from ...core.plugins.registry import Registry
 from ..state_variables import (
     Situations,
@@ -76,7 +76,7 @@ class ChainView(Situations):
 
 
 @njit(cache=True)
-def ends_of(angles, length):  # type: ignore[no-untyped-def]
+def ends_of(angles: FloatArray, length: float) -> FloatArray:
     """Return all joints and the tip ``(n + 1, 2)`` of a posture ``(n,)``, links of `length`."""
     n = len(angles)
     places = np.zeros((n + 1, 2))
@@ -89,7 +89,7 @@ def ends_of(angles, length):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def postures_of(angles, length):  # type: ignore[no-untyped-def]
+def postures_of(angles: FloatArray, length: float) -> FloatArray:
     """Return the joints and tips ``(m, n + 1, 2)`` of postures ``(m, n)``."""
     places = np.empty((len(angles), angles.shape[1] + 1, 2))
     for k in range(len(angles)):
@@ -155,7 +155,16 @@ def excess(view: ChainView, joint: int) -> FloatArray:
 
 
 @njit(cache=True)
-def columns(places, angles, speeds, goal, before, first, count, rows):  # type: ignore[no-untyped-def]
+def columns(
+    places: FloatArray,
+    angles: FloatArray,
+    speeds: FloatArray,
+    goal: FloatArray,
+    before: float,
+    first: int,
+    count: int,
+    rows: IntArray,
+) -> FloatArray:
     """Return the variables ``(count, m, len(rows))`` of joints from `first` on.
 
     Parameters are those of a `ChainView`; `rows` are indices of `COMPILED`. Columns of others stay
@@ -223,7 +232,7 @@ class ChainStates:
 
     def of_joints(self, view: ChainView, first: int, count: int) -> FloatArray:
         """Return the states ``(count, m, d)`` of joints from `first` on, compiled if possible."""
-        states: FloatArray = columns(
+        states = columns(
             view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
         )
         sense(self._things, view, range(first, first + count), states[:, :, 1:])

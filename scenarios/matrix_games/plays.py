@@ -70,11 +70,23 @@ class Learning(NamedTuple):
 
 
 @njit(cache=True)
-def play(  # type: ignore[no-untyped-def]
-    rng, world, plays: int, payoffs: FloatArray, optimal: FloatArray, theta: FloatArray,
-    rows: IntArray, deciding: Deciding, exploring: ExplorationParameters, clock: FloatArray,
-    learning: Learning, seen: FloatArray, given: FloatArray, joints: IntArray, paid: FloatArray,
-):  # fmt: skip
+def play(
+    rng: np.random.Generator,
+    world: np.random.Generator,
+    plays: int,
+    payoffs: FloatArray,
+    optimal: FloatArray,
+    theta: FloatArray,
+    rows: IntArray,
+    deciding: Deciding,
+    exploring: ExplorationParameters,
+    clock: FloatArray,
+    learning: Learning,
+    seen: FloatArray,
+    given: FloatArray,
+    joints: IntArray,
+    paid: FloatArray,
+) -> tuple[float, float]:
     """Play, and learn from all plays but the last two.
 
     Parameters
@@ -131,7 +143,16 @@ def play(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _value(i, joint, theta, places, deciding, seen, given, values) -> None:  # type: ignore[no-untyped-def]
+def _value(
+    i: int,
+    joint: IntArray,
+    theta: FloatArray,
+    places: IntArray,
+    deciding: Deciding,
+    seen: FloatArray,
+    given: FloatArray,
+    values: FloatArray,
+) -> None:
     """Value each action of agent i over the joint actions of those below it."""
     n, n_actions = seen.shape
     fixed, combos = 0, 1
@@ -162,7 +183,9 @@ def _value(i, joint, theta, places, deciding, seen, given, values) -> None:  # t
 
 
 @njit(cache=True)
-def _choose(values, exploring, clock, rng) -> int:  # type: ignore[no-untyped-def]
+def _choose(
+    values: FloatArray, exploring: ExplorationParameters, clock: float, rng: np.random.Generator
+) -> int:
     """Return the action that an explorer chooses."""
     if exploring.kind == GREEDY:
         return _greatest(values, rng)
@@ -170,17 +193,17 @@ def _choose(values, exploring, clock, rng) -> int:  # type: ignore[no-untyped-de
     if exploring.kind == DECREASING:
         rate = exploring.epsilon * (temperature - 1.0) / (exploring.max_temperature - 1.0)
         if rng.random() < min(1.0, rate):
-            return rng.integers(0, len(values))
+            return rng.integers(0, len(values))  # type: ignore[return-value]  # compiled: an int
         return _greatest(values, rng)
     ladder = np.exp((values - values.max()) / temperature)
     ladder /= ladder.sum()
     ladder = ladder.cumsum()
     ladder /= ladder[-1]
-    return np.searchsorted(ladder, rng.random(), side="right")
+    return np.searchsorted(ladder, rng.random(), side="right")  # type: ignore[return-value]  # compiled: an int
 
 
 @njit(cache=True)
-def _greatest(values, rng) -> int:  # type: ignore[no-untyped-def]
+def _greatest(values: FloatArray, rng: np.random.Generator) -> int:
     """Return the greatest value's place, see `nested_agents.core.numerics.greatest`."""
     top = values.max()
     best = np.flatnonzero(values >= top - 1e-12 * max(1.0, abs(top)))
@@ -188,7 +211,15 @@ def _greatest(values, rng) -> int:  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _learn(theta, rows, cells, joint, places, reward, learning) -> None:  # type: ignore[no-untyped-def]
+def _learn(
+    theta: FloatArray,
+    rows: IntArray,
+    cells: IntArray,
+    joint: IntArray,
+    places: IntArray,
+    reward: float,
+    learning: Learning,
+) -> None:
     """Learn from one play, as the learners do without discount."""
     index = (joint * places).sum()
     for i, row in enumerate(rows):

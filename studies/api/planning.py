@@ -118,7 +118,9 @@ class Plan:
             yield f"memory   about {self.memory / 1e9:.1f} GB with {processes}"
         if self.comparisons:
             yield ""
-            yield from power_text(n_seeds, self.comparisons, self.deviation, self.smallest)
+            yield from power_text(
+                n_seeds, self.comparisons, self.deviation, self.smallest, "success"
+            )
             text = (
                 f"Differences of success rates, every condition with the first, p adjusted; "
                 f"differences of single seeds are taken to deviate by {self.deviation:g}."

@@ -26,7 +26,7 @@ from ...scenarios.faults.wrappers import (
 )
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
-from ..results.statistics import BLOCK, NOT_NEGATIVE, REGAINED, bootstrap, rate, recovery
+from ..results.statistics import BLOCK, REGAINED, bootstrap, rate, recovery
 
 Data: TypeAlias = Any
 """An observation, action or space of Gymnasium, whose types are the environment's own; by agent of
@@ -134,7 +134,7 @@ class FaultCourse(NamedTuple):
         estimates |= {
             "cumulative loss": bootstrap(self.shortfall.sum(axis=1)),
             "recovered": rate(recovered[:, None]),
-            "recovery time": bootstrap(episodes, bounds=NOT_NEGATIVE),
+            "recovery time": bootstrap(episodes, bounds=(0.0, self.shortfall.shape[1])),
         }
         return Summary(self.name, len(self.faulty), estimates)
 

@@ -32,8 +32,7 @@ from ..errors import SpecError
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import published
 from ..results.contrasts import contrasts
-from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
-from ..results.results import Results, chosen, read, together
+from ..results.results import Results, choose_trials, combine, read
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..spec.tables import TomlTable
 from ..store import durable
@@ -147,12 +146,9 @@ class StudyResults:
 
     @property
     def power(self) -> tuple[str, ...]:
-        """What comparisons with the first condition can find, supposing a usual deviation."""
-        comparisons = len(self.conditions) - 1
-        if comparisons < 1:
-            return ()
-        seeds = min(len(self.results.seeds(condition)) for condition in self.conditions)
-        return tuple(power_text(seeds, comparisons, USUAL_DEVIATION, SMALLEST))
+        """What comparisons with the first condition can find, as `compare` says it."""
+        is_measured = SUCCESS.name in (measure.name for measure in self.results.measures)
+        return contrasts(self.results).power if is_measured else ()
 
     @cached_property
     def analysis(self) -> Any:
@@ -192,7 +188,7 @@ class StudyResults:
 
     def where(self, choice: str) -> StudyResults:
         """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `chosen`."""
-        part = chosen(self.results, choice, self._settings)
+        part = choose_trials(self.results, choice, self._settings)
         if not part.conditions:
             raise SpecError(f"where = {choice!r}: no finished trial is so")
         return replace(self, results=part, failed=(), _is_whole=False)
@@ -378,7 +374,7 @@ def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResul
     names = [path.name for path in paths]
     if len(set(names)) < len(names):
         names = list(map(str, paths))
-    results, labels = together(
+    results, labels = combine(
         [(name, study.results) for name, study in zip(names, studies, strict=True)],
         [study._settings for study in studies],
     )

@@ -182,9 +182,9 @@ def system_of(results: Results, condition: str) -> tuple[str, dict[str, object]]
 
 def draw_figures(study: Study, analysis: Any) -> Figures:
     """Return the figures of an analysis by name, as all figures look; none of an empty table."""
-    from ..presentation.figures import spell_dollars, styled  # matplotlib takes its time
+    from ..presentation.figures import apply_style, spell_dollars  # matplotlib takes its time
 
-    with styled():
+    with apply_style():
         figures = study.draw(analysis) if analysis.table else {}
         names = [line.condition for line in analysis.table]
         return {name: spell_dollars(figure, names) for name, figure in figures.items()}

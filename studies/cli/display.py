@@ -71,7 +71,7 @@ def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:
     """Print the table of a study and what it says of its results."""
     print_table(study.table(columns))
     print_lines(study.notes)
-    if not any(note.startswith("Power:") for note in study.notes):
+    if not any(note.startswith("Power:") for note in study.notes):  # one number of power a study
         print_lines(study.power)
 
 

@@ -40,7 +40,7 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
     }
     measured = any(row.measured is not None for row in rows)
     single = [(n, _log10(cost)) for n, cost in {r.agents: r.single_agent for r in rows}.items()]
-    with figures.styled():
+    with figures.apply_style():
         columns = 3 if measured else 1
         figure, (all_axes,) = figures.panels(1, columns, (3.2 * columns + 0.6, 4.2))
         all_axes[0].plot(*zip(*single, strict=True), "--", color="black")

@@ -127,7 +127,7 @@ MOST_LINES = 8
 def draw(explained: Explanation) -> dict[str, Figure]:
     """Return all figures that there is something for, by name."""
     drawings: dict[str, Figure] = {}
-    with figures.styled():
+    with figures.apply_style():
         if any(p.variance > 0 for p in explained.parts):
             blocks = range(0, len(explained.agents), MOST_LINES)
             for number, first in enumerate(blocks, 1):

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..results.aggregates import Aggregates
 from ..results.analysis import Difference, Figures
-from ..results.statistics import LEVEL, Estimate, stacked
+from ..results.statistics import LEVEL, Estimate, stack_estimates
 from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")
@@ -45,7 +45,7 @@ SETTINGS: dict[str, Any] = {
 
 
 @contextmanager
-def styled() -> Iterator[None]:
+def apply_style() -> Iterator[None]:
     """Let figures that are made within look as all do."""
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
         yield
@@ -190,7 +190,7 @@ def write(figure: Figure, path: Path) -> None:
     """
     check_suffix(path)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
-    with styled(), replacing(path) as file:
+    with apply_style(), replacing(path) as file:
         figure.savefig(file, format=path.suffix[1:], dpi=150, metadata=metadata)
 
 
@@ -228,7 +228,7 @@ def draw_line(
     """Draw estimates with their intervals: line `index` of so many lines, beside the others."""
     beside = 2.0 ** (APART * (index - (lines - 1) / 2))
     places = [beside * n for n in sizes]
-    all_of_them = stacked(estimates)
+    all_of_them = stack_estimates(estimates)
     axes.vlines(places, all_of_them.low, all_of_them.high, color=look(index)["color"], lw=1.2)
     axes.plot(places, all_of_them.value, **style(index))
 
@@ -317,7 +317,7 @@ def count_seeds(counts: Iterable[int]) -> str:
 def draw_profiles(aggregates: Aggregates) -> Figure:
     """Return the figure: share of runs above each score, interquartile mean by episode."""
     names = [line.condition for line in aggregates.table]
-    with styled():
+    with apply_style():
         figure, axes = panels(1, 1 + bool(aggregates.curves), (7.2, 2.9))
         profiles, *efficiency = axes[0]
         for index, profile in enumerate(aggregates.profiles.values()):

@@ -26,7 +26,7 @@ from ...core.numerics import pd
 from ...core.plugins.words import near
 from ..errors import SpecError, printable
 from ..results.analysis import Summary
-from ..results.statistics import FEW, Estimate, between, exactly, stacked, two_figures
+from ..results.statistics import FEW, Estimate, between, exactly, stack_estimates, two_figures
 from .progress import count
 
 Format = Literal["table", "csv", "json"]
@@ -207,7 +207,7 @@ class SummaryTable:
         columns: dict[str, Any] = {"condition": [line.condition for line in self.lines]}
         columns["seeds"] = [line.seeds for line in self.lines]
         for title in self.titles:
-            parts = stacked([line.estimates.get(title, UNKNOWN) for line in self.lines])
+            parts = stack_estimates([line.estimates.get(title, UNKNOWN) for line in self.lines])
             columns |= zip((title, f"{title} low", f"{title} high"), parts, strict=True)
         return in_csv(pd.DataFrame(columns))
 

@@ -30,7 +30,7 @@ from ...core.plugins.words import show
 from ...scenarios import SCENARIOS
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
-from ..presentation.figures import styled
+from ..presentation.figures import apply_style
 from ..presentation.progress import count
 from ..presentation.tables import tabulate
 from ..results.analysis import identity_lines
@@ -293,7 +293,7 @@ class Picture(NamedTuple):
 def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
     """Return a study's figures, by name, as they stand in a page and are taken away from it."""
     drawings = []
-    with styled():
+    with apply_style():
         for number, (name, figure) in enumerate(figures.items(), 1):
             svg = io.StringIO()
             figure.savefig(svg, format="svg", metadata={"Date": None})

@@ -15,7 +15,7 @@ from ...core.numerics import stats
 from ..errors import SpecError
 from .analysis import Summary
 from .contrasts import Contrasts
-from .statistics import Array, Estimate, stacked
+from .statistics import Array, Estimate, stack_estimates
 
 RESAMPLES = 2000
 THRESHOLDS = 51
@@ -147,6 +147,6 @@ def _profile(tasks: Tasks, thresholds: Array) -> Estimate:
 def _curve(tasks: Tasks) -> Estimate:
     """Return the interquartile mean in each episode, of scores ``(n_runs, n_episodes)``."""
     episodes = range(min(own.shape[1] for own in tasks))
-    return stacked(
+    return stack_estimates(
         [stratified_bootstrap([own[:, k] for own in tasks], interquartile_mean) for k in episodes]
     )

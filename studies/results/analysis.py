@@ -75,20 +75,20 @@ class Difference:
     @property
     def shown(self) -> str:
         """Value, interval, p as it is and adjusted, as text."""
-        e = self.estimate
-        interval = f"{_signed(e.value)} [{_signed(e.low)}, {_signed(e.high)}]"
-        raw = _compared(self.raw)
-        adjusted = _compared(self.p)
+        value, low, high = map(_format_difference, self.estimate)
+        interval = f"{value} [{low}, {high}]"
+        raw = _format_p(self.raw)
+        adjusted = _format_p(self.p)
         return f"{interval}, p {adjusted} ({raw.removeprefix('= ')} unadjusted)"
 
 
-def _signed(value: ArrayLike) -> str:
+def _format_difference(value: ArrayLike) -> str:
     """Return a difference with its sign, which rounding errors about 0 have not."""
     text = f"{float(np.asarray(value)):+.2f}"
     return "0.00" if text in ("+0.00", "-0.00") else text
 
 
-def _compared(p: float) -> str:
+def _format_p(p: float) -> str:
     return "< .001" if p < 0.001 else f"= {p:.2g}"
 
 
@@ -115,16 +115,16 @@ def differences(
     compared = []
     for group, pairs in groups.items():
         for condition, measure, *values in pairs:
-            own, base = shared(values)
+            own, base = select_shared(values)
             if len(own) >= 2:
                 names.append(group)
                 estimate = paired_difference(own, base, of_rates=of_rates)
                 compared.append((condition, measure, own, base, estimate))
-    made = list(zip(names, adjusted(compared), strict=True))
+    made = list(zip(names, adjust(compared), strict=True))
     return {g: tuple(d for name, d in made if name == g) for g in groups}
 
 
-def adjusted(
+def adjust(
     compared: Sequence[tuple[str, str, Array, Array, Estimate]],
 ) -> tuple[Difference, ...]:
     """Return what is compared, by which measure, of pairs ``(n_seeds,)`` with an estimate.
@@ -149,12 +149,12 @@ def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
     return bootstrap(own - base, bounds=(-1.0, 1.0) if of_rates else (-np.inf, np.inf))
 
 
-def shared(values: Sequence[BySeed]) -> list[Array]:
+def select_shared(values: Sequence[BySeed]) -> list[Array]:
     """Return values ``(n_seeds, ...)`` of the seeds that all have, of those by seed.
 
     Examples
     --------
-    >>> shared([pd.Series([0.0, 0.1, 0.2], [0, 1, 2]), pd.Series([1.2, 1.1], [2, 1])])
+    >>> select_shared([pd.Series([0.0, 0.1, 0.2], [0, 1, 2]), pd.Series([1.2, 1.1], [2, 1])])
     [array([0.1, 0.2]), array([1.1, 1.2])]
     """
     seeds = values[0].index
@@ -248,6 +248,11 @@ class Analysis:
 
 
 NOTHING = "Nothing to compare: no two conditions share two seeds."
+TWO_TESTS = (
+    "An interval is of one difference alone, and p is of permuted signs and adjusted over all: "
+    "where they seem to disagree about 0, p decides."
+)
+"""Said once where an interval and p seem to contradict each other."""
 
 
 def verdict_lines(
@@ -268,12 +273,14 @@ def verdict_lines(
 def verdicts(
     groups: Mapping[str, Sequence[Difference]],
     better: str | None = "higher",
+    measure: str = "",
     *,
     of_rates: bool = True,
 ) -> list[str]:
     """Return the verdicts of groups below their heads, how p is adjusted, and `power_lines`.
 
-    No lines if nothing is compared. p must be adjusted over all groups.
+    No lines if nothing is compared. p must be adjusted over all groups. Of what the power is, a
+    `measure` says; without, those of the differences.
     """
     compared = [d for group in groups.values() for d in group]
     lines = []
@@ -284,7 +291,17 @@ def verdicts(
     if compared:
         counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
         lines.append(f"p: permutation of signs over seeds, adjusted over {counted} (Holm).")
-    return lines + power_lines([d.sample for d in compared], of_rates=of_rates)
+    if any(map(_seems_contradicted, compared)):
+        lines += wrap(TWO_TESTS, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    measure = measure or " or ".join(dict.fromkeys(d.measure for d in compared))
+    return lines + power_lines([d.sample for d in compared], measure, of_rates=of_rates)
+
+
+def _seems_contradicted(difference: Difference) -> bool:
+    """Return whether an interval and p seem to say different things of a difference."""
+    e = difference.estimate
+    is_beside_zero = bool(e.low > 0.0 or e.high < 0.0)
+    return is_beside_zero != (difference.p < LEVEL)
 
 
 def judged(

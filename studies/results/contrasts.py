@@ -9,7 +9,8 @@ from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
 from .analysis import NOTHING, BySeed, Difference, Summary, differences, identity_lines, verdicts
-from .results import SECONDS, Results, shown
+from .power import power_lines
+from .results import SECONDS, Results, describe_number
 from .statistics import Array, Estimate, bootstrap, rate
 
 STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
@@ -68,8 +69,20 @@ class Contrasts(NamedTuple):
         for group in self.groups:
             head = ": ".join(filter(None, (group.setting, self.title)))
             groups[f"{head}, less that of {group.reference}"] = group.differences
-        lines = verdicts(groups, self.measure.better, of_rates=self.measure.is_rate) or [NOTHING]
-        return (*lines, *identity_lines(self.identical))
+        is_rate = self.measure.is_rate
+        lines = verdicts(groups, self.measure.better, self._of_phase, of_rates=is_rate)
+        return (*(lines or [NOTHING]), *identity_lines(self.identical))
+
+    @property
+    def _of_phase(self) -> str:
+        """What is compared, to be read in a sentence."""
+        return f"{self.phase} {self.measure.heading}".strip()
+
+    @property
+    def power(self) -> tuple[str, ...]:
+        """What the comparisons could have detected, line by line."""
+        samples = [d.sample for d in self.differences]
+        return tuple(power_lines(samples, self._of_phase, of_rates=self.measure.is_rate))
 
 
 def contrasts(
@@ -160,11 +173,11 @@ def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str,
         return measures[name], {c: results.means(c, phase, name) for c in of_phase}, phase
     numbers = {c: results.numbers(c) for c in results.conditions}
     columns = dict.fromkeys(n for own in numbers.values() for n in own)
-    names = {c: (c, c.removeprefix(SECONDS), shown(c)[0].heading) for c in columns}
+    names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
     column = next((c for c in columns if name in names[c]), None)
     if column is None:
         raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *columns})}")
-    measure, factor = shown(column)
+    measure, factor = describe_number(column)
     of_trials = {c: factor * own[column] for c, own in numbers.items() if column in own}
     return measure, {c: pd.Series(own, results.seeds(c)) for c, own in of_trials.items()}, ""
 
@@ -178,7 +191,7 @@ def _groups(
     if by is None:
         members = [(c, c) for c in conditions]
         known = {c: aliases(c, columns[c]) for c in conditions}
-        return [("", _led(members, reference, known))] if members else []
+        return [("", _put_first(members, reference, known))] if members else []
     keys = dict.fromkeys(key for c in conditions for key in columns[c])
     key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
     if key is None:
@@ -189,7 +202,7 @@ def _groups(
         rest = ", ".join(_level(k, v) for k, v in columns[c].items() if k != key and v != "")
         groups.setdefault(rest, []).append((level, c))
     known = {c: aliases(c, {key: columns[c][key]}) for c in conditions}
-    return [(setting, _led(members, reference, known)) for setting, members in groups.items()]
+    return [(setting, _put_first(members, reference, known)) for setting, members in groups.items()]
 
 
 def _level(key: str, value: object) -> str:
@@ -201,7 +214,9 @@ def _level(key: str, value: object) -> str:
     return value if isinstance(value, str) else f"{key.rpartition('.')[2]}={label({key: value})}"
 
 
-def _led(members: _Pairs, reference: str | None, known: Mapping[str, Collection[str]]) -> _Pairs:
+def _put_first(
+    members: _Pairs, reference: str | None, known: Mapping[str, Collection[str]]
+) -> _Pairs:
     """Return the members of a group, the reference first, by a name or another `known` one."""
     if reference is None:
         return members

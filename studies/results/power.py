@@ -225,42 +225,58 @@ def _simulated(effect: float, seeds: int, extreme: int) -> float:
 
 
 def power_text(
-    seeds: int, comparisons: int, deviation: float | None, smallest: float | None
+    seeds: int,
+    comparisons: int,
+    deviation: float | None,
+    smallest: float | None,
+    measure: str = "",
 ) -> list[str]:
     r"""Return lines on what paired seeds can tell, given the deviation of their differences.
+
+    Parameters
+    ----------
+    seeds, comparisons
+        How many.
+    deviation
+        Standard deviation of the differences of single seeds; None: it is not known.
+    smallest
+        The smallest difference that is of interest; None: none is named.
+    measure
+        By what conditions are compared.
 
     Examples
     --------
     >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
     Power: 5 seeds and 2 comparisons cannot give an adjusted p below .05, whatever
       the outcome. It needs at least 7 seeds; for a difference of .20, about 18.
-    >>> print(*power_text(20, 1, 0.25, 0.2), sep="\n")
-    Power: with 20 seeds, a difference of .17 is found with probability .80. For a
-      difference of .20 it takes about 15 seeds.
+    >>> print(*power_text(20, 1, 0.25, 0.2, "evaluation success"), sep="\n")
+    Power: with 20 seeds, a difference of .17 in evaluation success is found with
+      probability .80. For a difference of .20 it takes about 15 seeds.
     """
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
     among = f" and {comparisons} comparisons" if comparisons > 1 else ""
     needed = seeds_needed(comparisons)
     enough = seeds_for(smallest, deviation, comparisons) if smallest and deviation else None
     goal = two_figures(smallest or 0.0)
+    within = f" in {measure}" if measure else ""
     if seeds < needed:
         text = (
-            f"{counted}{among} cannot give an adjusted p below .05, whatever the outcome. "
+            f"{counted}{among} cannot give an adjusted p below .05{within}, whatever the outcome. "
             f"It needs at least {needed} seeds"
         )
         text += f"; for a difference of {goal}, about {enough}." if enough else "."
     elif deviation is None:
-        text = f"{counted}{among} that deviate by nothing: how small a difference they would find "
-        text += "cannot be determined."
+        text = f"{counted}{among} that deviate by nothing{within}: how small a difference they "
+        text += "would find cannot be determined."
     else:
         least = two_figures(detectable(deviation, seeds, comparisons))
-        text = f"with {counted}{among}, a difference of {least} is found with probability "
-        text += f"{two_figures(WANTED)}."
+        text = f"with {counted}{among}, a difference of {least}{within} is found with "
+        text += f"probability {two_figures(WANTED)}."
         text += f" For a difference of {goal} it takes about {enough} seeds." if enough else ""
     return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 
 
-def power_lines(samples: Sequence[Array], *, of_rates: bool = True) -> list[str]:
+def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool = True) -> list[str]:
     """Return lines on which differences comparisons could find, and how many seeds it takes.
 
     Parameters
@@ -268,6 +284,8 @@ def power_lines(samples: Sequence[Array], *, of_rates: bool = True) -> list[str]
     samples
         Differences of single seeds ``(n_seeds,)``, by comparison: all that were adjusted together,
         of one unit.
+    measure
+        By what conditions are compared.
     of_rates
         Whether they are differences of success rates, of which `SMALLEST` is of interest.
     """
@@ -275,4 +293,4 @@ def power_lines(samples: Sequence[Array], *, of_rates: bool = True) -> list[str]
         return []
     deviation = deviation_of(samples, of_rates=of_rates)
     smallest = SMALLEST if of_rates else None
-    return power_text(min(map(len, samples)), len(samples), deviation, smallest)
+    return power_text(min(map(len, samples)), len(samples), deviation, smallest, measure)

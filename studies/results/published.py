@@ -40,11 +40,11 @@ def dumps(outline: StudyOutline, results: Results) -> str:
         "spec": outline.table,
         "columns": results.columns,
         "measures": tables(measures),
-        "seeds": {c: _counted(results.seeds(c)) for c in results.conditions},
+        "seeds": {c: _pack_seeds(results.seeds(c)) for c in results.conditions},
         "phases": {
             phase: {
                 condition: {
-                    name: _packed(results.values(condition, name, phase), is_rate=is_rate)
+                    name: _pack(results.values(condition, name, phase), is_rate=is_rate)
                     for name, is_rate in rates.items()
                     if results.has(condition, phase, name)
                 }
@@ -52,8 +52,8 @@ def dumps(outline: StudyOutline, results: Results) -> str:
             }
             for phase in results.phases
         },
-        "numbers": _rounded(results, lambda name: name not in results.usage),
-        "usage": _rounded(results, lambda name: name in results.usage),
+        "numbers": _pack_numbers(results, lambda name: name not in results.usage),
+        "usage": _pack_numbers(results, lambda name: name in results.usage),
     }
     lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
@@ -128,7 +128,7 @@ def load(path: Path) -> Published:
         raise SpecError(f"{path}: holds no published results: {error}") from None
 
 
-def _counted(seeds: tuple[int, ...]) -> int | list[int]:
+def _pack_seeds(seeds: tuple[int, ...]) -> int | list[int]:
     """Return many seeds from 0 on as their number."""
     many = len(seeds) >= FEW and seeds == tuple(range(len(seeds)))
     return len(seeds) if many else list(seeds)
@@ -138,7 +138,7 @@ Packed = Sequence[object] | dict[str, object]
 """An array as lists; of many rows, as flags or one value for all, with its shape."""
 
 
-def _packed(values: np.ndarray, *, is_rate: bool) -> Packed:
+def _pack(values: np.ndarray, *, is_rate: bool) -> Packed:
     if not is_rate:
         rounded = np.round(values, DECIMALS)
         return _constant(rounded) or rounded.tolist()
@@ -153,7 +153,7 @@ def _constant(values: np.ndarray) -> Packed | None:
     return {"all": values.flat[0].item(), "shape": list(values.shape)}
 
 
-def _rounded(results: Results, wanted: Callable[[str], bool]) -> dict[str, dict[str, Packed]]:
+def _pack_numbers(results: Results, wanted: Callable[[str], bool]) -> dict[str, dict[str, Packed]]:
     """Return by condition the numbers of the wanted names; seconds by their part alone."""
     return {
         condition: {
@@ -313,27 +313,27 @@ def _check_condition(value: JsonValue, name: str, known: Collection[str]) -> Non
 
 
 def _unpack(value: JsonValue, room: Room, n_seeds: int, *most: int) -> Array:
-    """Return numbers that `_packed` wrote, ``(n_seeds, ...)``."""
+    """Return numbers that `_pack` wrote, ``(n_seeds, ...)``."""
     if isinstance(value.content, dict):
         number = value.child("all").number()
         array = np.full(room.take(value.child("shape"), n_seeds, *most), number)
     else:
         array = value.array(1 + len(most))
-    return _checked(array, value, n_seeds)
+    return _check_rows(array, value, n_seeds)
 
 
 def _unpack_rates(value: JsonValue, room: Room, n_seeds: int, most: int) -> Array:
-    """Return zeros and ones that `_packed` wrote, ``(n_seeds, n_episodes)``."""
+    """Return zeros and ones that `_pack` wrote, ``(n_seeds, n_episodes)``."""
     if isinstance(value.content, dict):
         flags = _bits(value.child("flags"))
         shape = room.take(value.child("shape"), n_seeds, most)
         if len(flags) != math.prod(shape):
             raise value.child("shape").refusal(f"that of {len(flags)} flags")
-        return _checked(flags.reshape(shape), value, n_seeds)
+        return _check_rows(flags.reshape(shape), value, n_seeds)
     rows = [_bits(row) for row in value.items()]
     if len(set(map(len, rows))) > 1:
         raise value.refusal("rows of equal length")
-    return _checked(np.array(rows), value, n_seeds)
+    return _check_rows(np.array(rows), value, n_seeds)
 
 
 def _bits(value: JsonValue) -> Array:
@@ -343,7 +343,7 @@ def _bits(value: JsonValue) -> Array:
     return np.array(list(map(int, text)))
 
 
-def _checked(array: Array, value: JsonValue, n_seeds: int) -> Array:
+def _check_rows(array: Array, value: JsonValue, n_seeds: int) -> Array:
     if len(array) != n_seeds or array.size == 0:
         raise value.refusal(f"of {n_seeds} seeds, a row for each")
     return array

@@ -230,10 +230,10 @@ def assemble(
     """
     swept = {key: ("", "a swept key") for row in columns.values() for key in row}
     names = [measure.name for measure in measures]
-    all_episodes = _joined(
+    all_episodes = _concatenate(
         episodes, ["condition", *swept, "seed", "phase", "episode", "steps", *names, "return"]
     )
-    all_trials = _joined(trials, ["condition", *swept, "seed", "state"])
+    all_trials = _concatenate(trials, ["condition", *swept, "seed", "state"])
     measured = {}
     for measure in measures:
         measured[measure.name] = measure.unit, f"{measure.title}, {measure.gathering} of its steps"
@@ -249,7 +249,7 @@ def assemble(
     )
 
 
-def _joined(frames: Sequence[pd.DataFrame], names: Sequence[str]) -> pd.DataFrame:
+def _concatenate(frames: Sequence[pd.DataFrame], names: Sequence[str]) -> pd.DataFrame:
     """Return frames below each other, with columns of these names first."""
     whole = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*names])
     return whole.reindex(columns=[*names, *(n for n in whole.columns if n not in names)])
@@ -318,15 +318,15 @@ _TITLES = {"decision_median": "decision", "decision_99": "99th percentile of dec
 """Headings of numbers that are shown in milliseconds."""
 
 
-def shown(name: str) -> tuple[Measure, float]:
+def describe_number(name: str) -> tuple[Measure, float]:
     """Return how a number is shown, and by what it is multiplied for that.
 
     Examples
     --------
-    >>> measure, factor = shown("decision_median")
+    >>> measure, factor = describe_number("decision_median")
     >>> measure.unit, factor
     ('ms', 1000.0)
-    >>> shown("messages")[0].unit
+    >>> describe_number("messages")[0].unit
     '1'
     """
     if name in _TITLES:
@@ -339,7 +339,7 @@ DIRECTORY = "directory"
 """Column that tells from which study a condition came, where there are several."""
 
 
-def chosen(results: Results, choice: str, settings: Mapping[str, Any]) -> Results:
+def choose_trials(results: Results, choice: str, settings: Mapping[str, Any]) -> Results:
     """Return the results of the trials of a choice, such as ``robots == 8 and box == "circle"``.
 
     Parameters
@@ -382,12 +382,12 @@ def chosen(results: Results, choice: str, settings: Mapping[str, Any]) -> Result
     return replace(results, episodes=episodes, trials=trials, columns=columns)
 
 
-def _apart(name: str, tables: Sequence[Mapping[str, Any]]) -> list[str]:
+def _distinguish(name: str, tables: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return labels of conditions of one name, by one or two settings that tell all apart; or none.
 
     Examples
     --------
-    >>> _apart("default", [{"scenario": {"robots": n, "box": "disc"}} for n in (2, 4)])
+    >>> _distinguish("default", [{"scenario": {"robots": n, "box": "disc"}} for n in (2, 4)])
     ['default, robots=2', 'default, robots=4']
     """
     own = [dict(flat(table)) for table in tables]
@@ -397,7 +397,7 @@ def _apart(name: str, tables: Sequence[Mapping[str, Any]]) -> list[str]:
     return labels if len(other) <= 2 and len(set(labels)) == len(labels) else []
 
 
-def together(
+def combine(
     studies: Sequence[tuple[str, Results]], settings: Sequence[Mapping[str, Any]] = ()
 ) -> tuple[Results, list[dict[str, str]]]:
     """Return the results of several studies as those of one, and the new labels of each.
@@ -419,7 +419,7 @@ def together(
     ]
     for condition in several if settings else ():
         at = [i for i, part in enumerate(parts) if condition in part.columns]
-        apart = _apart(condition, [settings[i].get(condition, {}) for i in at])
+        apart = _distinguish(condition, [settings[i].get(condition, {}) for i in at])
         if not times.keys() & set(apart):
             for i, text in zip(at, apart, strict=False):
                 labels[i][condition] = text

@@ -105,7 +105,7 @@ def bootstrap(
         low = value - half
         high = value + half
     else:
-        drawn = _drawn(n_runs, resamples, seed)
+        drawn = _draw_runs(n_runs, resamples, seed)
         means = []
         # Memory holds next to each other what the mean runs along fastest: with several points all
         # resamples of a run, else the runs of a resample.
@@ -126,7 +126,7 @@ def bootstrap(
 
 
 @lru_cache(maxsize=1)
-def _drawn(n_runs: int, resamples: int, seed: int) -> NDArray[Any]:
+def _draw_runs(n_runs: int, resamples: int, seed: int) -> NDArray[Any]:
     """Return the runs ``(resamples, n_runs)`` that resamples are made of.
 
     In few bytes. They are kept, as the conditions of a study mostly have equally many seeds.
@@ -186,10 +186,10 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
 
 def rates(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     """Return `rate` of each column of ``(n_runs, n_points)`` outcomes on its own."""
-    return stacked([rate(column[:, None], level) for column in np.asarray(outcomes).T])
+    return stack_estimates([rate(column[:, None], level) for column in np.asarray(outcomes).T])
 
 
-def stacked(estimates: Sequence[Estimate]) -> Estimate:
+def stack_estimates(estimates: Sequence[Estimate]) -> Estimate:
     """Return estimates of no dimension as one ``(n,)``."""
     return Estimate(*np.array(estimates, dtype=float).T)
 

@@ -35,7 +35,7 @@ def insert(connection: sqlite3.Connection, table: str, rows: list[tuple[object, 
         connection.executemany(f"INSERT INTO {table} VALUES ({places})", rows)
 
 
-def quoted(name: str) -> str:
+def quote(name: str) -> str:
     """Return a name as SQL takes any name."""
     return '"' + name.replace('"', '""') + '"'
 
@@ -93,7 +93,7 @@ class Planned(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Noted:
+class StudyNotes:
     """What a study is, in plain tables, texts and rows, as it is noted before anything is run."""
 
     spec: Mapping[str, Any]
@@ -139,14 +139,14 @@ def measures_from(tables: Iterable[Mapping[str, Any]]) -> tuple[Measure, ...]:
     return tuple(Measure(**table) for table in tables)
 
 
-def prepare(db: sqlite3.Connection, noted: Noted) -> None:
+def prepare(db: sqlite3.Connection, notes: StudyNotes) -> None:
     """Make the tables, and note what the study is and what computes it; within a transaction."""
-    swept = [quoted(key) for key in next(iter(noted.columns.values()))]
+    swept = [quote(key) for key in next(iter(notes.columns.values()))]
     definitions = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
     for statement in SCHEMA:
         db.execute(statement)
     # A measure is NULL where a scenario has it not.
-    kinds = ((quoted(m.name), "INTEGER" if m.is_rate else "REAL") for m in noted.measures)
+    kinds = ((quote(m.name), "INTEGER" if m.is_rate else "REAL") for m in notes.measures)
     measured = "".join(f"{name} {kind}, " for name, kind in kinds)
     db.execute(
         f"""CREATE TABLE IF NOT EXISTS episodes (
@@ -156,27 +156,27 @@ def prepare(db: sqlite3.Connection, noted: Noted) -> None:
     )
     db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({definitions})")
     db.execute("DELETE FROM conditions")
-    by_condition = enumerate(noted.columns.items())
+    by_condition = enumerate(notes.columns.items())
     insert(db, "conditions", [(i, label, *row.values()) for i, (label, row) in by_condition])
     stage = f"e.phase GLOB '{STAGE}*'"  # stages come first, in the order in which they are trained
     db.execute(
         f"""CREATE VIEW IF NOT EXISTS results AS
         SELECT c.condition, {"".join(f"c.{key}, " for key in swept)}t.seed,
-            {", ".join(f"e.{quoted(name)}" for name in columns(noted.measures))}
+            {", ".join(f"e.{quote(name)}" for name in columns(notes.measures))}
         FROM episodes e JOIN trials t USING (identity) JOIN conditions c USING (condition)
         WHERE t.state = 'done' ORDER BY c.position, t.seed, {stage} DESC,
             CASE WHEN {stage} THEN e.episode END, e.phase DESC, e.episode"""
     )
     db.execute("DELETE FROM planned")
     planned: list[tuple[object, ...]] = [
-        (i, *trial[:-1], json.dumps(trial.recorded)) for i, trial in enumerate(noted.planned)
+        (i, *trial[:-1], json.dumps(trial.recorded)) for i, trial in enumerate(notes.planned)
     ]
     insert(db, "planned", planned)
     db.execute("DELETE FROM meta")
     meta: dict[str, object] = {"results_version": RESULTS_VERSION}
-    meta["measures"] = tables(noted.measures)
-    meta |= {"spec": noted.spec, "conditions": noted.conditions}
-    meta |= {"sources": noted.sources, "code": noted.code}
+    meta["measures"] = tables(notes.measures)
+    meta |= {"spec": notes.spec, "conditions": notes.conditions}
+    meta |= {"sources": notes.sources, "code": notes.code}
     insert(db, "meta", [(key, json.dumps(value)) for key, value in meta.items()])
     insert(db, "meta", [("sha256", study_checksum(db))])
     if db.execute("SELECT 1 FROM ledger").fetchone() is None:

@@ -80,8 +80,8 @@ def _fault_of_study(path: Path, db: sqlite3.Connection) -> str | None:
 
 def _fault_of_trials(db: sqlite3.Connection) -> str | None:
     """Return whether its trials are those that were run; for their rows see `Store.verify`."""
-    noted = db.execute("SELECT count(*) FROM checksums").fetchall()
-    if db.execute("SELECT trials FROM ledger").fetchall() != noted:
+    kept = db.execute("SELECT count(*) FROM checksums").fetchall()
+    if db.execute("SELECT trials FROM ledger").fetchall() != kept:
         return "it does not hold as many trials as were run"
     if unwritten := _select(db, _NOT_IN_LEDGER):
         return f"it holds rows that no run wrote: {_name(db, unwritten)}"

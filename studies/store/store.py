@@ -25,7 +25,7 @@ from ..errors import SpecError
 from . import database, durable, integrity
 from .checksums import trial_checksums
 from .connection import DamageError, has_log, open_to_read, open_to_write, transaction
-from .database import DATABASE, NoStudyError, Noted, Planned
+from .database import DATABASE, NoStudyError, Planned, StudyNotes
 from .durable import Recording
 
 NO_LOG = (
@@ -114,9 +114,11 @@ class Store:
         """Return by module two digests of the code that computed what was added last."""
         return {name: (text, tree) for name, (text, tree) in self._read("code").items()}
 
-    def noted(self) -> Noted:
+    def study_notes(self) -> StudyNotes:
         """Return what the study is, but for its trials and code."""
-        return Noted(self.spec(), self.settings(), self.columns(), self.sources(), self.measures())
+        return StudyNotes(
+            self.spec(), self.settings(), self.columns(), self.sources(), self.measures()
+        )
 
     def measures(self) -> tuple[Measure, ...]:
         """Return what the study measures of its episodes, of any condition."""
@@ -208,7 +210,7 @@ class Store:
         }
         parts = ", ".join(f'{part} AS "seconds.{part}"' for part in database.SECONDS)
         cursor = self._db.execute(
-            f"SELECT c.condition, {''.join(f'c.{database.quoted(key)}, ' for key in swept)}seed, "
+            f"SELECT c.condition, {''.join(f'c.{database.quote(key)}, ' for key in swept)}seed, "
             f"state, identity, error, {parts} FROM trials "
             "JOIN conditions c USING (condition) LEFT JOIN seconds USING (identity) "
             "ORDER BY position, seed"
@@ -239,9 +241,9 @@ class Store:
     @classmethod
     @contextmanager
     def create(
-        cls, directory: Path, noted: Noted, files: Mapping[str, bytes], damage: str | None
+        cls, directory: Path, study: StudyNotes, files: Mapping[str, bytes], damage: str | None
     ) -> Iterator[Store]:
-        """Open a directory to write, within the context of `locked`.
+        """Open a directory to write, within the context of `lock_directory`.
 
         A damaged database is set aside under another name, and what can be trusted of it copied.
 
@@ -249,8 +251,8 @@ class Store:
         ----------
         directory
             The directory; what it holds must be the same study.
-        noted
-            What the study is.
+        study
+            What it is.
         files
             Contents of files that are kept beside the database, by name.
         damage
@@ -264,12 +266,12 @@ class Store:
         path = directory / DATABASE
         reason = None if damage is None else f"is damaged: {damage}"
         if damage is None:
-            reason = integrity.find_superseded(path, {trial.identity for trial in noted.planned})
+            reason = integrity.find_superseded(path, {trial.identity for trial in study.planned})
         aside = None if reason is None else integrity.set_aside(path)
         with open_to_write(path) as connection:
             store = cls(directory, connection)
             with transaction(connection):
-                database.prepare(connection, noted)
+                database.prepare(connection, study)
                 recovered = 0 if aside is None else integrity.recover(aside, connection)
             if aside is not None:
                 store.notes.append(
@@ -283,7 +285,7 @@ class Store:
                 kept.parent.mkdir(exist_ok=True)
                 if not kept.exists() or durable.read_bytes(kept) != content:
                     durable.write(kept, content)
-            store._code = noted.code_digest
+            store._code = study.code_digest
             yield store
 
     def states(self) -> dict[str, str]:
@@ -303,9 +305,9 @@ class Store:
         query = (
             "SELECT identity, condition, seed, recording_sha256 FROM trials WHERE state = 'done'"
         )
-        for identity, condition, seed, noted in self._db.execute(query).fetchall():
+        for identity, condition, seed, written in self._db.execute(query).fetchall():
             path = self._recordings(identity)
-            if identity not in damaged and (digest := durable.sha256(path)) != noted:
+            if identity not in damaged and (digest := durable.sha256(path)) != written:
                 what = "is missing" if digest is None else "is damaged"
                 damaged[identity] = f"{path}: {what} ({condition}, seed {seed})"
         return damaged
@@ -354,8 +356,8 @@ class Store:
     def recording(self, identity: str, name: str) -> Recording:
         """Return a recorded episode of a trial by its name in `Planned.recorded`, or its `TEAM`."""
         query = "SELECT recording_sha256 FROM trials WHERE identity = ?"
-        noted = self._db.execute(query, (identity,)).fetchone()
-        return durable.read_recording(self._recordings(identity), name, *(noted or ()))
+        row = self._db.execute(query, (identity,)).fetchone()
+        return durable.read_recording(self._recordings(identity), name, *(row or ()))
 
     def _recordings(self, identity: str) -> Path:
         return self.directory / "recordings" / f"{identity}.npz"

@@ -20,7 +20,7 @@ MARK = "running.json"
 
 
 @contextmanager
-def locked(directory: Path) -> Iterator[None]:
+def lock_directory(directory: Path) -> Iterator[None]:
     """Keep others from writing to a directory, which is made if it does not exist.
 
     Raises

@@ -16,10 +16,10 @@ from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import aliases, dumps, flat, named
 from ..store.connection import DamageError
-from ..store.database import DATABASE, SPEC_FILE, NoStudyError, Noted
+from ..store.database import DATABASE, SPEC_FILE, NoStudyError, StudyNotes
 from ..store.durable import read_text
 from ..store.store import Store
-from ..store.writer import locked
+from ..store.writer import lock_directory
 from .episodes import column_of
 from .trial import Trial, trials_of
 
@@ -67,15 +67,15 @@ def open_to_run(
         If it cannot be written, holds a study that differs by more than additional seeds, or
         another process is writing to it. Nothing has been changed then.
     """
-    noted = notes_of(spec, measures, trials)
-    _examine(directory, spec, noted, accept_code=accept_code)  # what is refused leaves nothing
-    with locked(directory):
+    notes = notes_of(spec, measures, trials)
+    _examine(directory, spec, notes, accept_code=accept_code)  # what is refused leaves nothing
+    with lock_directory(directory):
         # Again: nobody else writes from here on.
-        damage, code = _examine(directory, spec, noted, accept_code=accept_code)
-        computed = replace(noted, code=present(code))
+        damage, code = _examine(directory, spec, notes, accept_code=accept_code)
+        computed = replace(notes, code=present(code))
         copies = spec.sources.texts.items()  # to be read and run again, as is the spec
         files = {f"{FOLDER}/{kept_name(name)}": text.encode() for name, text in copies}
-        if not is_copy(directory / SPEC_FILE, spec, noted):
+        if not is_copy(directory / SPEC_FILE, spec, notes):
             files[SPEC_FILE] = dumps(spec.table()).encode()
         with Store.create(directory, computed, files, damage) as store:
             yield store
@@ -128,9 +128,11 @@ def check_teams(store: Store, identities: Container[str] = ()) -> None:
             raise SpecError(f"{line}; nested-agents run runs it again")
 
 
-def notes_of(spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Trial] = ()) -> Noted:
+def notes_of(
+    spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Trial] = ()
+) -> StudyNotes:
     """Return what a store notes of a study."""
-    return Noted(
+    return StudyNotes(
         spec=json.loads(json.dumps(spec.table())),
         conditions={c.label: c.settings.model_dump(mode="json") for c in spec.conditions()},
         columns={c.label: c.columns for c in spec.conditions()},
@@ -141,7 +143,7 @@ def notes_of(spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Tria
 
 
 def _examine(
-    directory: Path, spec: Spec, noted: Noted, *, accept_code: bool
+    directory: Path, spec: Spec, notes: StudyNotes, *, accept_code: bool
 ) -> tuple[str | None, Code | None]:
     """Return what is wrong with a directory's database as a whole, and the code of its results.
 
@@ -149,7 +151,7 @@ def _examine(
     ----------
     directory
         The directory.
-    spec, noted
+    spec, notes
         The study that is to be run in it, and what would be noted of it.
     accept_code
         Whether to go on although the installed code has changed.
@@ -163,33 +165,33 @@ def _examine(
     code: Code | None = None
     try:
         with Store.open(directory) as store:
-            mismatch = _mismatch_of_study(store, spec, noted, accept_code)
+            mismatch = _mismatch_of_study(store, spec, notes, accept_code)
             code = store.code()
     except (NoStudyError, DamageError) as error:
         damage = error.reason
-        mismatch = _mismatch_of_file(directory / SPEC_FILE, spec, noted, damage)
+        mismatch = _mismatch_of_file(directory / SPEC_FILE, spec, notes, damage)
     if mismatch is not None:
         raise SpecError(f"{directory}: holds another study: {mismatch}")
     return damage, code
 
 
-def is_copy(path: Path, spec: Spec, noted: Noted) -> bool:
+def is_copy(path: Path, spec: Spec, notes: StudyNotes) -> bool:
     """Tell whether a file holds a spec; what the spec names of users' files is not read again."""
     try:
         table = tomllib.loads(read_text(path))
-        return table == noted.spec or Spec.of(table, spec.sources) == spec
+        return table == notes.spec or Spec.of(table, spec.sources) == spec
     except (OSError, ValueError, RecursionError):
         return False
 
 
-def _mismatch_of_file(path: Path, spec: Spec, noted: Noted, damage: str | None) -> str | None:
+def _mismatch_of_file(path: Path, spec: Spec, notes: StudyNotes, damage: str | None) -> str | None:
     """Return how a spec differs from that of a file, where there is no sound database."""
-    if not path.exists() or is_copy(path, spec, noted):
+    if not path.exists() or is_copy(path, spec, notes):
         return None
     if damage is None:
         raise SpecError(f"{path}: is in the way of this study's own copy") from None
     try:
-        return difference(notes_of(Spec.load(path)), noted)
+        return difference(notes_of(Spec.load(path)), notes)
     except SpecError as error:
         raise SpecError(
             f"{path}: is no spec, and {DATABASE} beside it is damaged: which study this is cannot "
@@ -197,13 +199,15 @@ def _mismatch_of_file(path: Path, spec: Spec, noted: Noted, damage: str | None) 
         ) from None
 
 
-def _mismatch_of_study(store: Store, spec: Spec, noted: Noted, accept_code: bool) -> str | None:
+def _mismatch_of_study(
+    store: Store, spec: Spec, notes: StudyNotes, accept_code: bool
+) -> str | None:
     """Return how a spec differs from that of an open study."""
     if not accept_code and (refusal := outdated(store)) is not None:
         raise SpecError(refusal)
-    mismatch = difference(store.noted(), noted)
+    mismatch = difference(store.study_notes(), notes)
     copy = store.directory / SPEC_FILE
-    if mismatch is not None and is_copy(copy, spec, noted):
+    if mismatch is not None and is_copy(copy, spec, notes):
         raise SpecError(
             f"{copy}: is not the spec of the study beside it: {mismatch}; if you did not edit it, "
             f"it is damaged: nested-agents retry {store.directory} goes on by the database"
@@ -211,7 +215,7 @@ def _mismatch_of_study(store: Store, spec: Spec, noted: Noted, accept_code: bool
     return mismatch
 
 
-def difference(old: Noted, new: Noted) -> str | None:
+def difference(old: StudyNotes, new: StudyNotes) -> str | None:
     """Return one line on what keeps a study from being added to another; None if nothing does.
 
     Only what they mean is compared, not how it is written. Seeds may be added.
@@ -223,7 +227,7 @@ def difference(old: Noted, new: Noted) -> str | None:
     return f"{lines[0]}{more}; use another directory"
 
 
-def _differences(old: Noted, new: Noted) -> Iterator[str]:
+def _differences(old: StudyNotes, new: StudyNotes) -> Iterator[str]:
     yield from _changed_files(old.sources, new.sources)
     for name in SAME:
         yield from _unequal(name, old.spec.get(name, ABSENT), new.spec.get(name, ABSENT))
@@ -239,13 +243,13 @@ def _differences(old: Noted, new: Noted) -> Iterator[str]:
     for stages, new_stages in zip(_curricula(old), _curricula(new), strict=False):
         yield from _unequal("curriculum", stages, new_stages)
     # What tells conditions apart are the columns of every table.
-    keys, new_keys = (list(next(iter(noted.columns.values()))) for noted in (old, new))
+    keys, new_keys = (list(next(iter(notes.columns.values()))) for notes in (old, new))
     yield from _unequal("columns", keys, new_keys)
     if old.measures and [*map(column_of, old.measures)] != [*map(column_of, new.measures)]:
-        there, here = (", ".join(m.name for m in noted.measures) for noted in (old, new))
+        there, here = (", ".join(m.name for m in notes.measures) for notes in (old, new))
         yield f"episodes are measured by {there} there, {here} here, or these mean something else"
     for label in [label for label in new.conditions if label in old.conditions]:
-        before, after = (dict(flat(noted.conditions[label])) for noted in (old, new))
+        before, after = (dict(flat(notes.conditions[label])) for notes in (old, new))
         for key in sorted(before.keys() | after.keys()):
             there = before.get(key, ABSENT)
             here = after.get(key, ABSENT)
@@ -280,7 +284,7 @@ def _unequal(name: str, there: object, here: object) -> Iterator[str]:
         yield f"{name} = {texts[0]} there, {texts[1]} here"
 
 
-def _curricula(noted: Noted) -> list[Sequence[Mapping[str, Any]]]:
+def _curricula(notes: StudyNotes) -> list[Sequence[Mapping[str, Any]]]:
     """Return the stages of the spec and of each of its overrides, as they are written."""
-    own = noted.spec.get("curriculum", [])
-    return [own, *(o.get("curriculum", own) for o in noted.spec.get("overrides", ()))]
+    own = notes.spec.get("curriculum", [])
+    return [own, *(o.get("curriculum", own) for o in notes.spec.get("overrides", ()))]

@@ -3,11 +3,15 @@
 import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 from published_tables import print_table
 
+import nested_agents as na
 from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.presentation.tables import Cell
+from nested_agents.studies.results.statistics import bootstrap, two_figures
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "learning.md"
@@ -48,6 +52,33 @@ def test_the_planner(capsys: pytest.CaptureFixture[str]) -> None:
     choice = ["--where", "preset == 'planner'", "--columns", "evaluation success"]
     assert main(["table", path, *choice, "--format", "markdown"]) == 0
     assert capsys.readouterr().out in PAGE.read_text(encoding="utf-8")
+
+
+SIZES = (2, 4, 8, 16)
+IN_A_ROW = 5
+"""Training episodes over which a success rate of .8 is looked for."""
+
+
+def test_decisions_to_a_success_rate() -> None:
+    results = na.load(ROWS / "scaling.json").results
+    to_first: list[np.ndarray] = []
+    to_last: list[np.ndarray] = []
+    for robots in SIZES:
+        success = results.success(str(robots))
+        decisions = results.values(str(robots), "steps").cumsum(axis=1)
+        blocks = np.lib.stride_tricks.sliding_window_view(success, IN_A_ROW, axis=1)
+        reached = blocks.sum(axis=2) >= 4
+        assert reached.any(axis=1).all()
+        first = reached.argmax(axis=1)
+        seeds = np.arange(len(success))
+        to_first.append(decisions[seeds, first])
+        to_last.append(decisions[seeds, first + IN_A_ROW - 1])
+    page = " ".join(PAGE.read_text(encoding="utf-8").split())
+    for counted in (to_first, to_last):
+        slopes = np.polyfit(np.log(SIZES), np.log(counted), 1)[0]
+        assert f"n^{Cell.of(bootstrap(slopes)).bracketed(' ')}" in page
+    means = [f"{float(two_figures(float(d.mean()))):,.0f}" for d in to_first]
+    assert f"16 robots: {', '.join(means[:-1])} and {means[-1]} in the mean over 20 seeds" in page
 
 
 def test_failures_of_large_teams(capsys: pytest.CaptureFixture[str]) -> None:

@@ -160,5 +160,7 @@ def test_a_learner_of_another_library_is_entered(
 
 
 def test_the_command_offers_what_entries_may_be() -> None:
-    assert tuple(map(int, commands.sizes.choices)) == push_n.SIZES
-    assert tuple(commands.given.choices) == get_args(push_n.Entry.model_fields["given"].annotation)
+    options = {option.name: option for option in commands.benchmark.commands["run"].params}
+    assert tuple(map(int, options["robots"].type.choices)) == push_n.SIZES
+    allowed = get_args(push_n.Entry.model_fields["given"].annotation)
+    assert tuple(options["given"].type.choices) == allowed

@@ -4,6 +4,7 @@ import re
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from published_tables import print_table
 
@@ -12,7 +13,9 @@ from nested_agents.results import ROWS
 from nested_agents.studies.catalogue.chain_order import equivalence
 from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results.contrasts import contrasts
-from nested_agents.studies.results.statistics import two_figures
+from nested_agents.studies.results.results import Results
+from nested_agents.studies.results.statistics import bootstrap, paired_permutation, two_figures
+from nested_agents.studies.store.database import EVALUATION
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "topologies.md"
 EDGES = ("evaluation success", "decisions to goal", "decision [ms]", "messages")
@@ -28,6 +31,63 @@ EDGES = ("evaluation success", "decisions to goal", "decision [ms]", "messages")
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: put in\n{table}"
+
+
+SETTINGS = {
+    "own values, 3 sizes": ("own",),
+    "team's value, 3 sizes": ("team",),
+    "all six settings": ("own", "team"),
+}
+
+
+def test_what_telling_is_worth_over_all_settings() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    results = na.load(ROWS / "edges.json").results
+    for name, whose in SETTINGS.items():
+        lost, slower = pooled(results, whose, "considered only")
+        line = f"| {name} | {shown(lost)} | {p_of(lost)} | {times(slower)} | {p_of(slower)} |"
+        assert line in page, f"docs/topologies.md: put in\n{line}"
+    lost, slower = pooled(results, ("own",), "considered only")
+    own = f"lose {shown(-lost)} and take {times(slower)} times the decisions"
+    assert own in " ".join((PAGE.parents[1] / "README.md").read_text(encoding="utf-8").split())
+    assert f"{shown(-lost)}, which does not decide" in (PAGE.parent / "claims.md").read_text()
+    gained, as_many = pooled(results, ("own", "team"), "considered only, private plans")
+    text = " ".join(page.split())
+    assert f"it gains {shown(gained)} on the chain (p = {p_of(gained)})" in text
+    ratio = bootstrap(as_many)
+    value, low, high = np.exp([ratio.value, ratio.low, ratio.high])
+    assert f"({value:.2f} [{low:.2f}, {high:.2f}] times)" in text
+
+
+def pooled(results: Results, whose: tuple[str, ...], other: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return of each seed the mean difference of success, and of the logarithm of decisions."""
+    gained = []
+    longer = []
+    for condition in results.conditions:
+        if results.columns[condition]["learner.decision.value_of"] in whose:
+            phases = ("evaluation", EVALUATION + other)
+            trained, without = (results.success(condition, phase) for phase in phases)
+            steps = [results.values(condition, "steps", phase) for phase in phases]
+            gained.append(without.mean(axis=1) - trained.mean(axis=1))
+            before = (trained * steps[0]).sum(axis=1) / trained.sum(axis=1)
+            after = (without * steps[1]).sum(axis=1) / without.sum(axis=1)
+            longer.append(np.log(after / before))
+    return np.mean(gained, axis=0), np.mean(longer, axis=0)
+
+
+def shown(of_seeds: np.ndarray) -> str:
+    return Cell.of(bootstrap(of_seeds)).bracketed(" ")
+
+
+def times(logarithms: np.ndarray) -> str:
+    e = bootstrap(logarithms)
+    value, low, high = np.exp([e.value, e.low, e.high])
+    return f"{value:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def p_of(of_seeds: np.ndarray) -> str:
+    p = paired_permutation(of_seeds, np.zeros_like(of_seeds))
+    return "< .001" if p < 0.001 else f"{p:.1g}".removeprefix("0") if p < 0.1 else f"{p:.2f}"[1:]
 
 
 EVALUATED_AS = (

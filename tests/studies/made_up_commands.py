@@ -35,7 +35,7 @@ def run_here(measure, *arguments, usual=("svg",)):
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.setattr(figures, "USUAL", usual)
         patch.setattr(learning_curve, "measure", measure)
-        patch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
+        patch.setattr(studies_run, "check_conditions", lambda spec, **_: made_up.MEASURES)
         patch.setenv("COLUMNS", "80")
         status = main([str(argument) for argument in arguments])
     return status, out.getvalue(), err.getvalue()

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.numerics import FloatArray, IntArray, njit
+from ....core.numerics import BoolArray, FloatArray, IntArray, njit
 from ..world.geometry import LANES, nearest_points, surface
 from ..world.robots import resistance
 from ..world.settings import RobotSettings
@@ -94,7 +94,14 @@ def push(
 
 
 @njit(cache=True)
-def pushed(robots, box, twists, choices, seconds, model):  # type: ignore[no-untyped-def]
+def pushed(
+    robots: FloatArray,
+    box: FloatArray,
+    twists: FloatArray,
+    choices: IntArray,
+    seconds: float,
+    model: PushModel,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return what `push` does with the combinations last: ``(M, 3, m)``, ``(3, m)``, ``(M, m)``.
 
     Transposing within a kernel would take as long to compile as half of the arithmetic.
@@ -152,7 +159,18 @@ def pushed(robots, box, twists, choices, seconds, model):  # type: ignore[no-unt
 
 
 @njit(cache=True)
-def _substep(bodies, box, near, substep, way, spare, moved, dt, model, width):  # type: ignore[no-untyped-def]
+def _substep(
+    bodies: FloatArray,
+    box: FloatArray,
+    near: BoolArray,
+    substep: int,
+    way: FloatArray,
+    spare: FloatArray,
+    moved: float,
+    dt: float,
+    model: PushModel,
+    width: int,
+) -> float:
     """Find the contacts of all robots, their forces, and move the box for `dt` seconds.
 
     The robots are moved when they are next looked at, which saves to go through them once more.
@@ -214,7 +232,7 @@ class PushBelief(NamedTuple):
 
 
 @njit(cache=True)
-def believing(belief, constants):  # type: ignore[no-untyped-def]
+def believing(belief: PushBelief, constants: FloatArray) -> PushModel:
     """Return the `PushModel` of constants ``(3,)``."""
     model, factors = belief.model, np.exp(constants)
     compliance = np.empty_like(belief.ahead)
@@ -225,16 +243,26 @@ def believing(belief, constants):  # type: ignore[no-untyped-def]
             for j in range(3):
                 compliance[r, i, j] = inverse[i, j]
     return PushModel(
-        model.edges, model.rounding, model.reach, model.radii, compliance,
-        model.friction_force, model.friction_radius, model.contact_friction * factors[2],
-    )  # fmt: skip
+        model.edges,
+        model.rounding,
+        model.reach,
+        model.radii,
+        compliance,
+        model.friction_force,
+        model.friction_radius,
+        model.contact_friction * factors[2],
+    )
 
 
 @njit(cache=True)
-def outcomes(  # type: ignore[no-untyped-def]
-    robots: FloatArray, box: FloatArray, twists: FloatArray, seconds: float, belief,
+def outcomes(
+    robots: FloatArray,
+    box: FloatArray,
+    twists: FloatArray,
+    seconds: float,
+    belief: PushBelief,
     constants: FloatArray,
-):  # fmt: skip
+) -> FloatArray:
     """Predict one push under several constants.
 
     Parameters
@@ -268,7 +296,7 @@ def outcomes(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _twist(before, after, seconds, out) -> None:  # type: ignore[no-untyped-def]
+def _twist(before: FloatArray, after: FloatArray, seconds: float, out: FloatArray) -> None:
     """Write the constant twist between two poses, as `prediction.mean_twists` does.
 
     With that in its place `outcomes` takes 3.9 times as long. The last bits of the two differ (a

@@ -10,7 +10,7 @@ is the oracle of the tests, `tests/scenarios/box_pushing/push_oracle.py`.
 
 import numpy as np
 
-from ....core.numerics import njit
+from ....core.numerics import FloatArray, njit
 from ..world.geometry import LANES, NEAREST_SIZE
 
 CREEP = 0.002
@@ -51,7 +51,7 @@ _EXACT = {"contract", "nsz"}
 
 
 @njit(cache=True, fastmath=_EXACT)
-def head(rows, lanes):  # type: ignore[no-untyped-def]
+def head(rows: FloatArray, lanes: int) -> None:
     """Write cosine and sine of the heading: to the last bit but one, for any sane angle.
 
     The angle is reduced to an eighth of a turn on either side of a quarter, in two steps for
@@ -84,7 +84,7 @@ def head(rows, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def localise(body, box, lanes):  # type: ignore[no-untyped-def]
+def localise(body: FloatArray, box: FloatArray, lanes: int) -> None:
     """Write where the robot is in the frame of the box."""
     for k in range(lanes):
         dx, dy = body[X + k] - box[X + k], body[Y + k] - box[Y + k]
@@ -94,7 +94,15 @@ def localise(body, box, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def touch(body, box, radius, rounding, compliance, dt, lanes):  # type: ignore[no-untyped-def]
+def touch(
+    body: FloatArray,
+    box: FloatArray,
+    radius: float,
+    rounding: float,
+    compliance: FloatArray,
+    dt: float,
+    lanes: int,
+) -> int:
     """Write the contact rows of a robot; return in how many lanes it may touch the box."""
     c00, c01, c02 = compliance[0, 0], compliance[0, 1], compliance[0, 2]
     c10, c11, c12 = compliance[1, 0], compliance[1, 1], compliance[1, 2]
@@ -102,8 +110,10 @@ def touch(body, box, radius, rounding, compliance, dt, lanes):  # type: ignore[n
     touching = 0
     for k in range(lanes):
         ahead, left, turn = (
-            body[AHEAD + k], body[LEFT + k], body[TURN + k],
-        )  # fmt: skip
+            body[AHEAD + k],
+            body[LEFT + k],
+            body[TURN + k],
+        )
         qx, qy, side = box[NEAR_X + k], box[NEAR_Y + k], box[SIDE + k]
         off = np.sqrt(box[SQUARE + k])
         # Away from the surface the normal points from the nearest point, on it across the edge.
@@ -139,7 +149,7 @@ def touch(body, box, radius, rounding, compliance, dt, lanes):  # type: ignore[n
 
 
 @njit(cache=True, fastmath=_EXACT)
-def rest(box, force, lanes):  # type: ignore[no-untyped-def]
+def rest(box: FloatArray, force: float, lanes: int) -> None:
     """Begin the sweeps: no forces, and a box that moves as readily as at `START_SPEED`."""
     for k in range(lanes):
         box[U_X + k] = box[U_Y + k] = box[U_W + k] = 0.0
@@ -148,14 +158,14 @@ def rest(box, force, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def release(body, lanes):  # type: ignore[no-untyped-def]
+def release(body: FloatArray, lanes: int) -> None:
     """Take the contact force off a robot."""
     for k in range(lanes):
         body[FORCE_N + k] = body[FORCE_T + k] = 0.0
 
 
 @njit(cache=True, fastmath=_EXACT)
-def answer(body, box, rho2, friction, lanes):  # type: ignore[no-untyped-def]
+def answer(body: FloatArray, box: FloatArray, rho2: float, friction: float, lanes: int) -> None:
     """Let one robot find its contact force, the others' given."""
     for k in range(lanes):
         ix, iy = body[NX + k], body[NY + k]
@@ -194,7 +204,7 @@ def answer(body, box, rho2, friction, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def drag(box, rho2, force, lanes):  # type: ignore[no-untyped-def]
+def drag(box: FloatArray, rho2: float, force: float, lanes: int) -> None:
     """Let the box move as the contact forces have it."""
     for k in range(lanes):
         mobility = box[MOBILITY + k]
@@ -206,7 +216,7 @@ def drag(box, rho2, force, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def move(body, radius, compliance, dt, lanes):  # type: ignore[no-untyped-def]
+def move(body: FloatArray, radius: float, compliance: FloatArray, dt: float, lanes: int) -> None:
     """Move a robot for one substep under its twist and its contact force."""
     c00, c01, c02 = compliance[0, 0], compliance[0, 1], compliance[0, 2]
     c10, c11, c12 = compliance[1, 0], compliance[1, 1], compliance[1, 2]
@@ -233,7 +243,7 @@ def move(body, radius, compliance, dt, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def carry(box, reach, dt, lanes):  # type: ignore[no-untyped-def]
+def carry(box: FloatArray, reach: float, dt: float, lanes: int) -> float:
     """Move the box for one substep; return how far at most what lies within its reach moves."""
     farthest = 0.0
     for k in range(lanes):

@@ -106,11 +106,11 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray, merge: bool) ->
             which[r, c] = command
     return WheelCommands(
         counts, speeds, twists, which, sizes, ordered, level, n_distinct, first, distinct
-    )  # fmt: skip
+    )
 
 
 @njit(cache=True)
-def _find(twists, command, first):  # type: ignore[no-untyped-def]
+def _find(twists: FloatArray, command: int, first: IntArray) -> int:
     """Return which of the commands `first` has the twist of `command`, -1 if none."""
     for m in range(len(first)):
         off = 0.0

@@ -160,7 +160,9 @@ def _direction(ways: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def _inward(robots, boxes, edges, rounding):  # type: ignore[no-untyped-def]
+def _inward(
+    robots: FloatArray, boxes: FloatArray, edges: FloatArray, rounding: float
+) -> FloatArray:
     """Return the direction into the box ``(m,)`` at the point next to each robot, world frame."""
     directions = np.empty(len(robots))
     for c in range(len(robots)):

@@ -96,7 +96,7 @@ class Columns:
 
 
 @njit(cache=True, fastmath=_EXACT)
-def angle_of(x, y):  # type: ignore[no-untyped-def]
+def angle_of(x: float, y: float) -> float:
     """Return the angle of a vector, as ``arctan2(y, x)`` to its last bits.
 
     The angle with the nearer axis or diagonal is below pi / 8; there the rational function of
@@ -127,18 +127,28 @@ def angle_of(x, y):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def wrapped(angle):  # type: ignore[no-untyped-def]
+def wrapped(angle: float) -> float:
     """Map an angle to [-pi, pi), as `wrap` but for last bits, on which published rows hang."""
     return angle - 2.0 * pi * np.floor((angle + pi) / (2.0 * pi))
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-untyped-def]
+def _of_box(
+    box: FloatArray,
+    goal: FloatArray,
+    before: float,
+    periods: float,
+    first: int,
+    count: int,
+    work: FloatArray,
+) -> None:
     """Write how far the box has to go and has come, and how it is turned."""
     gx, gy, turned = goal[0], goal[1], goal[2]
     bx, by, psi = (
-        box[0, first : first + count], box[1, first : first + count], box[2, first : first + count],
-    )  # fmt: skip
+        box[0, first : first + count],
+        box[1, first : first + count],
+        box[2, first : first + count],
+    )
     for k in range(count):
         dx, dy = gx - bx[k], gy - by[k]
         course, distance = angle_of(dx, dy), np.sqrt(dx * dx + dy * dy)
@@ -152,7 +162,18 @@ def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_middle(robots, gaps, touching, box, goal, first, count, work, push, cross_track):  # type: ignore[no-untyped-def]
+def _of_middle(
+    robots: FloatArray,
+    gaps: FloatArray,
+    touching: bool,
+    box: FloatArray,
+    goal: FloatArray,
+    first: int,
+    count: int,
+    work: FloatArray,
+    push: int,
+    cross_track: int,
+) -> None:
     """Write into two rows where the robots' middle would push the box, and its cross-track error.
 
     Those `touching` weigh more, see `View.contact_push`, or all the same.
@@ -181,7 +202,9 @@ def _of_middle(robots, gaps, touching, box, goal, first, count, work, push, cros
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_robot(robot, gap, box, first, count, work):  # type: ignore[no-untyped-def]
+def _of_robot(
+    robot: FloatArray, gap: FloatArray, box: FloatArray, first: int, count: int, work: FloatArray
+) -> None:
     """Write the gap of a robot, the bearing of the box from it, and on which side it stands."""
     x, y = robot[0, first : first + count], robot[1, first : first + count]
     bx, by = box[0, first : first + count], box[1, first : first + count]
@@ -194,19 +217,24 @@ def _of_robot(robot, gap, box, first, count, work):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-def]
+def _of_face(
+    robot: FloatArray, box: FloatArray, edges: FloatArray, first: int, count: int, work: FloatArray
+) -> None:
     """Write the bearing of the way into the face of the box that is next to a robot.
 
     As `View.inward`: the direction to the nearest point from outside, away from it from inside.
     Rounding moves that point along the same line.
     """
     x, y, psi = (
-        robot[0, first : first + count], robot[1, first : first + count],
+        robot[0, first : first + count],
+        robot[1, first : first + count],
         robot[2, first : first + count],
-    )  # fmt: skip
+    )
     bx, by, turn = (
-        box[0, first : first + count], box[1, first : first + count], box[2, first : first + count],
-    )  # fmt: skip
+        box[0, first : first + count],
+        box[1, first : first + count],
+        box[2, first : first + count],
+    )
     near = work[_NEAREST:]
     for k in range(count):
         cos, sin = work[_COS + k], work[_SIN + k]
@@ -225,9 +253,17 @@ def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_path(  # type: ignore[no-untyped-def]
-    box, origin, periods, edges, friction_radius, middle, first, count, work
-):
+def _of_path(
+    box: FloatArray,
+    origin: FloatArray,
+    periods: float,
+    edges: FloatArray,
+    friction_radius: float,
+    middle: FloatArray,
+    first: int,
+    count: int,
+    work: FloatArray,
+) -> None:
     """Write where the box is going and by how much it will miss the goal, see `View.path`.
 
     Behind `_of_middle` of those in contact, which it takes; `middle` ``(3, m)`` is scratch.
@@ -258,7 +294,7 @@ def _of_path(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_all(gaps, first, count, aways, work):  # type: ignore[no-untyped-def]
+def _of_all(gaps: FloatArray, first: int, count: int, aways: FloatArray, work: FloatArray) -> None:
     """Write the two greatest gaps of all robots, how far each is away, and how many are."""
     for k in range(count):
         work[_WIDEST + k] = work[_SECOND + k] = -np.inf
@@ -275,7 +311,9 @@ def _of_all(gaps, first, count, aways, work):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_others(gaps, robot, first, count, aways, work):  # type: ignore[no-untyped-def]
+def _of_others(
+    gaps: FloatArray, robot: int, first: int, count: int, aways: FloatArray, work: FloatArray
+) -> None:
     """Write the greatest gap of the other robots and how many are away; of one alone its own."""
     n, gap = len(gaps), gaps[robot, first : first + count]
     share, alone = 1.0 / max(n - 1, 1), n == 1
@@ -292,10 +330,23 @@ def _of_others(gaps, robot, first, count, aways, work):  # type: ignore[no-untyp
 
 
 @njit(cache=True)
-def _relational(  # type: ignore[no-untyped-def]
-    robots, box, gaps, goal, origin, before, periods, edges, friction_radius, wanted, columns,
-    of_push, of_contact, of_path, of_face,
-):  # fmt: skip
+def _relational(
+    robots: FloatArray,
+    box: FloatArray,
+    gaps: FloatArray,
+    goal: FloatArray,
+    origin: FloatArray,
+    before: float,
+    periods: float,
+    edges: FloatArray,
+    friction_radius: float,
+    wanted: IntArray,
+    columns: IntArray,
+    of_push: bool | None,
+    of_contact: bool | None,
+    of_path: bool | None,
+    of_face: bool | None,
+) -> FloatArray:
     """Return relational shared blocks ``(robots wanted, m, columns)``.
 
     Parameters

@@ -110,7 +110,7 @@ def surface(
 
 
 @njit(cache=True, fastmath={"contract", "nsz"})
-def nearest_points(edges, rows, lanes):  # type: ignore[no-untyped-def]
+def nearest_points(edges: FloatArray, rows: FloatArray, lanes: int) -> None:
     """Write for each of some points the nearest point of an outline without rounding.
 
     Parameters
@@ -158,7 +158,9 @@ def nearest_points(edges, rows, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def gaps(robots, boxes, edges, rounding, radii):  # type: ignore[no-untyped-def]
+def gaps(
+    robots: FloatArray, boxes: FloatArray, edges: FloatArray, rounding: float, radii: FloatArray
+) -> FloatArray:
     """Return the gaps ``(m,)`` between round bodies and boxes [m], slightly negative in contact.
 
     Parameters
@@ -197,7 +199,17 @@ def disc_hit(cx: float, cy: float, radius: float, dx: float, dy: float, reach: f
 
 
 @njit(cache=True)
-def _ray_edge(x0, y0, x1, y1, x, y, dx, dy, reach) -> float:  # type: ignore[no-untyped-def]
+def _ray_edge(
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    x: float,
+    y: float,
+    dx: float,
+    dy: float,
+    reach: float,
+) -> float:
     """Return the distance at which a ray crosses a segment, or `reach`.
 
     The segment is from (x0, y0) to (x1, y1), the ray from (x, y) on along (dx, dy).

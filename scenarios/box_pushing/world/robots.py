@@ -188,8 +188,13 @@ def wheel_model(
 
 
 @njit(cache=True)
-def wheel_wrenches(  # type: ignore[no-untyped-def]
-    motion: FloatArray, speeds: FloatArray, dt: float, model, last: FloatArray, out: FloatArray
+def wheel_wrenches(
+    motion: FloatArray,
+    speeds: FloatArray,
+    dt: float,
+    model: WheelModel,
+    last: FloatArray,
+    out: FloatArray,
 ) -> None:
     """Compute the wheels' wrenches on all robots for one physics step.
 

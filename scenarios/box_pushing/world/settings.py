@@ -44,15 +44,15 @@ class RewardSettings(Settings):
     """Whose contact and infrared readings the conditions ask for: those of all robots, as in the
     paper, one reward for all agents; or those of each robot, a reward for the agents of each."""
     c1: NonNegative = 0.01
-    """Weight of R1 (Eq. 15), the reward for the box being near the goal."""
+    """Weight of R1 (Eq. 16), the reward for the box being near the goal."""
     r1: NonNegative = 1.5
-    """Decay of R1 per metre of the box's distance to the goal."""
+    """Decay of R1 per metre of the box's distance to the goal (Eq. 16)."""
     c2: NonNegative = 0.0007
     """Weight of R2 and R3 (Eq. 16), the reward for robots being near the box."""
     r2: NonNegative = 5.0
     """Decay per unit of infrared reading of a robot (Eq. 16, for any number of robots)."""
     c4: NonNegative = 0.0003
-    """Penalty per radian of the box's orientation error (Eq. 17)."""
+    """Penalty per radian of the box's orientation error (Eq. 16)."""
     least_approach: NonNegative = 0.001
     """By how much the box must have come nearer in a decision period for a negative Delta D [m];
     with 0 a box that creeps by rounding errors is paid as one that is pushed."""

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...results.analysis import Analysis, Figures, phases_of, shared
+from ...results.analysis import Analysis, Figures, phases_of, select_shared
 from ...results.contrasts import Group, contrasts
 from ...results.results import Results
 from ...results.statistics import LEVEL, Friedman, friedman, holm, two_figures
@@ -87,7 +87,7 @@ def order_tests(results: Results) -> tuple[OrderTest, ...]:
     tests = []
     for title, phase in phases_of(results).items() if len(conditions) > 1 else ():
         means = [results.means(condition, phase) for condition in conditions]
-        values = np.stack(shared(means), axis=1)
+        values = np.stack(select_shared(means), axis=1)
         if len(values) >= 2:
             test = friedman(values)
             tests.append(OrderTest(title, len(conditions), len(values), test, test.p))

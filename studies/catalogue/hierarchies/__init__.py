@@ -20,7 +20,7 @@ import numpy as np
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, NOTHING, Analysis, Figures, Pair, Summary, judged
 from ...results.results import Results, Sizes
-from ...results.statistics import Array, Estimate, bootstrap, exactly, rate
+from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exactly, rate
 from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ..scaling import NUMBERS, measure
@@ -127,8 +127,8 @@ def estimates(
     values = {EVALUATED: rate(success)}
     decisions = to_the_goal(success, results.values(condition, "steps", phase))
     if len(decisions):
-        values["decisions to goal"] = bootstrap(decisions)
-    values[DECIDING] = bootstrap(1e3 * deciding)
+        values["decisions to goal"] = bootstrap(decisions, bounds=NOT_NEGATIVE)
+    values[DECIDING] = bootstrap(1e3 * deciding, bounds=NOT_NEGATIVE)
     values["messages"] = exactly(messages[0])
     return values
 

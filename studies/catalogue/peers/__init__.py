@@ -13,7 +13,7 @@ import numpy as np
 
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, judged
 from ...results.results import Results
-from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stacked
+from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stack_estimates
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
@@ -93,7 +93,10 @@ def analyse(results: Results) -> Analysis:
         seconds = [np.mean(numbers.get(f"{CPU}{count}", np.nan)) for count in success]
         courses.append(
             LearningCourse(
-                condition, np.array(decisions), np.array(seconds), stacked([*success.values()])
+                condition,
+                np.array(decisions),
+                np.array(seconds),
+                stack_estimates([*success.values()]),
             )
         )
     if not courses:

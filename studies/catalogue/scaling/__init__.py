@@ -18,7 +18,7 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.numerics import FloatArray, pd
-from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, shared
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, select_shared
 from ...results.results import Results, Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
 from ...spec.tables import label_but
@@ -177,7 +177,7 @@ def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:
         own = [p for p in points if p.evaluator == evaluator]
         sizes = np.log([p.agents for p in own])
         for what, title in TIMES.items():
-            times = np.stack(shared([p.times[title] for p in own]))
+            times = np.stack(select_shared([p.times[title] for p in own]))
             if len({*sizes}) > 1 and times.size:
                 estimate = bootstrap(np.polyfit(sizes, np.log(times), 1)[0])
                 exponents.setdefault(evaluator, {})[what] = estimate

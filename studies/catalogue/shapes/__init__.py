@@ -8,7 +8,7 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 import numpy as np
 
-from ...results.analysis import Analysis, Difference, Figures, Summary, adjusted, ratio
+from ...results.analysis import Analysis, Difference, Figures, Summary, adjust, ratio
 from ...results.power import power_lines
 from ...results.results import Results
 from ...results.statistics import bootstrap, rate
@@ -54,7 +54,7 @@ def analyse(results: Results) -> Analysis:
                 e = d.estimate
                 interval = f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
                 notes.append(f"  {d.condition}: {interval}, p = {d.p:.2g} (adjusted)")
-            notes += power_lines([d.sample for d in compared])
+            notes += power_lines([d.sample for d in compared], "evaluation success")
     return Analysis(tuple(table), tuple(notes), ratios)
 
 
@@ -68,7 +68,7 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
         outcomes = results.success(condition, phase)
         estimate = ratio(outcomes, base)
         pairs.append((box, "ratio", outcomes.mean(axis=1), base.mean(axis=1), estimate))
-    return adjusted(pairs)
+    return adjust(pairs)
 
 
 def draw(analysis: Analysis) -> Figures:

@@ -137,6 +137,13 @@ class Course(NamedTuple):
         """What the episodes from the failure on fall short of the level before."""
         return np.asarray(self.before.mean() - self.success[:, self.onset :])
 
+    @property
+    def possible_loss(self) -> tuple[float, float]:
+        """The least and the greatest cumulative loss that there can be."""
+        before = float(self.before.mean())
+        episodes = self.short.shape[1]
+        return (before - 1.0) * episodes, before * episodes
+
     def recovery(self) -> tuple[Array, Array, Array]:
         """Return per seed whether it recovered, after how many episodes and steps."""
         recovered, episodes = recovery(self.short, (1.0 - REGAINED) * self.before.mean())
@@ -195,9 +202,9 @@ def _summary(course: Course) -> Summary:
     if course.before.any():  # else there is nothing to lose or to come back to
         estimates |= {
             "recovered": rate(recovered[:, None]),
-            "episodes": bootstrap(episodes, bounds=NOT_NEGATIVE),
+            "episodes": bootstrap(episodes, bounds=(0.0, course.short.shape[1])),
             "steps": bootstrap(steps, bounds=NOT_NEGATIVE),
-            "cumulative loss": bootstrap(course.short.sum(axis=1)),
+            "cumulative loss": bootstrap(course.short.sum(axis=1), bounds=course.possible_loss),
         }
     return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
 

@@ -15,7 +15,7 @@ from nested_agents.core.rules.kernels.fuzzy import Partition, layout, unpack
 from nested_agents.core.rules.kernels.strengths import exponential, many_strengths
 from nested_agents.core.rules.kernels.updates import add_features
 from nested_agents.core.rules.kernels.updates import td_update as kernels_td_update
-from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.rules.rule_base import Pooled, RuleBase
 
 N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2
 ROWS = np.arange(3)
@@ -174,6 +174,30 @@ def test_each(base: RuleBase, rng: np.random.Generator, count: int) -> None:
     assert base.each(theta, states) == pytest.approx(np.array(expected), rel=0, abs=1e-12)
     dense = each_dense(theta, states, base.layout)
     assert dense == pytest.approx(np.array(expected), rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
+@pytest.mark.parametrize("common", [(), (3,), (2, 3)])
+def test_total(
+    terms: list, n_own: int, membership: str, rng: np.random.Generator, common: tuple[int, ...]
+) -> None:
+    common = tuple(j for j in common if j >= n_own)
+    base = RuleBase(partitions_of(membership), terms, n_own, common=common)
+    theta = rng.normal(size=(5, base.n_rules))
+    firsts = np.array([0, 2, 5])  # of seven agents five are valued, two of one body, three of one
+    agents = np.array([0, 2, 3, 4, 6])
+    own = states_of(rng, 7 * 6).reshape(7, 6, 4)[..., :n_own].copy()
+    shared = states_of(rng, 2 * 6).reshape(2, 6, 4)
+    shared[1][:, list(common)] = shared[0][:, list(common)]
+    shared = shared[..., n_own:].copy()
+    of_bodies = np.add.reduceat(theta, firsts[:-1], axis=0)
+    weights = theta, of_bodies, theta.sum(axis=0)[None]
+    pooled = Pooled(weights, agents, np.arange(2), firsts)
+    expected = np.zeros(6)
+    for row, agent in enumerate(agents):
+        states = np.concatenate([own[agent], shared[0 if row < 2 else 1]], axis=1)
+        expected += base.features(states) @ theta[row]
+    assert base.total(pooled, own, shared) == pytest.approx(expected, rel=0, abs=1e-11)
 
 
 def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:

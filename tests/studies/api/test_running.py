@@ -13,7 +13,7 @@ TABLE = {"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
 
 def test_failed_trials_are_warned_of(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(learning_curve, "measure", made_up.failing)
-    monkeypatch.setattr(running, "check", lambda spec, **_: made_up.MEASURES)
+    monkeypatch.setattr(running, "check_conditions", lambda spec, **_: made_up.MEASURES)
     with pytest.warns(UserWarning, match=r"1 trial failed: study\.failed says why"):
         study = na.run(TABLE, tmp_path / "out", jobs=1, progress=False)
     ((condition, seed, error),) = study.failed

@@ -19,7 +19,7 @@ def places(tmp_path_factory: pytest.TempPathFactory):
     here = [tmp_path_factory.mktemp("studies") / name for name in ("one", "two")]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(learning_curve, "measure", made_up.measure)
-        patch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
+        patch.setattr(studies_run, "check_conditions", lambda spec, **_: made_up.MEASURES)
         na.run(TABLE, here[0], jobs=1, progress=False)
         na.run(na.Spec(**{**TABLE, "seeds": [0, 1, 2, 3]}), str(here[1]), jobs=1, progress=False)
     return here

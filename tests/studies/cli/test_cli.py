@@ -193,7 +193,7 @@ def test_the_demo_draws_what_is_learned_first_and_then_the_first_episode(
         sys.modules, "nested_agents.scenarios.box_pushing.pictures.rendering", rendering
     )
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
+    monkeypatch.setattr(studies_run, "check_conditions", lambda spec, **_: made_up.MEASURES)
     assert main(["demo", "--out", str(tmp_path), "--jobs", "1"]) == 0
     seen = capsys.readouterr().err
     assert seen.index("what the first trial has learned: ") < seen.index("of 32 trials")

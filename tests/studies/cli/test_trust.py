@@ -179,7 +179,7 @@ READING = {
     "results": ["results"],
     "table": ["table"],
     "compare": ["compare"],
-    "watch": ["watch", "--once"],
+    "status --watch": ["status", "--watch"],
     "export csv": ["export", "--format", "csv"],
     "export json": ["export", "--format", "json"],
     "export marl-eval": ["export", "--format", "marl-eval"],

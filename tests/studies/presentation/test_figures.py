@@ -2,14 +2,14 @@
 
 import io
 
-from nested_agents.studies.presentation.figures import name_rows, panels, spell_dollars, styled
+from nested_agents.studies.presentation.figures import apply_style, name_rows, panels, spell_dollars
 
 NAMES = ["cost $x_{$", "$5 and $6"]
 
 
 def test_a_dollar_in_a_name_is_a_character() -> None:
     svg = io.StringIO()
-    with styled():
+    with apply_style():
         figure, ((axes,),) = panels(1, 1, (3.0, 2.0))
         axes.set(title=NAMES[0], xscale="log", xlim=(1.0, 100.0))
         name_rows(axes, NAMES)

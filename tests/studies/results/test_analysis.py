@@ -7,7 +7,7 @@ from nested_agents.studies.results.analysis import (
     difference,
     differences,
     ratio,
-    shared,
+    select_shared,
 )
 from nested_agents.studies.results.results import Results
 
@@ -36,7 +36,7 @@ def test_only_seeds_that_both_have_are_compared() -> None:
     arrays.seeds["b"] = tuple(range(15, 35))
     results = arrays.frames()
     means = [results.means(condition, "evaluation") for condition in ("a", "b")]
-    one, other = shared(means)
+    one, other = select_shared(means)
     assert (one == means[0].to_numpy()[15:]).all()
     assert (other == means[1].to_numpy()[:5]).all()
     arrays.seeds["b"] = tuple(range(100, 120))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from nested_agents.studies.results.analysis import Difference, adjusted, verdict_lines
+from nested_agents.studies.results.analysis import Difference, adjust, verdict_lines
 from nested_agents.studies.results.power import (
     detectable,
     deviation_of,
@@ -80,7 +80,7 @@ def test_the_deviation_is_pooled_and_of_rates_never_zero() -> None:
 def compared(own: list[float], base: list[float], *titles: str) -> tuple[Difference, ...]:
     pair = np.array(own, dtype=float), np.array(base, dtype=float)
     estimate = bootstrap(pair[0] - pair[1], bounds=(-1, 1))
-    return adjusted([(title, "success", *pair, estimate) for title in titles or ["other"]])
+    return adjust([(title, "success", *pair, estimate) for title in titles or ["other"]])
 
 
 def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:

@@ -15,7 +15,7 @@ from made_up_results import ablation, hierarchies, scaling
 
 import nested_agents as na
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.results.results import NUMBERS, chosen, read, together
+from nested_agents.studies.results.results import NUMBERS, choose_trials, combine, read
 from nested_agents.studies.spec.studies import STUDIES
 from nested_agents.studies.workers.runner import save
 
@@ -56,7 +56,7 @@ SETTINGS = {"scenario": {"robots": 8, "box": "square"}, "learner": {"kind": "bat
 def is_chosen(text: str, settings=SETTINGS) -> bool:
     whole = ablation({"no replay": 0.5}, seeds=4).frames()
     columns = {"no replay": {"learner.self_model.enabled": "true"}}
-    part = chosen(replace(whole, columns=columns), text, {"no replay": settings})
+    part = choose_trials(replace(whole, columns=columns), text, {"no replay": settings})
     return 3 in part.seeds("no replay")
 
 
@@ -103,20 +103,20 @@ def test_a_name_of_several_settings_must_be_told_apart() -> None:
 def test_selected_trials_keep_their_values() -> None:
     whole, condition = scaling({2: 0.9, 4: 0.5}).frames(), "sums, robots=2"
     small = "condition in ['sums, robots=2', 'sampling, robots=2']"
-    part = chosen(whole, f"{small} and seed in {list(range(0, 20, 2))}", {})
+    part = choose_trials(whole, f"{small} and seed in {list(range(0, 20, 2))}", {})
     assert part.conditions == ("sums, robots=2", "sampling, robots=2")
     assert part.seeds(condition) == tuple(range(0, 20, 2))
     there = whole.success(condition, "evaluation")[::2]
     np.testing.assert_array_equal(part.success(condition, "evaluation"), there)
     assert len(part.numbers(condition)["seconds.learning"]) == 10
-    assert chosen(whole, "seed < 0", {}).conditions == ()
+    assert choose_trials(whole, "seed < 0", {}).conditions == ()
 
 
 def test_studies_together_name_what_would_be_confused() -> None:
     key = ("chain", "team", 2)
     first, second = hierarchies({key: 0.9}), hierarchies({key: 0.1, ("star", "team", 2): 0.2})
     one, other = first.frames(), second.frames()
-    whole, labels = together([("one", one), ("other", other)])
+    whole, labels = combine([("one", one), ("other", other)])
     label = "topology=chain, value_of=team, robots=2"
     assert labels[0] == {label: f"{label} (one)"}
     assert whole.columns[f"{label} (other)"]["directory"] == "other"
@@ -134,10 +134,10 @@ def test_studies_together_are_told_apart_by_what_differs() -> None:
     one, other = (hierarchies({("chain", "team", 2): 0.5}).frames() for _ in range(2))
     (label,) = one.conditions
     settings = [{label: {"learner": {"kind": "batch-td", "ridge": r}}} for r in (1.0, 3.0)]
-    whole, labels = together([("one", one), ("other", other)], settings)
+    whole, labels = combine([("one", one), ("other", other)], settings)
     assert whole.conditions == (f"{label}, ridge=1.0", f"{label}, ridge=3.0")
     assert labels[1] == {label: f"{label}, ridge=3.0"}
-    whole, _ = together([("one", one), ("other", other)], settings[:1] * 2)
+    whole, _ = combine([("one", one), ("other", other)], settings[:1] * 2)
     assert whole.conditions == (f"{label} (one)", f"{label} (other)")
 
 

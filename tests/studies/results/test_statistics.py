@@ -13,7 +13,7 @@ from scipy import stats
 from nested_agents.studies.results.statistics import (
     BITS,
     EXACT,
-    _drawn,
+    _draw_runs,
     _flips,
     _tail,
     bootstrap,
@@ -164,7 +164,7 @@ def test_what_cannot_be_estimated_is_refused(values):
 @pytest.mark.parametrize("shape", [(25,), (24, 1), (30, 7)])
 def test_how_resamples_lie_in_memory_changes_no_bit(shape):
     values = RNG.normal(size=shape)
-    means = np.moveaxis(values[_drawn(len(values), 50, 0)], 1, -1).mean(axis=-1)
+    means = np.moveaxis(values[_draw_runs(len(values), 50, 0)], 1, -1).mean(axis=-1)
     tail = _tail(0.95, len(values))
     expected = np.quantile(means, [tail, 1.0 - tail], axis=0)
     np.testing.assert_array_equal(bootstrap(values, resamples=50)[1:], expected)

@@ -30,7 +30,7 @@ def build(table: dict[str, object]) -> Spec:
     return spec
 
 
-@pytest.mark.parametrize("kind", [kind for kind in LEARNERS.built_in if kind != "mixed"])
+@pytest.mark.parametrize("kind", LEARNERS.built_in)
 def test_every_learner_is_chosen_by_its_kind_alone(kind: str) -> None:
     table = {"learner": {"kind": kind}}
     spec = build(table) if kind in BUILT else Spec.of(table)
@@ -41,9 +41,7 @@ def test_every_learner_is_chosen_by_its_kind_alone(kind: str) -> None:
     assert all(line.endswith(f"left out for learner.kind = {kind!r}") for line in remarks)
 
 
-def test_a_mixed_team_needs_its_parts() -> None:
-    with pytest.raises(SpecError, match=r"^learner\.parts: missing$"):
-        Spec.of({"learner": {"kind": "mixed"}})
+def test_a_mixed_team_is_chosen_with_its_parts() -> None:
     parts = [{"agents": "*", "learner": {"kind": "frozen"}}]
     (remark,) = Spec.of({"learner": {"kind": "mixed", "parts": parts}}).warnings()
     assert remark.endswith("left out for learner.kind = 'mixed'")

@@ -3,6 +3,7 @@
 import sqlite3
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import made_up
 import pytest
@@ -69,3 +70,17 @@ def test_rows_of_two_codes_are_mixed_only_if_asked_for(
         codes = [found for (found,) in db.execute("SELECT code FROM trials WHERE state = 'done'")]
     assert len(codes) == 3
     assert len(set(codes)) == 2
+
+
+def test_earlier_code_of_the_same_results_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    old = {"core/a.py": ("0", "1"), "studies/trials/b.py": ("2", "3"), "plugin/c.py": ("4", "5")}
+    here = {"core/d.py": ("6", "7"), "plugin/c.py": ("4", "5")}
+    monkeypatch.setattr(outline, "present", lambda known=None: here)
+    store = SimpleNamespace(code=lambda: old, directory="out")
+    assert "core/a.py and 2 more have changed" in outline.outdated(store)
+    monkeypatch.setattr(outline, "SAME_RESULTS", {outline.fingerprint(old)})
+    assert outline.outdated(store) is None
+    here["plugin/c.py"] = ("8", "9")  # a package that offers something has changed, too
+    assert "plugin/c.py has changed" in outline.outdated(store)
+    old["core/a.py"] = ("0", "other")
+    assert "core/a.py" in outline.outdated(store)

@@ -75,7 +75,7 @@ def test_a_full_disk_stops_a_study_with_one_line_and_costs_nothing(
     disk, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
+    monkeypatch.setattr(studies_run, "check_conditions", lambda spec, **_: made_up.MEASURES)
     monkeypatch.setattr(studies_run, "start_workers", lambda *_: contextlib.nullcontext(Here()))
     # Figures are no results: without them the disk need not be larger.
     monkeypatch.setattr(learning_curve, "draw", lambda analysis: {})

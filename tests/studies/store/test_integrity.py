@@ -9,15 +9,15 @@ from pathlib import Path
 import made_up
 import pytest
 
-from nested_agents.studies.api.study import load
+import nested_agents as na
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.checksums import trial_checksums
 from nested_agents.studies.store.database import DATABASE, SPEC_FILE
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.store.writer import locked
-from nested_agents.studies.trials.keeping import noted_of, pending
+from nested_agents.studies.store.writer import lock_directory
+from nested_agents.studies.trials.keeping import notes_of, pending
 from nested_agents.studies.workers.runner import save
 
 
@@ -156,12 +156,12 @@ def test_two_damaged_databases_are_both_kept(study):
 
 
 def test_a_database_that_may_not_be_read_is_not_damaged(study, monkeypatch):
-    def locked(*_, **__):
+    def refuse(*_, **__):
         error = sqlite3.OperationalError("database is locked")
         error.sqlite_errorcode = sqlite3.SQLITE_BUSY
         raise error
 
-    monkeypatch.setattr(sqlite3, "connect", locked)
+    monkeypatch.setattr(sqlite3, "connect", refuse)
     with (
         pytest.raises(SpecError, match=r"database is locked$"),
         made_up.opened(study),
@@ -345,7 +345,7 @@ def test_rows_that_no_run_wrote_are_told_and_never_counted(study, sound, tables,
     for table in tables:
         change(study, INVENTED[table], made_up.TRIALS[3].identity)
     name = "frozen, seed 99" if "trials" in tables else "trial x"
-    for command in ("results", "table", "compare", "export", "report", "status", "watch --once"):
+    for command in ("results", "table", "compare", "export", "report", "status", "status --watch"):
         first, *options = command.split()
         assert main([first, str(study), *options]) == 2, command
         out, err = capsys.readouterr()
@@ -353,7 +353,7 @@ def test_rows_that_no_run_wrote_are_told_and_never_counted(study, sound, tables,
         assert f"{study / DATABASE}: is damaged: it holds rows that no run wrote: {name}" in err
         assert err.count("\n") == 1
     with pytest.raises(SpecError, match="no run wrote"):
-        load(study)
+        na.load(study)
     (note,), ran = finish(study)
     assert ran == 0
     assert f"no run wrote: {name}; kept as {DATABASE}.damaged-1, 6 trials taken over" in note
@@ -378,8 +378,8 @@ def test_trials_that_a_new_plan_lacks_are_set_aside_and_not_counted(study):
     # As another version of Python, in which the same file has another syntax tree.
     planned = [trial.planned._replace(identity=f"new{i}") for i, trial in enumerate(made_up.TRIALS)]
     kept = made_up.TRIALS[0].planned
-    notes = replace(noted_of(made_up.SPEC, made_up.MEASURES), planned=[kept, *planned[1:]])
-    with locked(study), Store.create(study, notes, {}, None) as store:
+    notes = replace(notes_of(made_up.SPEC, made_up.MEASURES), planned=[kept, *planned[1:]])
+    with lock_directory(study), Store.create(study, notes, {}, None) as store:
         assert store.counts() == {"done": 1, "failed": 0}
         (note,) = store.notes
     assert "holds trials that are not of this study any more: " in note

@@ -114,7 +114,7 @@ def run(tmp_path, *arguments):
 @pytest.fixture
 def made_up_results(monkeypatch):
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(studies_run, "check", lambda spec, **_: made_up.MEASURES)
+    monkeypatch.setattr(studies_run, "check_conditions", lambda spec, **_: made_up.MEASURES)
 
 
 def test_a_machine_killed_in_a_cluster_costs_its_running_trial_only(cluster, tmp_path, monkeypatch):

@@ -12,8 +12,8 @@ import made_up_harm
 import pytest
 from made_up_commands import Command
 
+import nested_agents as na
 from nested_agents.core.plugins.sources import Sources
-from nested_agents.studies.api.study import run
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import trials_of
@@ -178,7 +178,7 @@ def rows(directory: Path) -> list[tuple[object, ...]]:
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory) -> list[tuple[object, ...]]:
     folder = tmp_path_factory.mktemp("alone")
-    run(write(folder), folder / "out", jobs=1, progress=False)
+    na.run(write(folder), folder / "out", jobs=1, progress=False)
     return rows(folder / "out")
 
 
@@ -191,7 +191,7 @@ def alone(tmp_path_factory) -> list[tuple[object, ...]]:
     ],
 )
 def test_rows_do_not_depend_on_who_runs_what_after_what(options, alone, tmp_path) -> None:
-    run(write(tmp_path), tmp_path / "out", progress=False, **options)
+    na.run(write(tmp_path), tmp_path / "out", progress=False, **options)
     assert rows(tmp_path / "out") == alone
 
 
