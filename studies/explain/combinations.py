@@ -16,7 +16,8 @@ from ...core.learners import LEARNERS, LearnerSettings
 from ..errors import SpecError
 from ..spec.spec import Spec
 from ..store.durable import TEAM
-from ..trials.session import Session, check, run_trial
+from ..trials.arrangement import check_conditions
+from ..trials.session import Session, run_trial
 from ..trials.trial import trials_of
 
 Table = Mapping[str, Any]
@@ -190,7 +191,7 @@ def attempt(axis: str, table: Table) -> Outcome:
     """
     try:
         spec = Spec.of(table)
-        check(spec)
+        check_conditions(spec)
     except SpecError as error:
         is_unknown = "unknown key" in str(error)
         return Outcome("no", SAID[axis] if is_unknown else str(error))

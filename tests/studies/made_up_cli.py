@@ -67,7 +67,7 @@ if __name__ == "__main__":
     become(**task["process"])
     if task["measure"]:
         learning_curve.measure = getattr(made_up, task["measure"])
-        studies_run.check = lambda spec, **_: made_up.MEASURES
+        studies_run.check_conditions = lambda spec, **_: made_up.MEASURES
         figures.USUAL = ("svg",)  # nobody looks at them
         commands.studies_of = lambda paper: ("learning-curve",)
     sys.argv = ["nested-agents", *task["arguments"]]
