@@ -24,6 +24,7 @@ LEARNERS = SettingsRegistry(
         "vdn": f"{__name__}.td:ValueDecompositionSettings",
         "fitted-q": f"{__name__}.fitted_q:FittedQSettings",
         "frozen": f"{__name__}.td:FrozenSettings",
+        "written": f"{__name__}.written:WrittenSettings",
         "ppo": f"{PEERS}:PPOSettings",
         "ippo": f"{PEERS}:IPPOSettings",
         "hierarchy-ppo": f"{PEERS}:HierarchyPPOSettings",

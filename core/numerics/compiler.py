@@ -81,6 +81,13 @@ class Kernel:
         return self._compile(INNER, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
     @property
+    def signatures(self) -> list[object]:
+        """The types of arguments for which it has been compiled; nothing is compiled for this."""
+        if "compiled" not in vars(self) or isinstance(self.compiled, FunctionType):
+            return []
+        return list(self.compiled.overloads)
+
+    @property
     def _numba_type_(self) -> Any:
         """What numba takes this for in kernels that name it as an attribute of its module."""
         return self.compiled._numba_type_

@@ -83,7 +83,7 @@ def modules_in(value: object, key: str = "") -> Iterator[tuple[str, str]]:
 
     Examples
     --------
-    >>> list(modules_in({"kind": "arms.seven:Arm", "id": "games/chess", "of": "chain:reversed"}))
+    >>> list(modules_in({"kind": "arms.seven:Arm", "id": "games/chess", "of": "arm.py:Arm"}))
     [('arms.seven', 'kind'), ('games.chess', 'id')]
     """
     if isinstance(value, Mapping):
@@ -96,7 +96,8 @@ def modules_in(value: object, key: str = "") -> Iterator[tuple[str, str]]:
         module, colon, _ = value.replace("/", ".").partition(":")
         is_id = key.rpartition(".")[2] == "id"
         is_named = is_id or (bool(colon) and "." in module)
-        if is_named and all(part.isidentifier() for part in module.split(".")):
+        is_file = value[: len(module)].endswith(".py")
+        if is_named and not is_file and all(part.isidentifier() for part in module.split(".")):
             yield module, key
 
 

@@ -84,6 +84,8 @@ class RuleBase:
         Indices of variables that are the same for all agents.
     actions
         Indices of variables that are actions taken.
+    names
+        What the variables are called; none: nobody asks.
 
     Examples
     --------
@@ -103,6 +105,7 @@ class RuleBase:
         dtype: str = "float64",
         common: Sequence[int] = (),
         actions: Sequence[int] = (),
+        names: Sequence[str] = (),
     ) -> None:
         d = len(partitions)
         for term in terms:
@@ -119,6 +122,7 @@ class RuleBase:
         self.n_own = n_own
         self.common = frozenset(common)
         self.actions = frozenset(actions)
+        self.names = tuple(names)
         self.sizes = tuple(prod(self.partitions[j].size for j in term) for term in self.terms)
         self.n_rules = sum(self.sizes)
         if self.n_rules > MOST_RULES:
@@ -170,7 +174,7 @@ class RuleBase:
         common = [names.index(name) for name in space.common]
         terms = list(dict.fromkeys(terms))
         actions = [names.index(name) for name in space.actions]
-        return cls(partitions, terms, space.n_own, settings.precision, common, actions)
+        return cls(partitions, terms, space.n_own, settings.precision, common, actions, names)
 
     @cached_property
     def kinds(self) -> tuple[IntArray, IntArray, IntArray]:

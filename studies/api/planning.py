@@ -118,15 +118,14 @@ class Plan:
             yield f"memory   about {self.memory / 1e9:.1f} GB with {processes}"
         if self.comparisons:
             yield ""
-            yield from power_text(
-                n_seeds, self.comparisons, self.deviation, self.smallest, "success"
-            )
+            yield from power_text(n_seeds, self.comparisons, self.deviation, self.smallest)
             text = (
                 f"Differences of success rates, every condition with the first, p adjusted; "
                 f"differences of single seeds are taken to deviate by {self.deviation:g}."
             )
             yield from wrap(text, WIDTH)
-        yield from self.warnings
+        for warning in self.warnings:
+            yield from wrap(warning, WIDTH)
 
 
 def plan(

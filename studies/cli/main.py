@@ -55,6 +55,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "topology": (".commands.describing", "List the topologies, or show one of them."),
     "check": (".commands.checking", "Check that scenarios keep their promises."),
+    "combine": (".commands.describing", "Try every learner with every part of a condition."),
     "cost": (".commands.describing", "Print what hierarchies cost, by formula and measured."),
     "benchmark": (PUBLISHED, "Enter a learner in the benchmark push-n, and compare entries."),
     "claims": (PUBLISHED, "Print the claims of the paper and the verdict on each."),

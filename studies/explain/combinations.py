@@ -1,7 +1,7 @@
 """What goes with what: every built-in learner against every other part of a condition, by trying.
 
 A cell is a learner and one case of an axis: a topology, say, or a failure of messages. It is a
-trial of a few decisions, which is trained, evaluated and, where teams are kept, restored. Then it
+trial of a few decisions, which is trained, evaluated and, where its team is kept, restored. Then it
 runs; or what the case asks for is left out, as the learner knows nothing of it; or it is refused.
 The sentence that says why is that of the warning, or of the refusal itself.
 """
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from ...core.learners import LEARNERS, LearnerSettings
+from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.spec import Spec
 from ..store.durable import TEAM
@@ -23,60 +24,76 @@ from ..trials.trial import trials_of
 Table = Mapping[str, Any]
 """A spec, or what is laid over it."""
 
-LINE: Table = {"kind": "line-up", "carts": 3}
+
+class Setting(NamedTuple):
+    """Where the cells of a learner are run."""
+
+    scenario: Table
+    """Three agents, none of which has others in its body."""
+    size: str
+    """The key of their number."""
+    first: str
+    """The name of the first."""
+    bodies: Table
+    """One whose bodies have several actuators."""
+
+
 BOX: Table = {"kind": "box-pushing", "robots": 2}
-POINTS: Table = {
-    "kind": f"{Path(__file__).parents[2] / 'examples/worlds/pushing_points.py'}:PushingPoints",
-    "robots": 3,
-    "option_length": 1,
-    "points": 3,
-}
-"""The world of Q-learning: what an agent has done is part of its state."""
+LINE = Setting({"kind": "line-up", "carts": 3}, "carts", "cart1", BOX)
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "worlds"
+PLAYERS: Table = {"kind": f"{EXAMPLES / 'levers.py'}:Levers", "players": 3}
+LEVERS = Setting(PLAYERS, "players", "player1", PLAYERS)
+"""For Q-learning: a state holds what was done. Every player is a body."""
 NETWORK: Table = {"hidden": [8], "batch_size": 4}
 POLICY: Table = {**NETWORK, "rollout": 4, "epochs": 1}
+BATCH: Table = {"kind": "batch-td", "weights": "role"}
 SHORT: dict[str, Table] = {
     "ppo": POLICY,
     "ippo": POLICY,
     "hierarchy-ppo": POLICY,
     "mappo": POLICY,
     "dqn": {**NETWORK, "begin": 2},
-    "mixed": {
-        "parts": [
-            {"agents": ["cart1", "robot1*"], "learner": {"kind": "hierarchy-ppo", **POLICY}},
-            {"agents": "*", "learner": {"kind": "batch-td", "weights": "role"}},
-        ]
-    },
 }
-"""What the learner of so short a trial is set to, beside its kind."""
-SAID = {"predictor": "learner.predictor: networks predict nothing, there is nothing to choose"}
-"""Sentences in place of those on keys that there are not, by axis."""
+"""What learners are set to in trials so short."""
 
 
-def _failing(kind: str, **more: Any) -> Table:
-    failure = {"kind": kind, "agents": ["*3"], **more}
-    return {"topology": {"kind": "chain", "failures": [failure]}}
+def failing(kind: str, agents: str, **more: str) -> Table:
+    """Return the table of a chain whose messages fail."""
+    return _chain(failures=[{"kind": kind, "agents": agents, **more}])
 
 
-def _chain(**more: Any) -> Table:
+def _chain(**more: object) -> Table:
     return {"topology": {"kind": "chain", **more}}
+
+
+def _joined(kind: str, **more: object) -> Table:
+    return {"topology": {"kind": kind, **more}}
 
 
 def _predicted(kind: str) -> Table:
     return {"learner": {"predictor": {"kind": kind}}}
 
 
+WALKER = {
+    "kind": "gymnasium",
+    "id": "BipedalWalker-v3",
+    "actions": 2,
+    "variables": {"angle": 0, "speed": 2},
+}
+"""A world that predicts nothing."""
+SEIZED = {"kind": "seized", "wheels": "robot1*"}
 AXES: dict[str, dict[str, Table]] = {
     "topology": {
-        "chain": _chain(),
-        "tree": {"topology": {"kind": "tree"}},
-        "star": {"topology": {"kind": "star"}},
-        "teams": {"topology": {"kind": "teams"}},
-        "independent": {"topology": {"kind": "independent"}},
+        "chain": _chain(order="reversed"),
+        "tree": _joined("tree"),
+        "star": _joined("star"),
+        "teams": _joined("teams"),
+        "independent": _joined("independent"),
     },
     "neighbours": {
-        "simultaneous": {"topology": {"kind": "simultaneous"}},
-        "coordination-graph": {"topology": {"kind": "coordination-graph"}},
-        "oriented": {"topology": {"kind": "coordination-graph", "oriented": "listed"}},
+        "simultaneous": _joined("simultaneous"),
+        "coordination-graph": _joined("coordination-graph"),
+        "oriented": _joined("coordination-graph", oriented="listed"),
     },
     "told": {
         "parents": _chain(told="parents"),
@@ -91,89 +108,93 @@ AXES: dict[str, dict[str, Table]] = {
         "next body": _chain(considers=["next"]),
     },
     "messages": {
-        "lost": _failing("lost", agents=["*1"]),
-        "delayed": _failing("delayed", agents=["*1"]),
-        "noisy": _failing("noisy", agents=["*1"]),
-        "absent": _failing("absent", agents=["*2"]),
-        "reparented": _failing("reparented", superior="FIRST"),
+        "lost": failing("lost", "*1"),
+        "delayed": failing("delayed", "*1"),
+        "noisy": failing("noisy", "*1"),
+        "absent": failing("absent", "*2"),
+        "reparented": failing("reparented", "*3", superior="FIRST"),
     },
-    "agents": {
-        "actuator": {"scenario": BOX, "agents": "actuator"},
-        "body": {"scenario": BOX, "agents": "body"},
-        "team": {"scenario": BOX, "agents": "team"},
+    "one agent for": {
+        "an actuator": {"scenario": "BODIES", "agents": "actuator"},
+        "a body": {"scenario": "BODIES", "agents": "body"},
+        "the team": {"agents": "team"},
     },
-    "evaluation elsewhere": {
+    "evaluated in": {
         "more agents": {"evaluations": {"there": {"SIZE": 4}}},
-        "other topology": {"evaluations": {"there": {"topology": {"kind": "star"}}}},
-        "failing messages": {
-            "evaluations": {"there": _failing("lost", agents=["*1"])},
-        },
+        "another topology": {"evaluations": {"there": _joined("star")}},
+        "failing messages": {"evaluations": {"there": failing("lost", "*1")}},
     },
-    "before and after": {
-        "curriculum": {
-            "curriculum": [{"name": "two", "episodes": 1, "scenario": {"SIZE": 2}}],
-        },
+    "further": {
+        "curriculum": {"curriculum": [{"name": "two", "episodes": 1, "scenario": {"SIZE": 2}}]},
         "kept team": {"keep_teams": True},
-        "actuator fault": {
-            "scenario": {**BOX, "failures": [{"kind": "seized", "wheels": ["robot1*"]}]},
-        },
+        "actuator fault": {"scenario": {**BOX, "failures": [SEIZED]}},
     },
     "predictor": {
         "given": {},
         "static": _predicted("static"),
         "learned": _predicted("learned"),
-        "none": {"scenario": {"kind": "gymnasium", "id": "BipedalWalker-v3", "actions": 2}},
+        "none": {"scenario": WALKER},
+        "none but learned": {"scenario": WALKER, **_predicted("learned")},
     },
 }
 """What a learner is combined with: cases by axis, and what each lays over the spec of a cell."""
+NO_PREDICTOR = "learner.predictor: networks predict nothing, so there is nothing to choose"
+"""Said of a key that settings of networks do not have."""
 
 
-class Outcome(NamedTuple):
+class Found(NamedTuple):
     """What has come of a cell."""
 
     verdict: Literal["yes", "left out", "no"]
-    """It runs; it runs without what it asks for; it is refused."""
+    """It runs; it runs without what is asked for; it is refused."""
     sentence: str = ""
     """Why, unless it runs."""
 
 
-class Cell(NamedTuple):
+class Combination(NamedTuple):
     """A learner, a case of an axis, and what has come of it."""
 
     axis: str
     case: str
     learner: str
-    outcome: Outcome
+    outcome: Found
 
 
 def spec_of(learner: str, changes: Table) -> dict[str, Any]:
     """Return the spec of a cell, as a table.
 
-    Worlds differ in how their agents are called and counted: ``SIZE`` and ``FIRST`` stand for the
-    key of their number, and for the name of the first.
+    What is said of learners of a mixed team is said of the last of them. Words in capitals stand
+    for what differs from world to world.
     """
-    world = POINTS if learner == "q-learning" else LINE
-    own = {"kind": learner, **SHORT.get(learner, {})}
+    world = LEVERS if learner == "q-learning" else LINE
+    own: dict[str, Any] = {"kind": learner, **SHORT.get(learner, {})}
     if issubclass(LEARNERS.model(learner), LearnerSettings):
         own["weights"] = "role"
-    table: dict[str, Any] = {
+    laid = changes.get("learner", {})
+    if learner == "mixed":
+        policy = {"kind": "hierarchy-ppo", **POLICY}
+        own["parts"] = [
+            {"agents": ["cart1", "actuator1", "robot1*"], "learner": policy},
+            {"agents": "*", "learner": {**BATCH, **laid}},
+        ]
+        laid = {}
+    table = {
         "preset": "own-value",
         "seeds": [1],
         "episodes": 1,
         "steps": 4,
         "evaluation": 1,
-        "scenario": world,
+        "scenario": world.scenario,
         "agents": "team" if learner == "dqn" else "actuator",
         **changes,
-        "learner": {**own, **changes.get("learner", {})},
+        "learner": {**own, **laid},
     }
-    words = {"SIZE": "robots" if world is POINTS else "carts"}
-    words["FIRST"] = "robot1" if world is POINTS else "cart1"
+    words = {"SIZE": world.size, "FIRST": world.first, "BODIES": world.bodies}
     filled: dict[str, Any] = _filled(table, words)
     return filled
 
 
-def _filled(value: Any, words: Mapping[str, str]) -> Any:
+def _filled(value: Any, words: Mapping[str, Any]) -> Any:
     if isinstance(value, Mapping):
         return {words.get(key, key): _filled(part, words) for key, part in value.items()}
     if isinstance(value, list):
@@ -181,7 +202,7 @@ def _filled(value: Any, words: Mapping[str, str]) -> Any:
     return words.get(value, value) if isinstance(value, str) else value
 
 
-def attempt(axis: str, table: Table) -> Outcome:
+def attempt(table: Table) -> Found:
     """Run a cell.
 
     Raises
@@ -193,26 +214,36 @@ def attempt(axis: str, table: Table) -> Outcome:
         spec = Spec.of(table)
         check_conditions(spec)
     except SpecError as error:
-        is_unknown = "unknown key" in str(error)
-        return Outcome("no", SAID[axis] if is_unknown else str(error))
+        message = str(error)
+        is_unknown = message.startswith("learner.predictor") and "unknown key" in message
+        return Found("no", NO_PREDICTOR if is_unknown else message)
     (trial,) = trials_of(spec)
     result = run_trial(trial)
     if trial.keep_teams:
-        again = Session.restored(trial, result.recordings[TEAM])
-        again.evaluate()
+        restored = Session.restored(trial, result.recordings[TEAM])
+        restored.evaluate()
         evaluated = [row for row in result.rows if row.phase == "evaluation"]
-        if list(again.result().rows) != evaluated:
+        if list(restored.result().rows) != evaluated:
             raise RuntimeError(f"{trial.settings.learner.kind}: the kept team acts otherwise")
-    settings = [spec.conditions()[0].settings]
-    settings += [other for _, other in spec.conditions()[0].evaluations]
-    warnings = [line for each in settings for line in each.warnings()]
-    return Outcome("left out", warnings[0]) if warnings else Outcome("yes")
+    others = [other for _, other in trial.evaluations]
+    warnings = [line for each in (trial.settings, *others) for line in each.warnings()]
+    return Found("left out", warnings[0]) if warnings else Found("yes")
 
 
-def cells(learners: Sequence[str] = ()) -> Iterator[Cell]:
-    """Run the cells of some learners, or of all that are built in, and yield them axis by axis."""
+def cells(learners: Sequence[str] = ()) -> Iterator[Combination]:
+    """Run the cells of some learners, or of all that are built in, and yield them axis by axis.
+
+    Raises
+    ------
+    SpecError
+        If there is no such learner, or this is no checkout: a world is one of the examples.
+    """
+    if not EXAMPLES.is_dir():
+        raise SpecError(f"{EXAMPLES}: is not there; combine runs in a checkout alone")
+    unknown = [name for name in learners if name not in LEARNERS.built_in]
+    if unknown:
+        raise SpecError(f"{unknown[0]}: unknown learner; {closest(unknown[0], LEARNERS.built_in)}")
     for axis, cases in AXES.items():
         for learner in learners or LEARNERS.built_in:
             for case, changes in cases.items():
-                outcome = attempt(axis, spec_of(learner, changes))
-                yield Cell(axis, case, learner, outcome)
+                yield Combination(axis, case, learner, attempt(spec_of(learner, changes)))

@@ -250,8 +250,8 @@ def power_text(
     Power: 5 seeds and 2 comparisons cannot give an adjusted p below .05, whatever
       the outcome. It needs at least 7 seeds; for a difference of .20, about 18.
     >>> print(*power_text(20, 1, 0.25, 0.2, "evaluation success"), sep="\n")
-    Power: with 20 seeds, a difference of .17 in evaluation success is found with
-      probability .80. For a difference of .20 it takes about 15 seeds.
+    Power: with 20 seeds, a difference of .17 is found with probability .80 in
+      evaluation success. For a difference of .20 it takes about 15 seeds.
     """
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
     among = f" and {comparisons} comparisons" if comparisons > 1 else ""
@@ -270,8 +270,8 @@ def power_text(
         text += "would find cannot be determined."
     else:
         least = two_figures(detectable(deviation, seeds, comparisons))
-        text = f"with {counted}{among}, a difference of {least}{within} is found with "
-        text += f"probability {two_figures(WANTED)}."
+        text = f"with {counted}{among}, a difference of {least} is found with probability "
+        text += f"{two_figures(WANTED)}{within}."
         text += f" For a difference of {goal} it takes about {enough} seeds." if enough else ""
     return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 

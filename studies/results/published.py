@@ -38,7 +38,7 @@ def dumps(outline: StudyOutline, results: Results) -> str:
     content = {
         "results_version": RESULTS_VERSION,
         "spec": outline.table,
-        "columns": results.columns,
+        "columns": {c: results.columns.get(c, {}) for c in results.conditions},
         "measures": tables(measures),
         "seeds": {c: _pack_seeds(results.seeds(c)) for c in results.conditions},
         "phases": {

@@ -14,6 +14,7 @@ from typing import Annotated, Any, NamedTuple, cast
 from pydantic import AfterValidator, Field
 
 from ...core.agents.joint import Granularity, join_agents
+from ...core.agents.mixed import MixedSettings
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
@@ -109,7 +110,7 @@ class ConditionSettings(Settings):
         """Return what of its topology says nothing to its learner, a line each."""
         learner = f"learner.kind = {self.learner.kind!r}"
         topology = self.topology
-        if isinstance(self.learner, LearnerSettings) and not self.learner.values_actions:
+        if _considers(self.learner):
             return ()
         if not self.learner.uses_hierarchy:
             ignored = topology != parse("chain")
@@ -122,6 +123,13 @@ class ConditionSettings(Settings):
         return json.dumps(
             self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"), allow_nan=False
         )
+
+
+def _considers(learner: TeamSettings) -> bool:
+    """Return whether agents try actions of others before they decide."""
+    if isinstance(learner, MixedSettings):
+        return any(_considers(part.learner) for part in learner.parts)
+    return isinstance(learner, LearnerSettings) and not learner.values_actions
 
 
 class Override(Settings):

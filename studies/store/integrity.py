@@ -85,9 +85,7 @@ def _fault_of_trials(db: sqlite3.Connection) -> str | None:
         return "it does not hold as many trials as were run"
     if unwritten := _select(db, _NOT_IN_LEDGER):
         return f"it holds rows that no run wrote: {_name(db, unwritten)}"
-    if unplanned := _select(
-        db, "SELECT identity FROM checksums EXCEPT SELECT identity FROM planned"
-    ):
+    if unplanned := _select(db, _NOT_PLANNED):
         return f"it holds trials that are not of this study: {_name(db, unplanned)}"
     return None
 

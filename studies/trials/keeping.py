@@ -16,7 +16,7 @@ from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import aliases, dumps, flat, named
 from ..store.connection import DamageError
-from ..store.database import DATABASE, SPEC_FILE, NoStudyError, StudyNotes
+from ..store.database import DATABASE, SPEC_FILE, NoStudyError, Planned, StudyNotes
 from ..store.durable import read_text
 from ..store.store import Store
 from ..store.writer import lock_directory
@@ -55,7 +55,7 @@ def open_to_run(
     spec
         The study.
     trials
-        All its trials.
+        Those that are to be run now: all, or some. Others of it that were planned before stay so.
     measures
         What it measures of its episodes, see `arrangement.check_conditions`.
     accept_code
@@ -71,8 +71,12 @@ def open_to_run(
     _examine(directory, spec, notes, accept_code=accept_code)  # what is refused leaves nothing
     with lock_directory(directory):
         # Again: nobody else writes from here on.
-        damage, code = _examine(directory, spec, notes, accept_code=accept_code)
-        computed = replace(notes, code=present(code))
+        damage, code, before = _examine(directory, spec, notes, accept_code=accept_code)
+        computed = replace(
+            notes,
+            code=present(code),
+            planned=[*notes.planned, *_planned_before(spec, trials, before)],
+        )
         copies = spec.sources.texts.items()  # to be read and run again, as is the spec
         files = {f"{FOLDER}/{kept_name(name)}": text.encode() for name, text in copies}
         if not is_copy(directory / SPEC_FILE, spec, notes):
@@ -142,10 +146,20 @@ def notes_of(
     )
 
 
+def _planned_before(
+    spec: Spec, trials: Sequence[Trial], before: Sequence[Planned]
+) -> list[Planned]:
+    """Return which other trials of a study it was planned with `before`."""
+    others = {planned.identity for planned in before} - {trial.identity for trial in trials}
+    return (
+        [trial.planned for trial in trials_of(spec) if trial.identity in others] if others else []
+    )
+
+
 def _examine(
     directory: Path, spec: Spec, notes: StudyNotes, *, accept_code: bool
-) -> tuple[str | None, Code | None]:
-    """Return what is wrong with a directory's database as a whole, and the code of its results.
+) -> tuple[str | None, Code | None, Sequence[Planned]]:
+    """Return what is wrong with a directory's database as a whole, its code and its plan.
 
     Parameters
     ----------
@@ -163,16 +177,18 @@ def _examine(
     """
     damage: str | None = None
     code: Code | None = None
+    planned: Sequence[Planned] = ()
     try:
         with Store.open(directory) as store:
             mismatch = _mismatch_of_study(store, spec, notes, accept_code)
             code = store.code()
+            planned = store.planned()
     except (NoStudyError, DamageError) as error:
         damage = error.reason
         mismatch = _mismatch_of_file(directory / SPEC_FILE, spec, notes, damage)
     if mismatch is not None:
         raise SpecError(f"{directory}: holds another study: {mismatch}")
-    return damage, code
+    return damage, code, planned
 
 
 def is_copy(path: Path, spec: Spec, notes: StudyNotes) -> bool:

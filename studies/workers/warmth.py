@@ -69,18 +69,8 @@ def _loaded_kernels() -> Iterator[Loaded]:
             continue
         for name, kernel in list(vars(content).items()):
             if isinstance(kernel, Kernel) and kernel.py_func.__module__ == module:
-                for types in _signatures(kernel):
+                for types in kernel.signatures:
                     yield Loaded(module, name, pickle.dumps(types))
-
-
-def _signatures(kernel: Kernel) -> list[object]:
-    """Return the types of arguments that a kernel has been called with."""
-    if "compiled" not in vars(kernel):  # what nobody called need not be made for this
-        return []
-    from numba.core.dispatcher import Dispatcher
-
-    compiled = kernel.compiled
-    return list(compiled.overloads) if isinstance(compiled, Dispatcher) else []
 
 
 def warm_up(goal: Warmth, known: Warmth) -> None:

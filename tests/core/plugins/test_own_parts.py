@@ -192,7 +192,7 @@ from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.learners import LEARNERS
 for registry in (LEARNERS, EVALUATORS, EXPLORATIONS):
     for name in registry.built_in:
-        registry.parsed(name)
+        registry.model(name)
 print(*({"numba", "scipy"} & {name.partition(".")[0] for name in sys.modules}))
 """
     run = subprocess.run(

@@ -12,7 +12,7 @@ import pettingzoo
 import pytest
 from made_up_environments import Cart, Walkers
 
-from nested_agents.core.plugins import sources
+from nested_agents.core.plugins import trust
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings, PettingZooSettings
 from nested_agents.studies.cli.main import main
@@ -74,7 +74,7 @@ def test_a_study_keeps_the_file_and_asks_for_trust(
     assert len(capsys.readouterr().out.splitlines()) == 1 + 2
     moved = folder / "elsewhere" / "out"
     shutil.copytree(out, moved)
-    monkeypatch.setattr(sources, "_here", set())
+    monkeypatch.setattr(trust, "_noted", set())
     for name in [name for name in sys.modules if name.startswith("_nested_agents_")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setenv("XDG_STATE_HOME", str(folder / "state"))

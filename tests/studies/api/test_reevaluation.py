@@ -226,7 +226,7 @@ def test_a_learner_that_acts_by_itself_is_kept_if_it_can_be_restored(tmp_path):
     assert team.arrays()["taken"] == team.act(None).joint_action[0]
     own = study.episodes.query("phase == 'evaluation'")["return"]
     assert na.reevaluate(study, ["chain"], jobs=1)["return"].tolist() == own.tolist()
-    with pytest.raises(na.SpecError, match="this needs agents with rule bases"):
+    with pytest.raises(na.SpecError, match="Mine has no continue_from"):
         na.reevaluate(study, ["tree:2"])
 
 

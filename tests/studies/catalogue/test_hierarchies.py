@@ -16,7 +16,7 @@ from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.power import seeds_needed
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check_conditions as measures_of
+from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers import runner
 
@@ -155,7 +155,7 @@ def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
             },
         }
     )  # fmt: skip
-    with made_up.opened(tmp_path, spec, measures_of(spec.measures)) as store:
+    with made_up.opened(tmp_path, spec, check_conditions(spec)) as store:
         for trial in trials_of(spec):
             runner.save(store, trial, measure(trial), 1.0)
         results = read(store)

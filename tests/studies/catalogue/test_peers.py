@@ -81,7 +81,7 @@ def test_what_cannot_be_is_refused() -> None:
         check(Spec.of({"study": "peers", "evaluation": 0}))
 
 
-@pytest.mark.parametrize("study", ["wheel-failure", "scaling", "related"])
+@pytest.mark.parametrize("study", ["wheel-failure", "related"])
 def test_studies_of_rule_bases_refuse_peers_before_they_begin(study: str, tmp_path: Path) -> None:
     path = tmp_path / "spec.toml"
     path.write_text(f'study = "{study}"\n[learner]\nkind = "ppo"\n')

@@ -132,11 +132,14 @@ def test_the_copy_keeps_weights_but_not_its_model_of_itself() -> None:
     session = Session(trial)
     session.train(5)
     copy = module._keeping_weights(session)
-    theta, effects = copy.learner.theta.copy(), copy.self_model.effects[0].copy()
+    theta, effects = (
+        fuzzy(copy).learner.theta.copy(),
+        fuzzy(copy).foresight.self_model.effects[0].copy(),
+    )
     assert (theta == fuzzy(session.team).learner.theta).all()
     session.train(3, 5, phase=KEPT, team=copy)
-    assert (copy.learner.theta == theta).all()
-    assert (copy.self_model.effects[0] != effects).any()
+    assert (fuzzy(copy).learner.theta == theta).all()
+    assert (fuzzy(copy).foresight.self_model.effects[0] != effects).any()
     assert (fuzzy(session.team).foresight.self_model.effects[0] == effects).all()
 
 

@@ -1,0 +1,65 @@
+"""A value that nobody learned: a formula over state variables, as a control of learning.
+
+A person who knows the task writes down what a state is worth. Decisions are those of any team, with
+the same predictor and the same search of joint actions. So what a team has learned is what it does
+better than this one; the rest is in its variables, its predictor and its search.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ..numerics import FloatArray, IntArray
+from ..rules.rule_base import RuleBase
+from .learner import LearnerSettings
+from .td import Frozen
+
+
+class WrittenSettings(LearnerSettings):
+    """No learning: a value that a person has written. A control, like ``frozen``."""
+
+    kind: Literal["written"] = "written"
+    factory: ClassVar[str] = f"{__name__}:Written"
+    value: Mapping[str, float] = {}
+    """By state variable, what every unit of its distance from 0 is worth."""
+
+
+class Written(Frozen):
+    """Never learns: f(s) is the sum over state variables of ``value`` times ``|s_j|``.
+
+    Consequent weights are what this is at the centres of the membership functions, so that f is
+    exact for triangular ones between the outermost centres, if one centre is 0.
+
+    Raises
+    ------
+    ValueError
+        If nothing is written, a variable is unknown, or no term of the rule base is over it alone;
+        one line.
+    """
+
+    def __init__(self, settings: WrittenSettings, rules: RuleBase, rows: IntArray) -> None:
+        super().__init__(settings, rules, rows)
+        self.theta[:] = _weights(settings.value, rules)
+
+
+def _weights(value: Mapping[str, float], rules: RuleBase) -> FloatArray:
+    """Return the consequent weights ``(n_rules,)`` of a written value."""
+    known = f"known: {', '.join(rules.names)}"
+    if not value:
+        raise ValueError(f"learner.value: must say what a state variable is worth, {known}")
+    weights = np.zeros(rules.n_rules)
+    for name, worth in value.items():
+        if name not in rules.names:
+            raise ValueError(f"learner.value.{name}: unknown state variable, {known}")
+        variable = rules.names.index(name)
+        if (variable,) not in rules.terms:
+            raise ValueError(
+                "learner.rule_base.order: must be 1, as a written value is a sum over single "
+                "variables"
+            )
+        term = rules.terms.index((variable,))
+        first = sum(rules.sizes[:term])
+        centres = np.array(rules.partitions[variable].centres)
+        weights[first : first + len(centres)] = worth * np.abs(centres)
+    return weights
