@@ -177,7 +177,7 @@ def tune(
         table = _table(results, points, range(first_seed, first_seed + n_seeds))
         names = [name for name in table["name"] if name in names]
     best = points[table["name"].iloc[0]]
-    tuned = _laid(spec, best)
+    tuned = _lay_over_spec(spec, best)
     durable.write(out / BEST_FILE, dumps(tuned.table()).encode())
     durable.write(out / TABLE_FILE, table.to_csv(index=False).encode())
     finalists = load(out).where(f"condition in {[GIVEN, *names, *CONTROLS]}")
@@ -195,7 +195,8 @@ def rungs(configurations: int, seeds: int) -> Iterator[tuple[int, int]]:
     n = 2
     while n < seeds:
         yield configurations, n
-        configurations, n = max(2, (configurations + 1) // 2), 2 * n
+        configurations = max(2, (configurations + 1) // 2)
+        n *= 2
     yield configurations, seeds
 
 
@@ -220,15 +221,15 @@ def _check_request(spec: Spec, trials: int, seeds: int, first_seed: int, draw: i
         )
 
 
-def _over(table: TomlTable, point: Point) -> TomlTable:
+def _lay_over(table: TomlTable, point: Point) -> TomlTable:
     """Return a table with values laid over it."""
     return reduce(overlay, starmap(nested, point.items()), table)
 
 
-def _laid(spec: Spec, point: Point) -> Spec:
+def _lay_over_spec(spec: Spec, point: Point) -> Spec:
     """Return a spec with values laid over it, and nothing left to tune."""
     table = {key: value for key, value in spec.table().items() if key != "tune"}
-    return Spec.of(_over(table, point), spec.sources)
+    return Spec.of(_lay_over(table, point), spec.sources)
 
 
 def _content(spec: Spec) -> str:
@@ -242,7 +243,7 @@ def _space(spec: Spec) -> dict[str, Sequence[object]]:
     if spec.tune:
         for key, values in spec.tune.items():
             for value in values:
-                _laid(spec, {key: value})  # refuses what no configuration can have
+                _lay_over_spec(spec, {key: value})  # refuses what no configuration can have
         return dict(spec.tune)
     with spec.sources.active():
         scenario = spec.conditions()[0].settings.scenario.build()
@@ -253,7 +254,7 @@ def _space(spec: Spec) -> dict[str, Sequence[object]]:
     for key, values in usual.items():
         for value in values:
             with suppress(SpecError):
-                _content(_laid(spec, {key: value}))
+                _content(_lay_over_spec(spec, {key: value}))
                 possible[key] = [*possible.get(key, ()), value]
     return possible
 
@@ -270,7 +271,7 @@ def _sample(spec: Spec, trials: int, draw: int) -> dict[str, Point]:
         if len(points) < trials and repr(point) not in tried:
             tried.add(repr(point))
             try:
-                points.setdefault(_content(_laid(spec, point)), point)
+                points.setdefault(_content(_lay_over_spec(spec, point)), point)
             except SpecError as error:
                 problem = str(error)
     if len(points) == 1:
@@ -283,7 +284,7 @@ def _study(spec: Spec, points: Mapping[str, Point], seeds: Iterable[int]) -> Spe
     left_out = ("tune", "evaluations", "keep_teams")
     base = {key: value for key, value in spec.table().items() if key not in left_out}
     base |= {"study": "learning-curve", "seeds": list(seeds)}
-    overrides = [_over({"name": name}, point) for name, point in points.items()]
+    overrides = [_lay_over({"name": name}, point) for name, point in points.items()]
     for name, table in CONTROLS.items():
         control = {"name": name, **table}
         with suppress(SpecError):  # if no rewards are predicted
