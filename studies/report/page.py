@@ -36,6 +36,7 @@ from ..presentation.tables import tabulate
 from ..results.analysis import identity_lines
 from ..results.contrasts import contrasts
 from ..results.results import read
+from ..spec.controls import control_lines
 from ..spec.outline import StudyOutline, sources_of
 from ..spec.tables import dumps
 from ..store.database import RESULTS_VERSION, Planned
@@ -220,12 +221,15 @@ def page(directory: Path) -> str:
         trials = store.planned()
         packed = replays(store, trials)
         sources = sources_of(store)
+        settings = store.settings()
     with sources.active():
         analysis = analyse_as(outline.study, results)
         figures = draw_figures(load_study(outline.study), analysis)
     notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included
+    there = {label: own for label, own in settings.items() if label in results.conditions}
+    notes = (*notes, *control_lines(there))
     return _template().render(
         study=outline.study,
         extent=extent(outline),
