@@ -15,7 +15,9 @@ SPACE = StateSpace(
     "demo",
     (
         Variable("gap", "m", 0.0, 2.0, centres=(0.0, 0.5, 2.0)),
-        Variable("bearing", "rad", -np.pi, np.pi, periodic=True, centres=(-2.0, -0.5, 0.0, 0.5, 2.0)),
+        Variable(
+            "bearing", "rad", -np.pi, np.pi, periodic=True, centres=(-2.0, -0.5, 0.0, 0.5, 2.0)
+        ),
     ),
 )  # fmt: skip
 VALUE = {"gap": -1.0, "bearing": -0.1}
@@ -66,7 +68,7 @@ def test_what_cannot_be_written_is_refused_in_one_line(value, rules, message: st
 
 def test_an_unknown_variable_of_a_spec_is_one_line() -> None:
     spec = Spec.of({"preset": "hand-written", "seeds": 1, "learner": {"value": {"gapp": 1.0}}})
-    with pytest.raises(SpecError, match="learner.value.gapp: unknown state variable") as refusal:
+    with pytest.raises(SpecError, match=r"learner\.value\.gapp: unknown state variable") as refusal:
         check_conditions(spec)
     assert "\n" not in str(refusal.value)
 
