@@ -53,7 +53,8 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store import durable
 from nested_agents.studies.store.database import DATABASE
-from nested_agents.studies.store.store import LOCK, Store
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.store.writer import LOCK
 from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
 from nested_agents.studies.trials.session import run_trial

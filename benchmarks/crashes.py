@@ -30,7 +30,8 @@ from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.tables import dumps
-from nested_agents.studies.store.store import MARK, Store
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.store.writer import MARK
 from nested_agents.studies.trials.arrangement import check_conditions
 
 

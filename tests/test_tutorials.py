@@ -13,7 +13,7 @@ from nested_agents.studies.spec.spec import Spec
 TUTORIALS = Path(__file__).resolve().parent.parent / "docs" / "tutorials"
 PAGES = sorted(path.stem for path in TUTORIALS.glob("*.md") if path.stem != "index")
 SMALL = ("seeds=2", "episodes=2", "steps=8", "evaluation=1")
-ELSEWHERE = ("--backend dask", "pip install", "dask ", "--measured")
+ELSEWHERE = ("--backend dask", "cp -r", "pip install", "dask ", "--measured")
 """What takes a cluster, or long: tests/studies/workers and tests/studies/cost have these."""
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
