@@ -22,7 +22,7 @@ class WrittenSettings(LearnerSettings):
     kind: Literal["written"] = "written"
     factory: ClassVar[str] = f"{__name__}:Written"
     value: Mapping[str, float] = {}
-    """By state variable, what every unit of its distance from 0 is worth."""
+    """By state variable, what every unit of its distance from 0 is worth; others are worth 0."""
 
 
 class Written(Frozen):
@@ -34,8 +34,7 @@ class Written(Frozen):
     Raises
     ------
     ValueError
-        If nothing is written, a variable is unknown, or no term of the rule base is over it alone;
-        one line.
+        If a variable is unknown, or no term of the rule base is over it alone; one line.
     """
 
     def __init__(self, settings: WrittenSettings, rules: RuleBase, rows: IntArray) -> None:
@@ -45,13 +44,11 @@ class Written(Frozen):
 
 def _weights(value: Mapping[str, float], rules: RuleBase) -> FloatArray:
     """Return the consequent weights ``(n_rules,)`` of a written value."""
-    known = f"known: {', '.join(rules.names)}"
-    if not value:
-        raise ValueError(f"learner.value: must say what a state variable is worth, {known}")
     weights = np.zeros(rules.n_rules)
     for name, worth in value.items():
         if name not in rules.names:
-            raise ValueError(f"learner.value.{name}: unknown state variable, {known}")
+            known = ", ".join(rules.names)
+            raise ValueError(f"learner.value.{name}: unknown state variable, known: {known}")
         variable = rules.names.index(name)
         if (variable,) not in rules.terms:
             raise ValueError(

@@ -22,6 +22,8 @@ class Comparison:
 
     contrasts: Contrasts
     """The analysis."""
+    remarks: tuple[str, ...] = ()
+    """What must be said of the conditions, in lines."""
 
     @cached_property
     def table(self) -> SummaryTable:
@@ -36,7 +38,7 @@ class Comparison:
     @property
     def verdicts(self) -> tuple[str, ...]:
         """What was found, and what could have been detected, line by line."""
-        return self.contrasts.notes
+        return (*self.contrasts.notes, *self.remarks)
 
     @cached_property
     def statistics(self) -> Aggregates:

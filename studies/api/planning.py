@@ -62,7 +62,7 @@ Range = tuple[float, float]
 """From and to."""
 
 
-class Tried(NamedTuple):
+class ConditionCost(NamedTuple):
     """What a condition takes, by one of its trials."""
 
     seconds: FloatArray
@@ -204,7 +204,7 @@ def _estimate(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Rang
     return (float(shortest), float(longest)), processes * memory
 
 
-def try_out(trial: Trial) -> Tried:
+def try_out(trial: Trial) -> ConditionCost:
     """Return what the trials of a condition take."""
     alone = replace(trial, seed=SEED, curriculum=(), evaluation=min(trial.evaluation, EPISODES))
     brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
@@ -242,7 +242,7 @@ def try_out(trial: Trial) -> Tried:
     seconds = building + acting * mean * episodes.sum() + learning
     growth = mean[1] * episodes.sum() / steps.sum()
     memory = held + growth * max(_bytes(session) - held, 0.0)
-    return Tried(seconds + trial.evaluation * evaluating, loading, memory)
+    return ConditionCost(seconds + trial.evaluation * evaluating, loading, memory)
 
 
 def _seconds_of_episodes(session: Session, episodes: int) -> list[float]:

@@ -99,7 +99,7 @@ def run_study(
 
 
 def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
-    """Return what a study measures of its episodes, if it can be run; see `check`.
+    """Return what a study measures of its episodes, if it can be run; see `check_conditions`.
 
     Raises
     ------

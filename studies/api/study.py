@@ -33,6 +33,7 @@ from ..presentation.tables import SummaryTable, tabulate
 from ..results import published
 from ..results.contrasts import contrasts
 from ..results.results import Results, choose_trials, combine, read
+from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..spec.tables import TomlTable
 from ..store import durable
@@ -118,31 +119,32 @@ class StudyResults:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the study says of its results, verdicts and their power, line by line."""
-        return notes_of(self.analysis)
+        return (*notes_of(self.analysis), *self._of_controls)
+
+    @property
+    def _of_controls(self) -> tuple[str, ...]:
+        """What must be said of controls, in lines, see `nested_agents.studies.spec.controls`."""
+        there = {c: self._settings[c] for c in self.conditions if c in self._settings}
+        return control_lines(there)
 
     @property
     def unlearned(self) -> tuple[str, ...]:
         """Conditions that learn, but have neither more success nor return than frozen weights.
 
-        In evaluation; known where there is a frozen condition in the same scenario.
+        In evaluation; known where a frozen condition decides alike in the same scenario.
         """
         evaluations = self.results.episodes.query("phase == 'evaluation'")
         columns = ["condition", SUCCESS.name, "return"]
         means = evaluations.reindex(columns=columns).groupby("condition").mean()
-        frozen = dict[str, pd.Series]()
-        learning = list[tuple[str, str]]()
-        for condition in means.index.intersection(list(self._settings), sort=False):
-            learner = self._settings[condition]["learner"]
-            scenario = repr(self._settings[condition]["scenario"])
-            if learner["kind"] != "frozen":
-                learning.append((condition, scenario))
-            elif learner["decision"]["rule"] == "value":
-                frozen[scenario] = means.loc[condition]
-        return tuple(
-            condition
-            for condition, scenario in learning
-            if scenario in frozen and (means.loc[condition] <= frozen[scenario]).all()
-        )
+        names = means.index.intersection(list(self._settings), sort=False)
+        settings = {name: self._settings[name] for name in names}
+        unlearned: list[str] = []
+        for condition, own in settings.items():
+            if own["learner"]["kind"] not in LEARN_NOTHING:
+                control = control_of(condition, settings)
+                if control is not None and (means.loc[condition] <= means.loc[control]).all():
+                    unlearned.append(condition)
+        return tuple(unlearned)
 
     @property
     def power(self) -> tuple[str, ...]:
@@ -184,7 +186,8 @@ class StudyResults:
             If there is no such key, measure, phase or reference.
         """
         key = None if by == "condition" else by
-        return Comparison(contrasts(self.results, measure, phase, key, reference))
+        compared = contrasts(self.results, measure, phase, key, reference)
+        return Comparison(compared, self._of_controls)
 
     def where(self, choice: str) -> StudyResults:
         """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `chosen`."""

@@ -7,7 +7,7 @@ on four, and so on: seeds are spent on what may be best. All meet the same world
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import reduce
@@ -17,11 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
+from ...core.learners import LearnerSettings
 from ...core.numerics import pd
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..results.results import Results, read
+from ..spec.conditions import Condition
+from ..spec.controls import WITH_REWARDS
+from ..spec.layers import without_learning
 from ..spec.spec import Spec
 from ..spec.tables import TomlTable, dumps, nested, overlay
 from ..store import durable
@@ -40,6 +44,8 @@ CONTROLS: dict[str, TomlTable] = {
     for name, rule in (("frozen", "value"), ("planner", "reward"))
 }
 """What the best is compared with, as overrides of a spec."""
+AS = "frozen, as "
+"""How the control of a configuration is called, before its name."""
 USUAL: dict[str, tuple[object, ...]] = {
     "learner.weights": ("own", "role"),
     "learner.decision.value_of": ("own", "below", "team"),
@@ -75,6 +81,8 @@ class Tuning:
     configurations: pd.DataFrame
     """Best first: the name of each configuration, on how many seeds it was tried, its
     mean evaluation success (or nothing) and return, and its values."""
+    control: str = "frozen"
+    """The condition that differs from the best configuration in learning alone."""
 
     def __str__(self) -> str:
         return "\n".join([str(self.study.table(self.columns)), "", *self.lines])
@@ -94,6 +102,9 @@ class Tuning:
         lines += [f"  {key} = {show(value)}" for key, value in self.changes.items()]
         if success == 0.0:
             lines.append("None of them reaches the goal in evaluation: they are ranked by return.")
+        if self.control.startswith(AS):
+            lines.append("Untrained weights plan by the reward under its rule of decision: judge")
+            lines.append(f"learning by the difference to {self.control!r}.")
         return [
             *lines,
             "Its success on these seeds is flattered, as it was chosen by it.",
@@ -151,17 +162,12 @@ def tune(
     everything = trials_of(study)
     planned = dict[str, Trial]()
     observer = Terminal() if progress else Observer()
-    names = list(points)
-    for n_configurations, n_seeds in rungs(len(points), seeds):
-        names = names[:n_configurations]
-        wanted = {*names, GIVEN}
-        if n_seeds == seeds:
-            wanted |= CONTROLS.keys()
-        planned |= {
-            trial.identity: trial
-            for trial in everything
-            if trial.condition in wanted and trial.seed < first_seed + n_seeds
-        }
+
+    def run(wanted: Container[str], n_seeds: int) -> Results:
+        """Run conditions on the first seeds, beside all that has been planned before."""
+        for trial in everything:
+            if trial.condition in wanted and trial.seed < first_seed + n_seeds:
+                planned[trial.identity] = trial
         with run_study(
             study,
             out,
@@ -172,16 +178,26 @@ def tune(
             observer=observer,
             chosen=list(planned.values()),
         ) as store:
-            results = read(store)
+            return read(store)
+
+    names = list(points)
+    for n_configurations, n_seeds in rungs(len(points), seeds):
+        names = names[:n_configurations]
+        wanted = {*names, GIVEN}
+        if n_seeds == seeds:
+            wanted |= CONTROLS.keys()
+        table = _table(run(wanted, n_seeds), points, range(first_seed, first_seed + n_seeds))
         observer.note(f"compared {count(len(names), 'configuration')} on {count(n_seeds, 'seed')}")
-        table = _table(results, points, range(first_seed, first_seed + n_seeds))
         names = [name for name in table["name"] if name in names]
     best = points[table["name"].iloc[0]]
-    tuned = _laid(spec, best)
+    control = _control_of(table["name"].iloc[0], study)
+    if control not in CONTROLS:
+        run({control}, seeds)
+    tuned = _lay_over_spec(spec, best)
     durable.write(out / BEST_FILE, dumps(tuned.table()).encode())
     durable.write(out / TABLE_FILE, table.to_csv(index=False).encode())
-    finalists = load(out).where(f"condition in {[GIVEN, *names, *CONTROLS]}")
-    return Tuning(tuned, best, finalists, table)
+    finalists = load(out).where(f"condition in {[GIVEN, *names, *CONTROLS, control]}")
+    return Tuning(tuned, best, finalists, table, control)
 
 
 def rungs(configurations: int, seeds: int) -> Iterator[tuple[int, int]]:
@@ -195,7 +211,8 @@ def rungs(configurations: int, seeds: int) -> Iterator[tuple[int, int]]:
     n = 2
     while n < seeds:
         yield configurations, n
-        configurations, n = max(2, (configurations + 1) // 2), 2 * n
+        configurations = max(2, (configurations + 1) // 2)
+        n *= 2
     yield configurations, seeds
 
 
@@ -220,15 +237,15 @@ def _check_request(spec: Spec, trials: int, seeds: int, first_seed: int, draw: i
         )
 
 
-def _over(table: TomlTable, point: Point) -> TomlTable:
+def _lay_over(table: TomlTable, point: Point) -> TomlTable:
     """Return a table with values laid over it."""
     return reduce(overlay, starmap(nested, point.items()), table)
 
 
-def _laid(spec: Spec, point: Point) -> Spec:
+def _lay_over_spec(spec: Spec, point: Point) -> Spec:
     """Return a spec with values laid over it, and nothing left to tune."""
     table = {key: value for key, value in spec.table().items() if key != "tune"}
-    return Spec.of(_over(table, point), spec.sources)
+    return Spec.of(_lay_over(table, point), spec.sources)
 
 
 def _content(spec: Spec) -> str:
@@ -242,7 +259,7 @@ def _space(spec: Spec) -> dict[str, Sequence[object]]:
     if spec.tune:
         for key, values in spec.tune.items():
             for value in values:
-                _laid(spec, {key: value})  # refuses what no configuration can have
+                _lay_over_spec(spec, {key: value})  # refuses what no configuration can have
         return dict(spec.tune)
     with spec.sources.active():
         scenario = spec.conditions()[0].settings.scenario.build()
@@ -253,7 +270,7 @@ def _space(spec: Spec) -> dict[str, Sequence[object]]:
     for key, values in usual.items():
         for value in values:
             with suppress(SpecError):
-                _content(_laid(spec, {key: value}))
+                _content(_lay_over_spec(spec, {key: value}))
                 possible[key] = [*possible.get(key, ()), value]
     return possible
 
@@ -270,7 +287,7 @@ def _sample(spec: Spec, trials: int, draw: int) -> dict[str, Point]:
         if len(points) < trials and repr(point) not in tried:
             tried.add(repr(point))
             try:
-                points.setdefault(_content(_laid(spec, point)), point)
+                points.setdefault(_content(_lay_over_spec(spec, point)), point)
             except SpecError as error:
                 problem = str(error)
     if len(points) == 1:
@@ -283,13 +300,37 @@ def _study(spec: Spec, points: Mapping[str, Point], seeds: Iterable[int]) -> Spe
     left_out = ("tune", "evaluations", "keep_teams")
     base = {key: value for key, value in spec.table().items() if key not in left_out}
     base |= {"study": "learning-curve", "seeds": list(seeds)}
-    overrides = [_over({"name": name}, point) for name, point in points.items()]
+    overrides = [_lay_over({"name": name}, point) for name, point in points.items()]
     for name, table in CONTROLS.items():
         control = {"name": name, **table}
         with suppress(SpecError):  # if no rewards are predicted
             check_conditions(Spec.of({**base, "overrides": [control]}, spec.sources))
             overrides.append(control)
+    study = Spec.of({**base, "overrides": overrides}, spec.sources)
+    planning = [c.label for c in study.conditions() if c.label in points and _plans(c)]
+    overrides += [_frozen_as(name, points[name]) for name in planning]
     return Spec.of({**base, "overrides": overrides}, spec.sources)
+
+
+def _plans(condition: Condition) -> bool:
+    """Return whether the zero weights of a condition plan, by predicted rewards."""
+    learner = condition.settings.learner
+    return isinstance(learner, LearnerSettings) and learner.decision.rule in WITH_REWARDS
+
+
+def _frozen_as(name: str, point: Point) -> TomlTable:
+    """Return the override that differs from a configuration in learning alone."""
+    control = _lay_over({"name": f"{AS}{name}"}, without_learning(point))
+    return overlay(control, {"learner": {"kind": "frozen"}})
+
+
+def _control_of(name: str, study: Spec) -> str:
+    """Return the condition that differs from a configuration in learning alone."""
+    label = f"{AS}{name}"
+    for condition in study.conditions():
+        if label in (condition.label, *condition.same):
+            return condition.label
+    return next(iter(CONTROLS))
 
 
 def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) -> pd.DataFrame:

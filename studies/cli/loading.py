@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def opened(directory: Path) -> Iterator[Store]:
+def open_study(directory: Path) -> Iterator[Store]:
     """Open a study to read it, and say so if the spec beside its database is another one."""
     with Store.open(directory) as store:
         if (remark := other_spec(store)) is not None:

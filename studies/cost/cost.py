@@ -209,7 +209,7 @@ def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
     finally:
         tracemalloc.stop()
     before = astuple(team.counts)
-    times = [_timed(team, scenario)]
+    times = [_time_steps(team, scenario)]
     # An episode here has two steps, of which the second alone changes weights.
     steps = 2 * len(times[0]), 2 * len(times[0]), len(times[0])
     after = astuple(team.counts)
@@ -217,13 +217,13 @@ def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
     for seed in range(1, repeats):
         team = Team(learner, scenario, hierarchy, policy_seed(seed))
         _step(team, scenario)
-        times.append(_timed(team, scenario))
+        times.append(_time_steps(team, scenario))
     deciding, learning = (median(part) for part in zip(*chain(*times), strict=True))
     each = tuple(sum(map(median, zip(*taken, strict=True))) for taken in times)
     return StepCost(Counts(*counted), deciding, learning, memory, each)
 
 
-def _timed(team: Team, scenario: Scenario) -> list[tuple[float, float]]:
+def _time_steps(team: Team, scenario: Scenario) -> list[tuple[float, float]]:
     """Take steps until enough time has been measured; return (deciding, learning) [s] of each."""
     times = [_step(team, scenario)]
     while sum(map(sum, times)) < LEAST_SECONDS and len(times) < MOST_TIMES:

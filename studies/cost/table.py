@@ -43,7 +43,7 @@ OF_THE_PAPER = PAPER.chain_closed_form(4)
 """Operations of four agents by Eq. 19, with the paper's |S|, |A| and L."""
 
 
-def written(rows: Sequence[CostRow], form: Form) -> str:
+def format_rows(rows: Sequence[CostRow], form: Form) -> str:
     """Return the rows in a format."""
     if form == "table":
         return _table(rows)
@@ -204,15 +204,15 @@ class CostTable:
     @property
     def csv(self) -> str:
         """The table as CSV, with every digit."""
-        return written(self.rows, "csv")
+        return format_rows(self.rows, "csv")
 
     @property
     def latex(self) -> str:
         """The table for LaTeX, with the package booktabs."""
-        return written(self.rows, "latex")
+        return format_rows(self.rows, "latex")
 
     def __str__(self) -> str:
-        return written(self.rows, "table")
+        return format_rows(self.rows, "table")
 
     __repr__ = __str__
 

@@ -53,6 +53,7 @@ SHORT: dict[str, Table] = {
     "hierarchy-ppo": POLICY,
     "mappo": POLICY,
     "dqn": {**NETWORK, "begin": 2},
+    "written": {"value": {"distance": -1.0}},
 }
 """What learners are set to in trials so short."""
 
@@ -142,7 +143,7 @@ NO_PREDICTOR = "learner.predictor: networks predict nothing, so there is nothing
 """Said of a key that settings of networks do not have."""
 
 
-class Found(NamedTuple):
+class Trying(NamedTuple):
     """What has come of a cell."""
 
     verdict: Literal["yes", "left out", "no"]
@@ -157,7 +158,7 @@ class Combination(NamedTuple):
     axis: str
     case: str
     learner: str
-    outcome: Found
+    outcome: Trying
 
 
 def spec_of(learner: str, changes: Table) -> dict[str, Any]:
@@ -202,7 +203,7 @@ def _filled(value: Any, words: Mapping[str, Any]) -> Any:
     return words.get(value, value) if isinstance(value, str) else value
 
 
-def attempt(table: Table) -> Found:
+def attempt(table: Table) -> Trying:
     """Run a cell.
 
     Raises
@@ -216,7 +217,7 @@ def attempt(table: Table) -> Found:
     except SpecError as error:
         message = str(error)
         is_unknown = message.startswith("learner.predictor") and "unknown key" in message
-        return Found("no", NO_PREDICTOR if is_unknown else message)
+        return Trying("no", NO_PREDICTOR if is_unknown else message)
     (trial,) = trials_of(spec)
     result = run_trial(trial)
     if trial.keep_teams:
@@ -227,7 +228,7 @@ def attempt(table: Table) -> Found:
             raise RuntimeError(f"{trial.settings.learner.kind}: the kept team acts otherwise")
     others = [other for _, other in trial.evaluations]
     warnings = [line for each in (trial.settings, *others) for line in each.warnings()]
-    return Found("left out", warnings[0]) if warnings else Found("yes")
+    return Trying("left out", warnings[0]) if warnings else Trying("yes")
 
 
 def cells(learners: Sequence[str] = ()) -> Iterator[Combination]:

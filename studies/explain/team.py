@@ -159,7 +159,8 @@ def rules_table(
     power = exponent(parts)
     lines = list[tuple[str, ...]]()
     for j in mean_shares(parts):
-        variable, partition = variables[j], rules.partitions[j]
+        variable = variables[j]
+        partition = rules.partitions[j]
         shares = [percent(p.share(p.singles[j])) for p in parts]
         lines.append((f"{variable.name}, share of the variance", *shares))
         words = zip(labels(variable, partition), partition.centres, strict=True)
@@ -252,7 +253,7 @@ def explain(store: Store, trial: Trial) -> Explanation:
         to the last bit, the one that is kept.
     """
     with trial.sources.active():
-        session, bodies = _trained(store, trial)
+        session, bodies = _load_team(store, trial)
         agents = session.team.only(FuzzyAgents)
         taken = [take_apart(agents.rules, theta) for theta in agents.learner.theta]
         return Explanation(
@@ -292,7 +293,7 @@ def _policy(session: Session) -> PolicyMap | str:
     return policy or "the scenario has no method show_policy for agents such as these"
 
 
-def _trained(store: Store, trial: Trial) -> tuple[Session, BodyEffects | None]:
+def _load_team(store: Store, trial: Trial) -> tuple[Session, BodyEffects | None]:
     """Return a session with the team of a trial, and what its bodies were believed to be."""
     arrays = store.recording(trial.identity, TEAM) if trial.keep_teams else None
     with refused(f"{store.directory}: "):  # a file that settings name may not be what it was

@@ -101,7 +101,7 @@ def verdicts(bodies: BodyEffects, actuators: Sequence[str]) -> Iterator[str]:
             if abs(left - 1.0) > LEAST_CHANGE:
                 caveat = "" if abs(left - 1.0) > 2.0 * around else "; uncertain"
                 share = f"{left:+.2f} ± {around:.2f} of its drive"
-                yield f"{name}: {share}, {_like(left)}{caveat}"
+                yield f"{name}: {share}, {_name_drive(left)}{caveat}"
 
 
 def by_body(bodies: BodyEffects, actuators: Sequence[str]) -> Iterator[Sequence[str]]:
@@ -112,7 +112,7 @@ def by_body(bodies: BodyEffects, actuators: Sequence[str]) -> Iterator[Sequence[
         first += effect.shape[1] - 1
 
 
-def _like(left: float) -> str:
+def _name_drive(left: float) -> str:
     if left < -LEAST_CHANGE:
         return "as if it were reversed"
     if left <= LEAST_CHANGE:

@@ -36,6 +36,7 @@ from ..presentation.tables import tabulate
 from ..results.analysis import identity_lines
 from ..results.contrasts import contrasts
 from ..results.results import read
+from ..spec.controls import control_lines
 from ..spec.outline import StudyOutline, sources_of
 from ..spec.tables import dumps
 from ..store.database import RESULTS_VERSION, Planned
@@ -214,18 +215,21 @@ def page(directory: Path) -> str:
         results = read(store)
         counts = store.counts()
         failed = [
-            (condition, seed, without_places(error.rstrip()))
+            (condition, seed, hide_places(error.rstrip()))
             for condition, seed, error in store.failed()
         ]
         trials = store.planned()
         packed = replays(store, trials)
         sources = sources_of(store)
+        settings = store.settings()
     with sources.active():
         analysis = analyse_as(outline.study, results)
         figures = draw_figures(load_study(outline.study), analysis)
     notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included
+    there = {label: own for label, own in settings.items() if label in results.conditions}
+    notes = (*notes, *control_lines(there))
     return _template().render(
         study=outline.study,
         extent=extent(outline),
@@ -243,8 +247,8 @@ def page(directory: Path) -> str:
         spec=dumps(outline.table),
         versions=versions(),
         results_version=RESULTS_VERSION,
-        css=_own("page.css"),
-        js=_own("page.js"),
+        css=_read_own("page.css"),
+        js=_read_own("page.js"),
         replay_js=Markup(packed.script),
     )
 
@@ -269,7 +273,7 @@ def brief(notes: str) -> str:
     return NOT_SIGNIFICANT.sub(lambda lines: counted.format(lines[0].count("  no ")), notes)
 
 
-def _own(name: str) -> Markup:
+def _read_own(name: str) -> Markup:
     """Return a file of this package, which is HTML already."""
     return Markup((FOLDER / name).read_text(encoding="utf-8"))
 
@@ -297,7 +301,7 @@ def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
         for number, (name, figure) in enumerate(figures.items(), 1):
             svg = io.StringIO()
             figure.savefig(svg, format="svg", metadata={"Date": None})
-            text = embedded(svg.getvalue(), f"figure{number}-")
+            text = embed(svg.getvalue(), f"figure{number}-")
             pdf = io.BytesIO()
             figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
             encoded = base64.b64encode(pdf.getvalue()).decode("ascii")
@@ -305,12 +309,12 @@ def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
     return drawings
 
 
-def embedded(svg: str, prefix: str) -> str:
+def embed(svg: str, prefix: str) -> str:
     """Return an SVG file's root element, its ids and its style kept from those of other ones.
 
     Examples
     --------
-    >>> embedded('<?xml version="1.0"?><svg><style>*{a: b}</style><g id="x"/></svg>', "f-")
+    >>> embed('<?xml version="1.0"?><svg><style>*{a: b}</style><g id="x"/></svg>', "f-")
     '<svg id="f-"><style>#f- *{a: b}</style><g id="f-x"/></svg>'
     """
     svg = svg[svg.index("<svg") :].strip()
@@ -395,10 +399,10 @@ def versions() -> list[tuple[str, str]]:
     return [python, *((name, installed(name)) for name in PACKAGES), ("platform", machine)]
 
 
-def without_places(text: str) -> str:
+def hide_places(text: str) -> str:
     """Return text in which absolute paths keep their last two parts only.
 
-    >>> without_places('File "/home/me/lib/core/team.py", line 3')
+    >>> hide_places('File "/home/me/lib/core/team.py", line 3')
     'File "…/core/team.py", line 3'
     """
     return re.sub(r"(?<![\w.…/:])/(?:[^\s\"':/]+/)+(?=[^\s\"':/]+/[^\s\"':/]+)", "…/", text)

@@ -173,6 +173,8 @@ class Condition(NamedTuple):
     refuse."""
     other_kinds: tuple[str, ...] = ()
     """Which kinds these are, as ``learner.kind = 'fitted-q'``; where nothing is left out, none."""
+    same: tuple[str, ...] = ()
+    """Labels of controls that would be the same, and are left out."""
 
     @property
     def tables(self) -> list[Any]:

@@ -22,7 +22,7 @@ from ...core.agents.joint import Granularity
 from ...core.decision.settings import DecisionSettings
 from ...core.evaluators.best_response import BestResponseSettings
 from ...core.evaluators.coordination import MaxPlusSettings, VariableEliminationSettings
-from ...core.learners import LearnerSettings, TeamSettings
+from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import MOST_RULES, BatchTDSettings
 from ...core.learners.fitted_q import FittedQSettings
 from ...core.plugins.problems import explain, misplaced, problems_of
@@ -31,6 +31,7 @@ from ...core.plugins.words import closest, show
 from ...topologies.config import parse
 from ..errors import SpecError, refused
 from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings
+from .controls import LEARN_NOTHING
 from .presets import PRESETS
 from .tables import TomlTable, flat, label, nested, overlay, scalar, without
 
@@ -111,7 +112,8 @@ def grid(
     Raises
     ------
     SpecError
-        If a condition is invalid, or two are the same.
+        If a condition is invalid, or two that learn are the same. Of controls that are the same
+        the first one stands, see `Condition.same`.
     """
     conditions: list[Condition] = []
     points: dict[str, tuple[str, Layer]] = {}
@@ -129,10 +131,15 @@ def grid(
         )
         content = json.dumps([settings.canonical(), *(stage.table() for stage in stages)])
         other, other_point = points.setdefault(content, (name, point))
-        if other_point is not point or name in labels:
+        is_same = other_point is not point
+        if is_same and settings.learner.kind in LEARN_NOTHING and other != name:
+            _leave_out(name, other, conditions)
+            continue
+        if is_same or name in labels:
             raise SpecError(
                 f"{_differing(point, other_point) or ('overrides' if overrides else 'sweep')}: "
-                f"conditions {other!r} and {name!r} are the same"
+                f"conditions {other!r} and {name!r} are the same: leave one out, or give it other "
+                "settings"
             )
         labels.add(name)
         columns: dict[str, Any] = {"name": override.name} if override else {}
@@ -145,6 +152,13 @@ def grid(
         left_out = resolved.left_out, resolved.other_kinds
         conditions.append(Condition(name, columns, settings, evaluated, stages, *left_out))
     return tuple(conditions)
+
+
+def _leave_out(name: str, other: str, conditions: list[Condition]) -> None:
+    """Note in a control that one of another name, which would be the same, is left out."""
+    at = [condition.label for condition in conditions].index(other)
+    same = (*conditions[at].same, name)
+    conditions[at] = conditions[at]._replace(same=same)
 
 
 def _differing(point: Layer, other: Layer) -> str:
@@ -185,11 +199,13 @@ def resolve(
     name = point.get("preset", preset if own_preset is None else own_preset)
     if not isinstance(name, str) or name not in PRESETS:
         raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
-    if own_preset is not None or "preset" in point:
-        tables = _for_preset(name, tables)
     own = [tables, layer_of(override) if override else {}]
     own += [nested(key, value) for key, value in point.items() if key != "preset"]
     own = [_expand(layer) for layer in own]
+    if "preset" in point:
+        own = [for_control(name, layer) for layer in own]
+    elif own_preset is not None:  # what stands beside the preset is meant for it
+        own[0] = for_control(name, own[0])
     given = PRESETS[name].table
     scenario = _settle([_part("scenario", given)], [_part("scenario", t) for t in own], where)
     defaults = _expand(scenario.settings.scenario.scenario_defaults(name))
@@ -201,13 +217,40 @@ def _part(name: str, table: Layer) -> TomlTable:
     return {name: table[name]} if name in table else {}
 
 
-def _for_preset(name: str, tables: Layer) -> Layer:
-    """Return a spec's tables without what tunes learning, if a preset is a control: it has not."""
-    learner = tables.get("learner", {})
-    if "kind" in learner or PRESETS[name].table["learner"]["kind"] != "frozen":
-        return tables
-    kept = {key: v for key, v in learner.items() if key in LearnerSettings.model_fields}
-    return {**tables, "learner": kept}
+def for_control(preset: str, layer: Layer) -> Layer:
+    """Return what a user laid over a preset, without what tunes learning if that is a control.
+
+    A control that is defined by its rule of decision, as ``random`` and ``planner`` are, keeps it.
+    """
+    own = PRESETS[preset].table["learner"]
+    if own["kind"] not in LEARN_NOTHING or "learner" not in layer:
+        return layer
+    fields = LEARNERS.model(own["kind"]).model_fields.keys() - {"kind"}
+    kept: TomlTable = {key: value for key, value in layer["learner"].items() if key in fields}
+    if "rule" in own.get("decision", {}) and isinstance(kept.get("decision"), Mapping):
+        kept["decision"] = {k: v for k, v in kept["decision"].items() if k != "rule"}
+    return {**layer, "learner": kept}
+
+
+def without_learning(point: Mapping[str, object]) -> dict[str, object]:
+    """Return values by dotted key without those that tune learning.
+
+    Examples
+    --------
+    >>> without_learning({"learner.ridge": 3.0, "learner.decision.rule": "reward-and-value"})
+    {'learner.decision.rule': 'reward-and-value'}
+    """
+    return {key: value for key, value in point.items() if not _tunes_learning(key)}
+
+
+def tuning_keys(keys: Iterable[str]) -> list[str]:
+    """Return which dotted keys tune learning, sorted."""
+    return sorted({key for key in keys if _tunes_learning(key)})
+
+
+def _tunes_learning(key: str) -> bool:
+    section, _, rest = key.partition(".")
+    return section == "learner" and rest.partition(".")[0] not in LearnerSettings.model_fields
 
 
 def _settle(given: Layers, own: Layers, where: str) -> Resolved:

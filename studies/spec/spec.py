@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 from pkgutil import resolve_name
@@ -26,7 +26,7 @@ from ...core.agents.joint import Granularity
 from ...core.decision.exploration import EXPLORATIONS
 from ...core.evaluators import EVALUATORS
 from ...core.hierarchy.hierarchy import Hierarchy
-from ...core.learners import LEARNERS, LearnerSettings
+from ...core.learners import LEARNERS
 from ...core.numerics import nx
 from ...core.plugins.problems import explain
 from ...core.plugins.registry import Registry
@@ -41,7 +41,8 @@ from ..errors import SpecError, refused
 from ..store.database import DATABASE, SPEC_FILE
 from ..store.durable import read_text
 from .conditions import Condition, Curriculum, Length, Name, Override
-from .layers import below, expand, grid, section
+from .controls import LEARN_NOTHING, planning_remark
+from .layers import below, expand, grid, section, tuning_keys
 from .presets import PRESETS
 from .studies import STUDIES
 from .tables import TomlTable, assignment, overlay
@@ -366,18 +367,33 @@ class Spec(Settings):
             kinds = dict.fromkeys(kind for c in self.conditions() for kind in c.other_kinds)
             keys = join_names(left_out, MOST_KEYS)
             lines.append(f"{keys}: of the preset, left out for {join_names(kinds, MOST_KEYS)}")
-        controls = [c for c in self.conditions() if c.settings.learner.kind == "frozen"]
-        tuned = self.learner.keys() - LearnerSettings.model_fields.keys() - {"kind"}
-        if tuned and controls:
-            keys = ", ".join(f"learner.{key}" for key in sorted(tuned))
-            labels = join_names((condition.label for condition in controls), 3)
-            lines.append(f"{keys}: left out for {labels}, which learn nothing")
+        lines += self._of_controls()
         for condition in self.conditions():
             lines += condition.settings.warnings()
             others: list[Any] = [*dict(condition.evaluations).values(), *condition.curriculum]
             for there in (condition.settings, *others):
                 lines += there.scenario.warnings()
         return tuple(dict.fromkeys(lines))
+
+    def _of_controls(self) -> Iterator[str]:
+        """Yield what is left out for controls, and what must be said of them, a line each."""
+        controls = [c for c in self.conditions() if c.settings.learner.kind in LEARN_NOTHING]
+        labels = join_names((condition.label for condition in controls), MOST_KEYS)
+        tuned = tuning_keys([*(f"learner.{key}" for key in self.learner), *self.sweep])
+        tuned = [key for key in tuned if key != "learner.kind"]
+        if tuned and controls:
+            yield f"{', '.join(tuned)}: left out for {labels}, which learn nothing"
+        for control in controls:
+            if control.same:
+                others = join_names(map(repr, control.same), MOST_KEYS)
+                yield (
+                    f"{others}: left out, the same control as {control.label!r}; to have both, "
+                    "give it another learner.decision or scenario"
+                )
+        tables = {c.label: c.settings.model_dump(mode="json") for c in self.conditions()}
+        remark = planning_remark(tables)
+        if remark is not None:
+            yield remark
 
     @property
     def sources(self) -> Sources:

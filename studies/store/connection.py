@@ -134,6 +134,7 @@ def _begin_journal(path: Path) -> None:
         with closing(_connect(path)) as connection:
             connection.execute("PRAGMA locking_mode = EXCLUSIVE")
             connection.execute("PRAGMA journal_mode = DELETE")
+        path.with_name(f"{path.name}-shm").unlink(missing_ok=True)
 
 
 @contextmanager

@@ -29,9 +29,11 @@ from .database import DATABASE, NoStudyError, Planned, StudyNotes
 from .durable import Recording
 
 NO_LOG = (
-    "this file system shares no memory (as NFS, Lustre, GPFS), so results are kept with a rollback "
-    "journal; the same results, written more slowly"
+    "is kept with a rollback journal, as on file systems that share no memory (NFS, Lustre, GPFS): "
+    "the same results, written more slowly"
 )
+"""What is said of a database without a write-ahead log."""
+
 NamesAndRows = tuple[list[str], Iterable[tuple[object, ...]]]
 """The names of columns, and rows of values, which may be read one by one."""
 

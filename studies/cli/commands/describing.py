@@ -127,7 +127,7 @@ def cost(
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
     from ....core.agents.cost import Problem
-    from ...cost.table import cost_table, written
+    from ...cost.table import cost_table, format_rows
     from ...presentation.progress import say
 
     with refused():
@@ -143,7 +143,7 @@ def cost(
             from ...cost.figure import draw
 
             draw(rows, plot)
-    print_data(f"{written(rows, form)}\n")
+    print_data(f"{format_rows(rows, form)}\n")
     return 0
 
 
@@ -190,7 +190,7 @@ def combine(learners: tuple[str, ...], form: str) -> int:
 
     say("running a few decisions of every combination, first compiling what is not")
     for line in write(cells(learners), markdown=form == "markdown"):
-        print(line)
+        print_text(line)
     return 0
 
 

@@ -15,7 +15,7 @@ from ...store import durable
 from ...store.store import Store
 from .. import options
 from ..display import Form, in_form, print_data, print_study, print_table, print_text
-from ..loading import describe, load_results, opened, progress, trust_files
+from ..loading import describe, load_results, open_study, progress, trust_files
 
 PERIOD = 2.0
 """How often a study that is watched is looked at [s]."""
@@ -182,7 +182,7 @@ def results(directory: Path, form: Literal["table", "csv", "json"], phase: str) 
     from ...presentation.tables import write_rows
     from ...results.results import read
 
-    with opened(directory) as store:
+    with open_study(directory) as store:
         store.verify()
         measured = read(store)
     if measured.phases and phase not in measured.phases:
@@ -217,7 +217,7 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
     folder = directory / "export" if out is None else out
     if trust:
         trust_files(directory)
-    with opened(directory) as store:
+    with open_study(directory) as store:
         store.verify()
         paths = {folder / name: text for name, text in _texts(store, form).items()}
     there = [path for path in paths if path.exists()]
@@ -292,7 +292,7 @@ def explain(directory: Path, condition: str | None, seed: int | None, trust: boo
 
     if trust:
         trust_files(directory)
-    with opened(directory) as store:
+    with open_study(directory) as store:
         trial = finished_trial(store, condition, seed)
         conditions = list(store.columns())
         explanation = team.explain(store, trial)

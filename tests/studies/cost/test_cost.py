@@ -23,7 +23,7 @@ from nested_agents.studies.cost.cost import (
     step_formula,
 )
 from nested_agents.studies.cost.figure import draw
-from nested_agents.studies.cost.table import cost_table, written
+from nested_agents.studies.cost.table import cost_table, format_rows
 from nested_agents.studies.presentation import figures
 
 FIVE = ("chain", "teams", "tree:2", "star", "independent")
@@ -226,14 +226,14 @@ def made_up(n: int, power: float) -> CostRow:
 
 
 def test_the_table_of_what_was_measured_says_what_it_holds() -> None:
-    out = written([made_up(n, 1.5) for n in range(1, 11)], "table")
+    out = format_rows([made_up(n, 1.5) for n in range(1, 11)], "table")
     assert "ms: deciding and learning" in out
     assert max(map(len, out.splitlines())) <= 80
 
 
 def test_latex_has_what_was_measured() -> None:
     rows = [made_up(1, 1.0), made_up(10, 2.0), replace(made_up(11, 1.0), measured=None)]
-    formulas, measured = written(rows, "latex").split("\n\n")
+    formulas, measured = format_rows(rows, "latex").split("\n\n")
     assert r"\begin{tabular}{rlrrrrr}" in formulas
     assert measured.splitlines() == [
         r"% needs \usepackage{booktabs}",
@@ -248,19 +248,19 @@ def test_latex_has_what_was_measured() -> None:
         r"\end{tabular}",
     ]
     asked = replace(rows[2], formula=None)
-    assert written([asked], "latex").count("tabular") == 2
+    assert format_rows([asked], "latex").count("tabular") == 2
 
 
 def test_repeats_have_an_interval_in_every_form() -> None:
     row = made_up(2, 1.0)
     assert row.measured is not None
     repeated = [replace(row, measured=replace(row.measured, repeats=(0.001, 0.002, 0.003)))]
-    table = written(repeated, "table")
+    table = format_rows(repeated, "table")
     assert "2±2.5" in table  # Student's t of two degrees of freedom: 4.303 x 1 ms / sqrt(3)
     assert "a 95 % interval of the mean of 3 repeats" in table
-    assert "±" not in written([row], "table")
-    assert r"2$\pm$2.5" in written(repeated, "latex")
-    (record,) = json.loads(written(repeated, "json"))
+    assert "±" not in format_rows([row], "table")
+    assert r"2$\pm$2.5" in format_rows(repeated, "latex")
+    (record,) = json.loads(format_rows(repeated, "json"))
     assert (record["repeats"], record["step_s"], record["step_s_low"]) == (3, 0.002, 0.0)
     assert record["step_s_high"] == pytest.approx(0.002 + 4.3027 * 0.001 / 3**0.5, rel=1e-4)
 
@@ -282,7 +282,7 @@ def test_repeats_are_measured(said) -> None:
 
 def test_csv_has_columns_of_rows_that_were_measured_later() -> None:
     rows = [replace(made_up(1, 1.0), measured=None), made_up(2, 1.0)]
-    first, second = csv.DictReader(io.StringIO(written(rows, "csv")))
+    first, second = csv.DictReader(io.StringIO(format_rows(rows, "csv")))
     assert (first["memory_bytes"], second["memory_bytes"]) == ("", "160")
 
 
@@ -321,5 +321,5 @@ def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
     assert max(map(len, out.splitlines())) <= 80
     assert "<svg" in figure.read_text()
     rows = cost_table(["chain"], [2], Problem(), measured=True).rows
-    (record,) = json.loads(written(rows, "json"))
+    (record,) = json.loads(format_rows(rows, "json"))
     assert record["joint_actions_per_step"] == record["joint_actions_formula_per_step"] == 20

@@ -7,21 +7,28 @@ import pytest
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import WIDTH
 from nested_agents.studies.explain.combination_tables import write
-from nested_agents.studies.explain.combinations import AXES, Combination, Found
+from nested_agents.studies.explain.combinations import AXES, Combination, Trying
 
 
 def test_sentences_are_numbered_once_for_all_learners() -> None:
     left_out = [f"topology: left out, learner.kind = {name!r} tells nobody" for name in "ab"]
     made = [
-        Combination("predictor", "given", "a", Found("yes")),
-        Combination("predictor", "static", "a", Found("left out", left_out[0])),
-        Combination("predictor", "given", "b", Found("left out", left_out[1])),
-        Combination("predictor", "static", "b", Found("no", "other")),
+        Combination("predictor", "given", "a", Trying("yes")),
+        Combination("predictor", "static", "a", Trying("left out", left_out[0])),
+        Combination("predictor", "given", "b", Trying("left out", left_out[1])),
+        Combination("predictor", "static", "b", Trying("no", "other")),
+    ]
+    cases = list(AXES["predictor"])
+    made = [
+        *made[:2],
+        *(Combination("predictor", case, "a", Trying("yes")) for case in cases[2:]),
+        *made[2:],
+        *(Combination("predictor", case, "b", Trying("yes")) for case in cases[2:]),
     ]
     lines = list(write(made))
-    assert [line.split() for line in lines[:3]] == [
-        ["predictor", "given", "static"],
-        ["a", "yes", "out", "1"],
+    assert lines[0].split() == " ".join(["predictor", *cases]).split()
+    assert [line.split()[:5] for line in lines[1:3]] == [
+        ["a", "yes", "out", "1", "yes"],
         ["b", "out", "1", "no", "2"],
     ]
     assert lines[-2:] == [

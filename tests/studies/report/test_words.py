@@ -31,7 +31,7 @@ def test_topologies_are_named_as_the_spec_writes_them():
 
 def test_places_of_the_machine_are_shortened():
     text = "File \"/a/b/c/d.py\", at '/x/y'; 1/2 and a/b/c stay; /srv/data/deep/file.toml: bad"
-    assert words.without_places(text) == (
+    assert words.hide_places(text) == (
         "File \"…/c/d.py\", at '/x/y'; 1/2 and a/b/c stay; …/deep/file.toml: bad"
     )
 

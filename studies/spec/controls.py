@@ -1,0 +1,118 @@
+"""Controls: conditions that learn nothing, beside which it is seen what learning is worth.
+
+A control differs from the team that it controls in learning alone. Where a preset of a control is
+laid under what a user has written (see `layers.for_control`), it keeps what says how agents decide
+and predict: the rule, whose value, the evaluator, the predictor, the horizon.
+
+Where predicted rewards count, *zero weights plan*: success of a team that has learned is then no
+sign of learning. Where they do not count, zero weights make all values equal, and as ties are
+random, frozen weights and random actions are one control.
+"""
+
+from collections.abc import Mapping
+from textwrap import wrap
+from typing import Any
+
+from ...core.plugins.words import show
+from ...topologies.builders import join_names
+from ..errors import WIDTH
+
+LEARN_NOTHING = ("frozen", "written")
+"""Kinds of learners that do not learn."""
+WITH_REWARDS = ("reward", "reward-and-value")
+"""Rules of decision by which zero weights plan."""
+MOST_NAMES = 3
+"""Conditions that a remark names."""
+
+Settings = Mapping[str, Any]
+"""The settings of a condition as a table."""
+
+
+def control_of(condition: str, settings: Mapping[str, Settings]) -> str | None:
+    """Return the condition that differs from one that learns in learning alone.
+
+    None if there is none. Zero weights tie under any rule without rewards: there every frozen
+    condition of the same scenario is one.
+
+    Parameters
+    ----------
+    condition
+        The one that learns.
+    settings
+        Of all conditions, by label.
+    """
+    team = settings[condition]
+    for label, own in settings.items():
+        is_frozen = own["learner"]["kind"] == "frozen" and own["scenario"] == team["scenario"]
+        if is_frozen and _decision_of(own) == _decision_of(team):
+            return label
+    return None
+
+
+def _decision_of(settings: Settings) -> object:
+    """Return what tells how zero weights decide."""
+    learner = settings["learner"]
+    decision = learner.get("decision", {})
+    if decision.get("rule") not in WITH_REWARDS:
+        return decision.get("rule") == "random"
+    return settings["topology"], decision, learner.get("predictor")
+
+
+def control_remark(settings: Mapping[str, Settings]) -> str | None:
+    """Return what must be said of the controls of some conditions, in one sentence; None: nothing.
+
+    Parameters
+    ----------
+    settings
+        Of all conditions, by label.
+    """
+    return planning_remark(settings) or _same_remark(settings)
+
+
+def control_lines(settings: Mapping[str, Settings]) -> tuple[str, ...]:
+    """Return `control_remark` in lines that fit a terminal; none if there is nothing to say."""
+    remark = control_remark(settings)
+    return () if remark is None else tuple(wrap(remark, WIDTH, subsequent_indent="  "))
+
+
+def planning_remark(settings: Mapping[str, Settings]) -> str | None:
+    """Return that zero weights plan, too, and what to judge learning by; None: they do not.
+
+    Parameters
+    ----------
+    settings
+        Of all conditions, by label.
+    """
+    planning: dict[str, str | None] = {}
+    for condition, own in settings.items():
+        learner = own["learner"]
+        rule = learner.get("decision", {}).get("rule")
+        if learner["kind"] not in LEARN_NOTHING and rule in WITH_REWARDS:
+            planning[condition] = control_of(condition, settings)
+    if not planning:
+        return None
+    names = join_names(planning, MOST_NAMES)
+    rules = dict.fromkeys(settings[c]["learner"]["decision"]["rule"] for c in planning)
+    why = f"untrained weights plan by the reward under rule = {', '.join(map(show, rules))}"
+    controls = list(dict.fromkeys(filter(None, planning.values())))
+    if not controls:
+        return (
+            f"{names}: {why}, and no control learns nothing under the same: judge learning by the "
+            "difference to one of preset = 'frozen' with the same learner.decision"
+        )
+    return f"{names}: {why}; judge learning by the difference to {join_names(controls, MOST_NAMES)}"
+
+
+def _same_remark(settings: Mapping[str, Settings]) -> str | None:
+    """Return that frozen and random conditions of one scenario are one control, if it is so."""
+    frozen: list[str] = []
+    drawn: list[str] = []
+    for condition, own in settings.items():
+        if own["learner"]["kind"] == "frozen":
+            rule = own["learner"]["decision"]["rule"]
+            if rule in ("value", "random"):
+                (drawn if rule == "random" else frozen).append(condition)
+    if not frozen or not drawn:
+        return None
+    names = f"{join_names(frozen, MOST_NAMES)} and {join_names(drawn, MOST_NAMES)}"
+    return f"{names} are one control: frozen weights make all values equal, and ties are random"
