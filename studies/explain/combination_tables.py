@@ -7,7 +7,7 @@ from itertools import groupby
 from textwrap import fill
 
 from ..errors import WIDTH
-from .combinations import AXES, Combination
+from .combinations import Combination
 
 MARKS = {"yes": "yes", "left out": "out", "no": "no"}
 LEGEND = (
@@ -20,9 +20,9 @@ def write(cells: Iterable[Combination], *, markdown: bool = False) -> Iterator[s
     """Yield the tables, axis by axis, and the sentences, line by line."""
     sentences: dict[str, int] = {}
     for axis, of_axis in groupby(cells, lambda cell: cell.axis):
-        cases = AXES[axis]
-        rows = [[axis, *cases]]
-        for learner, own in groupby(of_axis, lambda cell: cell.learner):
+        tried = list(of_axis)
+        rows = [[axis, *dict.fromkeys(cell.case for cell in tried)]]
+        for learner, own in groupby(tried, lambda cell: cell.learner):
             rows.append([learner, *(_mark(cell, sentences) for cell in own)])
         yield from _markdown(rows) if markdown else _columns(rows)
         yield ""
