@@ -1,7 +1,7 @@
 """Compiles the kernels of a spec's trials before there is all that a trial needs.
 
-``python -m nested_agents.studies.trials.rehearsal SPEC MODULE`` runs a few steps of the first
-trial, in which nothing moves: the module need not be installed, a `Still` stands in for it. A
+``python -m nested_agents.studies.trials.rehearsal SPEC MODULE`` runs a few steps of each condition,
+in which nothing moves: the module need not be installed, a `Still` stands in for it. A
 kernel is compiled for the types of its arguments, which are the same as ever. The trials then take
 it from the cache, and compile what else they call.
 
@@ -35,13 +35,13 @@ class Still(float):
 
 
 def rehearse(spec: Spec) -> None:
-    """Train and evaluate the team of the first trial of a spec for a few steps."""
+    """Train and evaluate the team of the first trial of each condition for a few steps."""
     from .session import Session
 
-    trial = replace(trials_of(spec)[0], episodes=EPISODES, steps=STEPS, evaluation=1)
-    session = Session(trial)
-    session.train(EPISODES)
-    session.finish()
+    for trial in trials_of(spec)[: len(spec.conditions())]:
+        session = Session(replace(trial, episodes=EPISODES, steps=STEPS, evaluation=1))
+        session.train(EPISODES)
+        session.finish()
 
 
 if __name__ == "__main__":
