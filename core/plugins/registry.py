@@ -259,7 +259,7 @@ class SettingsRegistry(Registry):
         def build(settings: Settings, *given: object) -> object:
             if has_own:
                 given = (settings, *given)
-            named = {field: getattr(settings, field) for field in fields}
+            named = {field: value for field, value in settings if field in fields}
             if not isinstance(thing, type):  # a function says it itself
                 return thing(*given, **named)
             return self._instance(name, thing, given, named)

@@ -65,7 +65,7 @@ def module_text(module: str) -> str:
 def _place_of(package: str) -> str | None:
     """Return where a package or module at the top is; None if there is none."""
     known = sys.modules.get(package)
-    spec = getattr(known, "__spec__", None)
+    spec = None if known is None else known.__spec__
     try:
         spec = spec or find_spec(package)
     except (ImportError, ValueError):

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from ...core.interface.plain import MISSING, offered
 from ..errors import SpecError, refused
 from ..results.analysis import Analysis, Figures, identity_lines
 from ..results.results import Results
@@ -69,18 +70,17 @@ def load_study(name: str) -> Study:
         entry = STUDIES.find(name)
     source = entry() if isinstance(entry, type) else entry
     names = OPTIONS | {part: part for part in PARTS}
-    offered: dict[str, Any] = {
-        own: getattr(source, part) for part, own in names.items() if hasattr(source, part)
-    }
-    missing = [part for part in PARTS if not callable(offered.get(part))]
+    known = {own: offered(source, part, MISSING) for part, own in names.items()}
+    parts: dict[str, Any] = {own: part for own, part in known.items() if part is not MISSING}
+    missing = [part for part in PARTS if not callable(parts.get(part))]
     if missing:
         raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
-    return Study(**offered)
+    return Study(**parts)
 
 
 def notes_of(analysis: Any) -> tuple[str, ...]:
     """Return what an analysis says in words, line by line; one of your own may say nothing."""
-    return tuple(getattr(analysis, "notes", ()))
+    return tuple(offered(analysis, "notes", ()))
 
 
 def measure(trial: Trial) -> TrialResult:

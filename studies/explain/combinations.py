@@ -161,7 +161,7 @@ class Combination(NamedTuple):
     outcome: Trying
 
 
-def spec_of(learner: str, changes: Table) -> dict[str, Any]:
+def spec_of(learner: str, changes: Table) -> dict[str, object]:
     """Return the spec of a cell, as a table.
 
     What is said of learners of a mixed team is said of the last of them. Words in capitals stand
@@ -191,11 +191,10 @@ def spec_of(learner: str, changes: Table) -> dict[str, Any]:
         "learner": {**own, **laid},
     }
     words = {"SIZE": world.size, "FIRST": world.first, "BODIES": world.bodies}
-    filled: dict[str, Any] = _filled(table, words)
-    return filled
+    return {key: _filled(value, words) for key, value in table.items()}
 
 
-def _filled(value: Any, words: Mapping[str, Any]) -> Any:
+def _filled(value: object, words: Mapping[str, Any]) -> object:
     if isinstance(value, Mapping):
         return {words.get(key, key): _filled(part, words) for key, part in value.items()}
     if isinstance(value, list):

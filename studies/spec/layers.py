@@ -86,7 +86,7 @@ def below(table: Layer) -> tuple[type[Settings], TomlTable]:
 def grid(
     preset: str,
     spec: Sections,
-    sweep: Mapping[str, Sequence[Any]],
+    sweep: Mapping[str, Sequence[object]],
     overrides: Sequence[Override] = (),
     evaluations: Mapping[str, Layer] | None = None,
     curriculum: Sequence[StageSettings] = (),
@@ -142,7 +142,7 @@ def grid(
                 "settings"
             )
         labels.add(name)
-        columns: dict[str, Any] = {"name": override.name} if override else {}
+        columns: dict[str, object] = {"name": override.name} if override else {}
         columns |= {key: scalar(point[key]) if key in point else "" for key in keys}
         evaluated = tuple(
             (other, _reevaluation(settings, changes, f" (evaluation {other!r}){where}"))
@@ -169,8 +169,8 @@ def _differing(point: Layer, other: Layer) -> str:
 
 
 def _points(
-    overrides: Sequence[Override], sweep: Mapping[str, Sequence[Any]]
-) -> Iterator[tuple[Override | None, dict[str, Any]]]:
+    overrides: Sequence[Override], sweep: Mapping[str, Sequence[object]]
+) -> Iterator[tuple[Override | None, dict[str, object]]]:
     for override in overrides or (None,):
         crossed = {**(override.sweep if override else {}), **sweep}
         for values in itertools.product(*crossed.values()):
@@ -422,7 +422,7 @@ def expand(table: Layer, where: str) -> TomlTable:
 
 def _sweep(
     table: Layer, where: str, reach: tuple[type[Settings], TomlTable]
-) -> Iterable[tuple[str, Any]]:
+) -> Iterable[tuple[str, object]]:
     for key, values in flat(table):
         head, _, tail = key.partition(".")
         if key not in ("preset", "agents", "topology") and not (head in SECTIONS and tail):
