@@ -2,8 +2,9 @@
 
 A team is trained in its condition's hierarchy, and then acts greedily, with the same weights and on
 the same worlds, as every entry of ``[evaluations]`` has it: agents that are told nothing, that
-consider nobody, that expect something else of the unseen, whose messages are lost. So a difference
-is one of deciding alone, not of what was learned.
+consider nobody, that expect something else of the unseen, whose messages are lost. So the weights
+are the same; but a team that acts under relations which it was not trained under meets situations
+that it has not learned in, and a part of each difference is this shift of distribution.
 
 One measure was fixed beforehand: evaluation success. For each condition of training, every
 evaluation is compared with that under the hierarchy of training, as in the study `hierarchies`.

@@ -30,6 +30,8 @@ def test_numbers_by_hand() -> None:
         "recovered": 0.5,
         "recovery time": 7.0,
     }
+    e = course.summary().estimates["recovery time"]
+    assert (float(e.low), float(e.high)) == (0.0, 11.0), "of 11 episodes from the fault on"
 
 
 class Pushing:

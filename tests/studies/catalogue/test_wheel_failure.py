@@ -45,6 +45,7 @@ def test_levels_recovery_and_area_by_hand() -> None:
     assert spent.tolist() == [20.0, 80.0]
     assert course.short.sum(axis=1).tolist() == [2.0, 8.0]
     assert (course.before.mean(), course.end.mean()) == (1.0, 0.5)
+    assert course.possible_loss == (0.0, 8.0)
 
 
 def test_cases_are_told_apart_by_what_adapts() -> None:

@@ -8,8 +8,10 @@ from nested_agents.studies.results.analysis import (
     differences,
     ratio,
     select_shared,
+    verdicts,
 )
 from nested_agents.studies.results.results import Results
+from nested_agents.studies.results.statistics import Estimate
 
 
 def with_first(results: Results) -> tuple[Difference, ...]:
@@ -81,3 +83,17 @@ def test_runs_that_all_ended_alike_still_leave_doubt() -> None:
     once = none.copy()
     once[0, 0] = 1.0
     assert ratio(all_, once).high > 100.0
+
+
+@pytest.mark.parametrize(
+    ("low", "p", "is_explained"), [(0.01, 0.2, True), (-0.1, 0.2, False), (0.01, 0.01, False)]
+)
+def test_an_interval_that_seems_to_contradict_p_is_explained_once(
+    low: float, p: float, is_explained: bool
+) -> None:
+    estimate = Estimate(*map(np.array, (0.2, low, 0.4)))
+    sample = np.linspace(0.0, 0.4, 8)
+    found = Difference("a", "evaluation success", 8, estimate, p, p, sample)
+    text = " ".join(" ".join(verdicts({"all": [found, found]})).split())
+    assert text.count("where they seem to disagree about 0, p decides.") == is_explained
+    assert "probability .80 in evaluation success." in text
