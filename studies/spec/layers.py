@@ -210,8 +210,8 @@ def resolve(
     given = PRESETS[name].table
     parts = _settle([_part("scenario", given)], [_part("scenario", t) for t in own], where)
     scenario = parts.settings.scenario
-    is_elsewhere = scenario.kind != given.get("scenario", {}).get("kind", DEFAULT)
-    defaults = [PRESETS[name].elsewhere] if is_elsewhere else []
+    is_of_another_kind = scenario.kind != given.get("scenario", {}).get("kind", DEFAULT)
+    defaults = [PRESETS[name].other_scenarios] if is_of_another_kind else []
     return _settle([given, *defaults, _expand(scenario.scenario_defaults(name))], own, where)
 
 
