@@ -133,7 +133,12 @@ class JointAgents(Scenario):
         shared = space.variables[self._n_each :]
         own = [replace(v, name=f"{agent}.{v.name}") for agent in of_block for v in repeated]
         name = f"joint {space.name}" if self.whole else f"bodies' {space.name}"
-        self.state_space = StateSpace(name, (*own, *shared), 0 if self.whole else len(own))
+        sources = [v.name for _ in of_block for v in repeated] + [v.name for v in shared]
+        variables = (*own, *shared)
+        taken = [v.name for v, n in zip(variables, sources, strict=True) if n in space.actions]
+        self.state_space = StateSpace(
+            name, variables, 0 if self.whole else len(own), actions=tuple(taken)
+        )
         # Row c holds the actions of a block's agents of index c.
         shape = (len(single),) * len(self.blocks[0])
         self._local = np.indices(shape).reshape(len(shape), -1).T.copy()

@@ -14,7 +14,7 @@ import platform
 import re
 import tempfile
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from pkgutil import resolve_name
@@ -32,7 +32,7 @@ from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
 from ..presentation.figures import apply_style
 from ..presentation.progress import count
-from ..presentation.tables import tabulate
+from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import identity_lines
 from ..results.contrasts import contrasts
 from ..results.results import Results, read
@@ -232,7 +232,7 @@ def page(directory: Path) -> str:
         notes = contrasts(results).notes  # what `compare` says of it, this included
     there = {label: own for label, own in settings.items() if label in results.conditions}
     notes = (*notes, *control_lines(there))
-    return _template().render(
+    return _template("page").render(
         study=outline.study,
         extent=extent(outline),
         compared=", ".join(next(iter(outline.columns.values()))),
@@ -255,7 +255,55 @@ def page(directory: Path) -> str:
     )
 
 
-def _template() -> jinja2.Template:
+def comparison_page(
+    title: str,
+    sources: str,
+    notes: Sequence[str],
+    table: SummaryTable,
+    figures: Mapping[str, Figure],
+) -> str:
+    """Return a comparison as one self-contained page of HTML.
+
+    Parameters
+    ----------
+    title
+        What is compared.
+    sources
+        Where the results are from.
+    notes
+        What is said of them, in lines.
+    table, figures
+        What is shown.
+    """
+    return _template("comparison").render(
+        title=title,
+        sources=sources,
+        notes="\n".join(notes),
+        table=table,
+        pictures=pictures(figures),
+        versions=versions(),
+        css=_read_own("page.css"),
+        js=_read_own("page.js"),
+    )
+
+
+def check_path(file: Path) -> None:
+    """Refuse to write a page to where no HTML file can be.
+
+    Raises
+    ------
+    SpecError
+        If it is a directory, has another suffix, or is in no directory.
+    """
+    if file.is_dir() or not file.name:
+        raise SpecError(f"--out {file}: is a directory")
+    if file.suffix not in (".html", ".htm"):
+        raise SpecError(f"--out {file}: suffix must be .html or .htm")
+    if not file.parent.is_dir():
+        raise SpecError(f"--out {file}: there is no directory {file.parent}")
+
+
+def _template(name: str) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER),
         autoescape=True,
@@ -264,7 +312,7 @@ def _template() -> jinja2.Template:
         lstrip_blocks=True,
     )
     environment.filters["count"] = count
-    return environment.get_template("page.html.jinja")
+    return environment.get_template(f"{name}.html.jinja")
 
 
 def brief(notes: str) -> str:

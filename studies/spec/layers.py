@@ -28,6 +28,7 @@ from ...core.learners.fitted_q import FittedQSettings
 from ...core.plugins.problems import explain, misplaced, problems_of
 from ...core.plugins.settings import ScenarioSettings, Settings, tuples
 from ...core.plugins.words import closest, show
+from ...scenarios import DEFAULT
 from ...topologies.config import parse
 from ..errors import SpecError, refused
 from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings
@@ -207,9 +208,11 @@ def resolve(
     elif own_preset is not None:  # what stands beside the preset is meant for it
         own[0] = for_control(name, own[0])
     given = PRESETS[name].table
-    scenario = _settle([_part("scenario", given)], [_part("scenario", t) for t in own], where)
-    defaults = _expand(scenario.settings.scenario.scenario_defaults(name))
-    return _settle([given, defaults], own, where)
+    parts = _settle([_part("scenario", given)], [_part("scenario", t) for t in own], where)
+    scenario = parts.settings.scenario
+    is_of_another_kind = scenario.kind != given.get("scenario", {}).get("kind", DEFAULT)
+    defaults = [PRESETS[name].other_scenarios] if is_of_another_kind else []
+    return _settle([given, *defaults, _expand(scenario.scenario_defaults(name))], own, where)
 
 
 def _part(name: str, table: Layer) -> TomlTable:

@@ -17,9 +17,14 @@ class Preset(NamedTuple):
     """What it is, in one line."""
     table: Mapping[str, Any]
     """The `scenario`, `topology` and `learner` tables as they would stand in a spec."""
+    other_scenarios: Mapping[str, Any]
+    """Laid over it where the scenario is of another kind than its own."""
 
 
 _TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
-PRESETS = {name: Preset(table.pop("summary"), table) for name, table in _TABLES.items()}
+PRESETS = {
+    name: Preset(table.pop("summary"), table, table.pop("other_scenarios", {}))
+    for name, table in _TABLES.items()
+}
 """Every preset by name."""

@@ -211,6 +211,15 @@ def test_one_agent_with_all_joint_actions_and_variables(pair) -> None:
     assert single.state_space.n_variables == 6
 
 
+@pytest.mark.parametrize("each", ["body", "team"])
+def test_actions_in_states_are_those_of_all_its_actuators(each, line_world) -> None:
+    world = line_world(1, 2)
+    assert not join_agents(world, each).state_space.actions
+    world.state_space = replace(world.state_space, actions=("speed",))
+    names = join_agents(world, each).state_space.actions
+    assert [name.endswith("wheel0.speed") for name in names] == [True, False]
+
+
 def test_an_agent_for_every_actuator_is_the_scenario_itself(line_world) -> None:
     world = line_world(2, 2)
     assert join_agents(world, "actuator") is world

@@ -73,6 +73,12 @@ def test_parts_that_cannot_be_are_refused(parts, said: str, world) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_every_part_draws_by_itself(world) -> None:
+    team = Team(mixed(("cart0", TD), ("*", TD)), world, chain_of(world.agents), policy_seed(0))
+    first, second = (part.rng.integers(2**60, size=4).tolist() for part in team.parts)
+    assert first != second
+
+
 def test_frozen_leaders_and_followers_that_learn(world, tmp_path) -> None:
     settings = mixed(("cart0", {"kind": "frozen"}), ("cart1", TD))
     team = Team(settings, world, chain_of(world.agents), policy_seed(0))

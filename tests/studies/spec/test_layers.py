@@ -58,6 +58,23 @@ def test_a_learner_is_chosen_over_any_preset(preset: str, kind: str) -> None:
     assert spec.conditions()[0].settings.learner.kind == kind
 
 
+@pytest.mark.parametrize("preset", sorted({*PRESETS} - {"hand-written"}))
+@pytest.mark.parametrize("kind", ["kinematic-chain", "line-up"])
+def test_every_preset_is_of_other_scenarios_too(preset: str, kind: str) -> None:
+    spec = build({"preset": preset, "scenario": {"kind": kind}})
+    assert spec.conditions()[0].settings.scenario.kind == kind
+
+
+def test_the_product_of_the_paper_is_that_of_all_variables_there_are() -> None:
+    (condition,) = Spec.of({"preset": "paper"}).conditions()
+    assert condition.settings.learner.rule_base.order == 7
+    (condition,) = Spec.of({"preset": "paper", "scenario": {"kind": "line-up"}}).conditions()
+    assert condition.settings.learner.rule_base.order == "full"
+    table = {"rule_base": {"order": 1}}
+    spec = Spec.of({"preset": "paper", "scenario": {"kind": "line-up"}, "learner": table})
+    assert spec.conditions()[0].settings.learner.rule_base.order == 1
+
+
 def test_what_the_user_did_not_write_gives_way_with_one_remark() -> None:
     spec = build({"learner": {"kind": "fitted-q"}})
     (condition,) = spec.conditions()
