@@ -31,7 +31,7 @@ from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import foreign, published
-from ..results.contrasts import contrasts
+from ..results.contrasts import contrasts, power_with_first
 from ..results.results import Results, choose_trials, combine, read
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, other_spec, sources_of
@@ -150,7 +150,7 @@ class StudyResults:
     def power(self) -> tuple[str, ...]:
         """What comparisons with the first condition can find, as `compare` says it."""
         is_measured = SUCCESS.name in (measure.name for measure in self.results.measures)
-        return contrasts(self.results).power if is_measured else ()
+        return power_with_first(self.results) if is_measured else ()
 
     @cached_property
     def analysis(self) -> Any:

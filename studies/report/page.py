@@ -35,7 +35,7 @@ from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import identity_lines
 from ..results.contrasts import contrasts
-from ..results.results import read
+from ..results.results import Results, read
 from ..spec.controls import control_lines
 from ..spec.outline import StudyOutline, sources_of
 from ..spec.tables import dumps
@@ -104,12 +104,14 @@ class Replays(NamedTuple):
         return sentences
 
 
-def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTES) -> Replays:
+def replays(
+    store: Store, results: Results, trials: Iterable[Planned], most_bytes: int = MOST_BYTES
+) -> Replays:
     """Pack the recordings of finished trials, in their order, until there is no more room.
 
     Those that no canvas can play are drawn by their scenarios, one for each condition.
     """
-    reached = _reached(store)
+    reached = _reached(results)
     done = {(condition, seed) for condition, seed, _ in reached}
     scenes = list[Json]()
     episodes = list[Json]()
@@ -190,9 +192,9 @@ def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
     return None, {}
 
 
-def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:
+def _reached(results: Results) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode reached the goal, by condition, seed and number."""
-    training = read(store).episodes.query("phase == 'training'")
+    training = results.episodes.query("phase == 'training'")
     success = training.set_index(["condition", "seed", "episode"])["success"]
     reached: Mapping[tuple[str, int, int], bool] = success.astype(bool).to_dict()
     return reached
@@ -219,7 +221,7 @@ def page(directory: Path) -> str:
             for condition, seed, error in store.failed()
         ]
         trials = store.planned()
-        packed = replays(store, trials)
+        packed = replays(store, results, trials)
         sources = sources_of(store)
         settings = store.settings()
     with sources.active():

@@ -7,15 +7,17 @@ authors' library rliable; where all runs of a task ended alike, they have no wid
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.numerics import stats
 from ..errors import SpecError
 from .analysis import Summary
 from .contrasts import Contrasts
-from .statistics import Array, Estimate, stack_estimates
+from .statistics import Array, Estimate, blocks, draw_runs, stack_estimates
 
 RESAMPLES = 2000
 THRESHOLDS = 51
@@ -69,11 +71,21 @@ def stratified_bootstrap(tasks: Tasks, statistic: Callable[[Tasks], Array]) -> E
     statistic
         Of tasks; resamples are along the first axis of each.
     """
-    rng = np.random.default_rng(0)
-    drawn = [own[rng.integers(len(own), size=(RESAMPLES, len(own)))] for own in tasks]
+    sizes = tuple(map(len, tasks))
+    parts = [
+        statistic([own[runs[rows]] for own, runs in zip(tasks, _drawn(sizes), strict=True)])
+        for rows in blocks(RESAMPLES, sum(sizes))
+    ]
     tail = 0.5 - 0.95 / 2.0
-    low, high = np.quantile(statistic(drawn), [tail, 1.0 - tail], axis=0)
+    low, high = np.quantile(np.concatenate(parts), [tail, 1.0 - tail], axis=0)
     return Estimate(statistic(tasks), low, high)
+
+
+@lru_cache(maxsize=2)
+def _drawn(sizes: tuple[int, ...]) -> list[NDArray[Any]]:
+    """Return the runs that resamples of tasks of so many runs are made of; see `draw_runs`."""
+    rng = np.random.default_rng(0)
+    return [draw_runs(rng, size, RESAMPLES) for size in sizes]
 
 
 class Aggregates(NamedTuple):
