@@ -31,6 +31,7 @@ from ...scenarios import SCENARIOS
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
 from ..presentation.figures import apply_style
+from ..presentation.headlines import headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import identity_lines
@@ -231,7 +232,7 @@ def page(directory: Path) -> str:
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included
     there = {label: own for label, own in settings.items() if label in results.conditions}
-    notes = (*notes, *control_lines(there))
+    notes = (*headlines(results, there), *notes, *control_lines(there))
     return _template("page").render(
         study=outline.study,
         extent=extent(outline),
