@@ -302,14 +302,18 @@ class Workers(ABC, Generic[F]):
         left = len(trials)
         running: dict[F, Trial] = {}
         finished: SimpleQueue[F] = SimpleQueue()
+
+        def hand_out() -> None:
+            for trial in islice(waiting, max(self.processes - len(running), 0)):
+                with beginning_processes():
+                    future = self.submit(run_trial, trial)
+                    running[future] = trial
+                started(trial.identity)
+                future.add_done_callback(finished.put)
+
         try:
             while left:
-                for trial in islice(waiting, max(self.processes - len(running), 0)):
-                    with beginning_processes():
-                        future = self.submit(run_trial, trial)
-                        running[future] = trial
-                    started(trial.identity)
-                    future.add_done_callback(finished.put)
+                hand_out()
                 try:
                     future = finished.get(timeout=POLL)
                 except Empty:
@@ -319,7 +323,9 @@ class Workers(ABC, Generic[F]):
                     future.add_done_callback(finished.put)
                     continue
                 del running[future]
+                del future  # else a Dask worker keeps its result, which is run again if it dies
                 left -= 1
+                hand_out()  # the worker goes on while this one is kept
                 yield outcome
         finally:
             if running:
