@@ -29,6 +29,7 @@ from ...core.plugins.sources import Sources
 from ...core.plugins.words import closest
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
+from ..presentation.headlines import headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import foreign, published
 from ..results.contrasts import contrasts, power_with_first
@@ -119,7 +120,8 @@ class StudyResults:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the study says of its results, verdicts and their power, line by line."""
-        return (*notes_of(self.analysis), *self._of_controls)
+        sentences = headlines(self.results, self._settings)
+        return (*sentences, *notes_of(self.analysis), *self._of_controls)
 
     @property
     def _of_controls(self) -> tuple[str, ...]:

@@ -29,9 +29,9 @@ PHASE = "evaluation"
 BLANK = -1
 """Code of a run of which no seed is known."""
 CONDITION, RUN, ITEM = ("its condition", "its run", "its item")
-"""ScoreColumns of a table of scores, beside those of scores, once it has been read."""
+"""Columns of a table of scores, beside those of scores, once it has been read."""
 RESERVED = ("seed", "phase", "episode", "steps", "return", "state")
-"""ScoreColumns of results, which have a meaning there: a table's own of these names are called anew."""
+"""Columns of results, which have a meaning there: a table's own of these names are called anew."""
 
 
 class ScoreColumns(NamedTuple):

@@ -91,12 +91,25 @@ def analyse(results: Results) -> Analysis:
             if title == EVALUATED:
                 estimates |= evaluated(results, condition)
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
+    _leave_out_same(table)
     followed = []
     for m in measures:
         own = [c for c in conditions if results.has(c, "training", m.name)]
         if own and (m.name == SUCCESS.name or not m.is_rate):
             followed.append((m, {c: results.values(c, m.name) for c in own}))
     return Analysis(tuple(table), cases=followed)
+
+
+def _leave_out_same(table: Sequence[Summary]) -> None:
+    """Leave out rates of evaluation that are its success, wherever they are known."""
+    for title in {title for line in table for title in line.estimates}:
+        if title.endswith(", evaluation") and all(
+            line.estimates[title] == line.estimates.get(EVALUATED)
+            for line in table
+            if title in line.estimates
+        ):
+            for line in table:
+                line.estimates.pop(title, None)
 
 
 def _of_evaluations(results: Results) -> Analysis:
