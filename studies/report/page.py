@@ -9,7 +9,6 @@ condition.
 """
 
 import base64
-import io
 import platform
 import re
 import tempfile
@@ -30,7 +29,6 @@ from ...core.plugins.words import show
 from ...scenarios import SCENARIOS
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
-from ..presentation.figures import apply_style
 from ..presentation.headlines import headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
@@ -46,6 +44,7 @@ from ..store.store import Store
 from ..trials.keeping import spec_of
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import installed
+from .pictures import hierarchy_pictures, pictures
 
 MOST_BYTES = 1_500_000
 """Of all packed episodes together."""
@@ -225,6 +224,7 @@ def page(directory: Path) -> str:
         packed = replays(store, results, trials)
         sources = sources_of(store)
         settings = store.settings()
+        drawn = hierarchy_pictures(store)
     with sources.active():
         analysis = analyse_as(outline.study, results)
         figures = draw_figures(load_study(outline.study), analysis)
@@ -245,6 +245,7 @@ def page(directory: Path) -> str:
         pictures=pictures(figures),
         replays=packed,
         topologies=topologies(outline),
+        hierarchies=drawn,
         failed=failed,
         seeds=runs(outline.seeds),
         spec=dumps(outline.table),
@@ -327,53 +328,6 @@ def brief(notes: str) -> str:
 def _read_own(name: str) -> Markup:
     """Return a file of this package, which is HTML already."""
     return Markup((FOLDER / name).read_text(encoding="utf-8"))
-
-
-class Picture(NamedTuple):
-    """A figure."""
-
-    name: str
-    """Its file's, without suffix."""
-    svg: Markup
-    """An element that can stand in a page beside others."""
-    pdf: str
-    """The same figure, in base64."""
-
-    @property
-    def title(self) -> str:
-        """The name in words."""
-        return self.name.replace("-", " ").replace("_", " ")
-
-
-def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
-    """Return a study's figures, by name, as they stand in a page and are taken away from it."""
-    drawings = []
-    with apply_style():
-        for number, (name, figure) in enumerate(figures.items(), 1):
-            svg = io.StringIO()
-            figure.savefig(svg, format="svg", metadata={"Date": None})
-            text = embed(svg.getvalue(), f"figure{number}-")
-            pdf = io.BytesIO()
-            figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
-            encoded = base64.b64encode(pdf.getvalue()).decode("ascii")
-            drawings.append(Picture(name, Markup(text), encoded))
-    return drawings
-
-
-def embed(svg: str, prefix: str) -> str:
-    """Return an SVG file's root element, its ids and its style kept from those of other ones.
-
-    Examples
-    --------
-    >>> embed('<?xml version="1.0"?><svg><style>*{a: b}</style><g id="x"/></svg>', "f-")
-    '<svg id="f-"><style>#f- *{a: b}</style><g id="f-x"/></svg>'
-    """
-    svg = svg[svg.index("<svg") :].strip()
-    svg = re.sub(r"\s*<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
-    svg = re.sub(r'\bid="', f'id="{prefix}', svg)
-    svg = re.sub(r'(url\(|href=")#', rf"\1#{prefix}", svg)
-    svg = re.sub(r"(<style[^>]*>)\s*\*", rf"\1#{prefix} *", svg)
-    return svg.replace("<svg", f'<svg id="{prefix}"', 1)
 
 
 PACKAGES = (
