@@ -244,5 +244,6 @@ def enumerated(hierarchy: Hierarchy, accuracy: float) -> Expected:
         more = (np.bincount(case, if_b) - np.bincount(case, if_a))[case]
         is_tied = np.abs(more) <= EQUAL * np.bincount(case, if_a + if_b)[case]
         named[:, agent] = np.where(is_tied, signals[:, agent], more > 0.0)
-    counted = np.bincount(named.sum(axis=1), if_b, minlength=n + 1)
+    counted: FloatArray = np.zeros(n + 1)
+    np.add.at(counted, named.sum(axis=1), if_b)
     return Expected(if_b @ named, _of_vote(counted))

@@ -122,7 +122,7 @@ def _notes(cases: list[SignalsCase]) -> list[str]:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: shares by number of agents; dashed, what theory says."""
+    """Return the figure: shares by number of agents; in grey, what theory says."""
     from ...presentation import figures as f  # matplotlib takes its time
 
     cases = analysis.cases
@@ -133,10 +133,10 @@ def draw(analysis: Analysis) -> Figures:
             own = [case for case in cases if case.system == system]
             agents = [case.agents for case in own]
             f.draw_line(axes, agents, [case.values[title] for case in own], index, len(systems))
-            said = [case for case in own if f"{title}, {THEORY}" in case.values]
+            known = [case for case in own if f"{title}, {THEORY}" in case.values]
             axes.plot(
-                [case.agents for case in said],
-                [float(case.values[f"{title}, {THEORY}"].value) for case in said],
+                [case.agents for case in known],
+                [float(case.values[f"{title}, {THEORY}"].value) for case in known],
                 color="#888888", lw=0.8, zorder=0,
             )  # fmt: skip
         f.scale_axis(axes, sorted({case.agents for case in cases}))
