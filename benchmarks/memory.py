@@ -1,8 +1,8 @@
 """What processes and large studies take of memory and time: ``python -m benchmarks.memory``.
 
 First a worker: its resident memory after each thing that it imports, up to a trial of two steps.
-Then a study of many made-up trials of two conditions: processor time and greatest memory of the
-commands that read it. Its rows are written as those of any study, but not waited for.
+Then a study of many made-up trials: processor time and greatest memory of the commands that read
+it. Its rows are written as those of any study, but not waited for.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 from rich.console import Console
@@ -58,9 +60,17 @@ for stage in sys.argv[1:]:
 """
 
 RUN = ["run", "DIR/study.toml", "--out", "DIR"]
-COMMANDS = (["status", "DIR"], ["table", "DIR"], ["export", "DIR", "--overwrite"], RUN)
+COMMANDS = (
+    ["status", "DIR"], ["table", "DIR"], ["compare", "DIR"], ["compare", "DIR", "--statistics"],
+    ["results", "DIR", "--format", "csv"], ["export", "DIR", "--overwrite"],
+    ["export", "DIR", "--format", "json", "--overwrite"], ["report", "DIR"], RUN,
+)  # fmt: skip
+LOAD = "import sys, nested_agents as na; na.load(sys.argv[1])"
 WORKER = {"after": "after", "resident": "resident\n\\[MB]", "private": "private\n\\[MB]"}
-STUDY = {"command": "command", "s": "processor\n\\[s]", "peak": "greatest\n\\[MB]"}
+STUDY = {
+    "command": "command", "wall": "time\n\\[s]", "s": "processor\n\\[s]",
+    "peak": "greatest\n\\[MB]",
+}  # fmt: skip
 
 
 def worker() -> list[Row]:
@@ -77,16 +87,18 @@ def worker() -> list[Row]:
     return rows
 
 
-def fill(directory: Path, trials: int, episodes: int) -> None:
+def fill(directory: Path, conditions: int, seeds: int, episodes: int) -> None:
     """Make a study whose results are random numbers."""
+    steps = np.linspace(0.01, 0.9, conditions).round(4).tolist()
     spec = Spec.of(
         {
-            "seeds": trials // 2, "episodes": episodes, "steps": 8, "evaluation": 0,
-            "scenario": {"kind": "line-up"}, "sweep": {"preset": ["default", "frozen"]},
+            "seeds": seeds, "episodes": episodes, "steps": 8, "evaluation": 5,
+            "scenario": {"kind": "line-up"}, "sweep": {"learner.discount": steps},
         }
     )  # fmt: skip
     trials = trials_of(spec)
-    with open_to_run(directory, spec, trials, check_conditions(spec)) as store:
+    opened = open_to_run(directory, spec, trials, check_conditions(spec))
+    with mock.patch("os.fsync"), opened as store:
         store._db.execute("PRAGMA synchronous = OFF")
         for trial in trials:
             save(store, trial, made_up(trial, store), total=1.0)
@@ -94,26 +106,36 @@ def fill(directory: Path, trials: int, episodes: int) -> None:
 
 def made_up(trial: Trial, store: Store) -> TrialResult:
     """Return random numbers as the result of a trial."""
-    rng, measures = np.random.default_rng(trial.seed), store.measures()
+    rng = np.random.default_rng(int(trial.identity, 16))
+    measures = store.measures()
     rows = tuple(
         EpisodeRow(
-            "training", episode, int(rng.integers(1, trial.steps + 1)),
+            phase, episode, int(rng.integers(1, trial.steps + 1)),
             {m.name: bool(rng.random() < 0.5) if m.is_rate else rng.random() for m in measures},
             rng.random(),
         )
-        for episode in range(trial.episodes)
+        for phase, many in (("training", trial.episodes), ("evaluation", trial.evaluation))
+        for episode in range(many)
     )  # fmt: skip
     seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), 0.1)
     return TrialResult(rows, measures, {}, seconds)
 
 
 def commands(directory: Path) -> list[Row]:
-    """Return what each command takes."""
+    """Return what each command takes, and `nested_agents.load`."""
+    lines = {
+        " ".join(word for word in words if "DIR" not in word): _line(words, directory)
+        for words in COMMANDS
+    }
+    lines["na.load"] = ["-c", LOAD, str(directory)]
     rows: list[Row] = []
-    for words in COMMANDS:
-        used = used_by(_line(words, directory), stderr=subprocess.DEVNULL)
+    for name, line in lines.items():
+        begin = time.perf_counter()
+        used = used_by(line, stderr=subprocess.DEVNULL)
+        wall = time.perf_counter() - begin
         spent = used.ru_utime + used.ru_stime
-        rows.append({"command": words[0], "s": spent, "peak": round(used.ru_maxrss / 1024)})
+        peak = round(used.ru_maxrss / 1024)
+        rows.append({"command": name, "wall": wall, "s": spent, "peak": peak})
     return rows
 
 
@@ -123,34 +145,43 @@ def _line(words: list[str], directory: Path) -> list[str]:
 
 def going_on(directory: Path) -> Row:
     """Return what `run` takes until it goes on with the trials that are left: here none."""
-    line = [sys.executable, *_line(RUN, directory)]
+    words = [sys.executable, *_line(RUN, directory)]
+    begin = time.perf_counter()
     with subprocess.Popen(
-        line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stderr is not None
-        assert "were run before" in process.stderr.readline()
+        while "were run before" not in (line := process.stderr.readline()):
+            assert line
+        wall = time.perf_counter() - begin
         status = Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8")
         times = Path(f"/proc/{process.pid}/stat").read_text(encoding="utf-8").split()
         process.stderr.read()
     ticks = int(times[13]) + int(times[14])
     peak = next(int(x.split()[1]) for x in status.splitlines() if x.startswith("VmHWM"))
     seconds = ticks / os.sysconf("SC_CLK_TCK")
-    return {"command": "run, until it goes on", "s": seconds, "peak": round(peak / 1024)}
+    peak = round(peak / 1024)
+    return {"command": "run, until it goes on", "wall": wall, "s": seconds, "peak": peak}
 
 
 def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.memory", description=__doc__)
-    parser.add_argument("--trials", type=int, default=10_000, metavar="N")
+    parser.add_argument("--conditions", type=int, default=10, metavar="N")
+    parser.add_argument("--seeds", type=int, default=1000, metavar="N", help="of each condition")
     parser.add_argument("--episodes", type=int, default=10, metavar="N", help="of a trial")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="where the study is kept")
     options = parser.parse_args()
     console = Console(width=80)
-    show(console, "A worker", WORKER, worker())
+    if options.keep is None:
+        show(console, "A worker", WORKER, worker())
     with tempfile.TemporaryDirectory() as folder:
-        directory = Path(folder) / "study"
-        fill(directory, options.trials, options.episodes)
+        directory = options.keep or Path(folder) / "study"
+        if not directory.exists():
+            fill(directory, options.conditions, options.seeds, options.episodes)
         rows = [*commands(directory), going_on(directory)]
-    show(console, f"{options.trials} trials of {options.episodes} episodes", STUDY, rows)
+    size = f"{options.conditions} conditions x {options.seeds} seeds x {options.episodes} episodes"
+    show(console, size, STUDY, rows)
 
 
 if __name__ == "__main__":

@@ -71,6 +71,7 @@ _PLACES = {
     "bootstrap": ("studies.results.statistics", "bootstrap"),
     "build_hierarchy": ("topologies", "build"),
     "check_scenario": ("scenarios.checking.checker", "check_scenario"),
+    "compare_table": ("studies.api.study", "compare_table"),
     "cost_table": ("studies.cost.table", "cost_table"),
     "control_loop": ("core.agents.loop", "control_loop"),
     "detectable": ("studies.results.power", "detectable"),

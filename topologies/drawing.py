@@ -60,6 +60,21 @@ def draw(
     """
     if Path(path).suffix not in (".svg", ".png", ".pdf"):
         raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
+    figure = picture(hierarchy, bodies=bodies, title=title, failing=failing)
+    # Without date and random identifiers, equal hierarchies give equal files.
+    metadata = {"Date": None} if Path(path).suffix == ".svg" else None
+    with matplotlib.rc_context({"svg.hashsalt": "nested-agents", "svg.fonttype": "none"}):
+        figure.savefig(path, dpi=150, metadata=metadata)
+
+
+def picture(
+    hierarchy: Hierarchy,
+    *,
+    bodies: Sequence[Sequence[int]] | None = None,
+    title: str = "",
+    failing: Sequence[int] = (),
+) -> Figure:
+    """Return a picture of a hierarchy as matplotlib has it; for the arguments see `draw`."""
     places = positions(hierarchy)
     low = places.min(axis=0)
     high = places.max(axis=0)
@@ -91,10 +106,7 @@ def draw(
     axes.text(
         centre, bottom, "; ".join(notes), fontsize=7.5, color="#555555", ha="center", va="center"
     )
-    # Without date and random identifiers, equal hierarchies give equal files.
-    metadata = {"Date": None} if Path(path).suffix == ".svg" else None
-    with matplotlib.rc_context({"svg.hashsalt": "nested-agents", "svg.fonttype": "none"}):
-        figure.savefig(path, dpi=150, metadata=metadata)
+    return figure
 
 
 def positions(hierarchy: Hierarchy) -> FloatArray:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.aggregates import Aggregates, aggregate
 from ..results.analysis import Difference
 from ..results.contrasts import Contrasts
+from ..store import durable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,6 +64,34 @@ class Comparison:
         from ..presentation.figures import draw_profiles  # matplotlib takes its time
 
         return draw_profiles(self.statistics)
+
+    def report(self, path: str | PathLike[str], sources: str = "") -> Path:
+        """Write verdicts, table, statistics and figure as one self-contained HTML file.
+
+        Parameters
+        ----------
+        path
+            Of the file.
+        sources
+            Where the results are from, as the page says it.
+
+        Raises
+        ------
+        SpecError
+            If the path is no HTML file.
+        """
+        from ..report.page import check_path, comparison_page
+
+        file = Path(path)
+        check_path(file)
+        notes = [*self.verdicts]
+        figures: dict[str, Figure] = {}
+        if any(len(runs) > 1 for group in self.contrasts.groups for runs in group.values.values()):
+            notes += ["", str(self.aggregated), "", *self.statistics.notes]
+            figures["runs"] = self.figure()
+        title = self.contrasts.title
+        durable.write(file, comparison_page(title, sources, notes, self.table, figures).encode())
+        return file
 
     def __str__(self) -> str:
         return "\n".join([str(self.table), "", *self.verdicts])

@@ -21,7 +21,7 @@ from functools import cached_property
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
@@ -29,9 +29,10 @@ from ...core.plugins.sources import Sources
 from ...core.plugins.words import closest
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
+from ..presentation.headlines import headlines
 from ..presentation.tables import SummaryTable, tabulate
-from ..results import published
-from ..results.contrasts import contrasts
+from ..results import foreign, published
+from ..results.contrasts import contrasts, power_with_first
 from ..results.results import Results, choose_trials, combine, read
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, other_spec, sources_of
@@ -119,7 +120,8 @@ class StudyResults:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the study says of its results, verdicts and their power, line by line."""
-        return (*notes_of(self.analysis), *self._of_controls)
+        sentences = headlines(self.results, self._settings)
+        return (*sentences, *notes_of(self.analysis), *self._of_controls)
 
     @property
     def _of_controls(self) -> tuple[str, ...]:
@@ -150,7 +152,7 @@ class StudyResults:
     def power(self) -> tuple[str, ...]:
         """What comparisons with the first condition can find, as `compare` says it."""
         is_measured = SUCCESS.name in (measure.name for measure in self.results.measures)
-        return contrasts(self.results).power if is_measured else ()
+        return power_with_first(self.results) if is_measured else ()
 
     @cached_property
     def analysis(self) -> Any:
@@ -161,7 +163,7 @@ class StudyResults:
     def compare(
         self,
         by: str | None = None,
-        measure: str = "success",
+        measure: str | None = None,
         *,
         phase: str | None = None,
         reference: str | None = None,
@@ -174,7 +176,8 @@ class StudyResults:
             A swept key, or the last part of it: conditions that agree in all others are compared.
             None, or ``condition``: all conditions with the first.
         measure
-            A measure of episodes, ``steps``, ``return`` or a number of whole trials, by name.
+            A measure of episodes, ``steps``, ``return`` or a number of whole trials, by name; by
+            default the first, which is success in studies.
         phase
             Of the episodes; by default ``evaluation``.
         reference
@@ -186,7 +189,8 @@ class StudyResults:
             If there is no such key, measure, phase or reference.
         """
         key = None if by == "condition" else by
-        compared = contrasts(self.results, measure, phase, key, reference)
+        name = self.results.measures[0].name if measure is None else measure
+        compared = contrasts(self.results, name, phase, key, reference)
         return Comparison(compared, self._of_controls)
 
     def where(self, choice: str) -> StudyResults:
@@ -292,17 +296,12 @@ class StudyResults:
         SpecError
             If the path is no HTML file, or these are not the results of one whole study.
         """
-        from ..report.page import page  # its templates and packers take their time
+        from ..report.page import check_path, page  # its templates and packers take their time
 
         if not self._is_whole:
             raise SpecError("report: is of a whole study, not of a part of it or of another one")
         file = self.directory / "report.html" if path is None else Path(path)
-        if file.is_dir() or not file.name:
-            raise SpecError(f"--out {file}: is a directory")
-        if file.suffix not in (".html", ".htm"):
-            raise SpecError(f"--out {file}: suffix must be .html or .htm")
-        if not file.parent.is_dir():
-            raise SpecError(f"--out {file}: there is no directory {file.parent}")
+        check_path(file)
         durable.write(file, page(self.directory).encode())
         return file
 
@@ -328,16 +327,24 @@ class StudyResults:
         return f"<h4>{escape(self.outline.study)}</h4>{self.table().html}"
 
 
-def load(*places: Place) -> StudyResults:
+def load(
+    *places: Place, columns: Sequence[str] = (), better: Literal["higher", "lower"] = "higher"
+) -> StudyResults:
     """Return the results of a study that is kept in a directory, or of several together.
 
     Parameters
     ----------
     *places
         Directories of studies; or single files that ``export --format json`` has written, or of the
-        form of marl-eval, as those of BenchMARL are.
+        form of marl-eval, as those of BenchMARL are; or tables of scores of others: CSV, JSON lines
+        or Parquet, see `nested_agents.studies.results.foreign`.
         Conditions of several studies whose labels are equal get the name of their directory; the
         first study says how all of them are analysed.
+    columns
+        Of tables of scores, which column is what: ``"condition=model,seed=run,score=accuracy"``; as
+        `compare_table` has them.
+    better
+        Which scores of tables are better.
 
     Raises
     ------
@@ -348,8 +355,86 @@ def load(*places: Place) -> StudyResults:
         raise SpecError("load: needs a directory at least")
     paths = [Path(place) for place in places]
     _check_distinct(paths)
-    loaded = [_load_one(path) for path in paths]
+    is_table = [path.suffix in foreign.SUFFIXES for path in paths]
+    if columns and not any(is_table):
+        raise SpecError(f"columns: are of tables, {', '.join(foreign.SUFFIXES)}")
+    loaded = [
+        _load_table(path, columns, better) if table else _load_one(path)
+        for path, table in zip(paths, is_table, strict=True)
+    ]
     return loaded[0] if len(loaded) == 1 else _merge(paths, loaded)
+
+
+def compare_table(
+    table: pd.DataFrame | Place,
+    *,
+    condition: str | Sequence[str] = "condition",
+    score: str | Sequence[str] = "score",
+    seed: str | None = None,
+    item: str | None = None,
+    better: Literal["higher", "lower"] = "higher",
+    by: str | None = None,
+    reference: str | None = None,
+) -> Comparison:
+    """Compare conditions of which a table has the scores, whoever has made it.
+
+    Parameters
+    ----------
+    table
+        A row for each score; or a file of it, CSV, JSON lines or Parquet.
+    condition
+        Column of what is compared; several are crossed.
+    score
+        Column of what is measured; of several the first is compared.
+    seed
+        Column of the runs on which conditions are compared; None: on the items.
+    item
+        Column of what each score was measured on: a question, a task.
+    better
+        Which scores are better.
+    by, reference
+        As in `StudyResults.compare`.
+
+    Raises
+    ------
+    SpecError
+        If a column is missing, a score is no finite number, or nothing can be compared.
+
+    Examples
+    --------
+    >>> scores = {"chain": [0.8, 0.7, 0.9], "star": [0.5, 0.6, 0.6]}
+    >>> table = pd.DataFrame(
+    ...     [(name, k, s) for name, own in scores.items() for k, s in enumerate(own)],
+    ...     columns=["topology", "run", "accuracy"],
+    ... )
+    >>> comparison = compare_table(table, condition="topology", score="accuracy", seed="run")
+    >>> round(float(comparison.differences[0].estimate.value), 2)
+    -0.23
+    """
+    frame = table if isinstance(table, pd.DataFrame) else foreign.read_table(Path(table))
+    names = foreign.ScoreColumns(_several(condition), _several(score), seed, item)
+    return _of_table(foreign.results_of(frame, names, better)).compare(by, reference=reference)
+
+
+def _several(names: str | Sequence[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def _load_table(
+    path: Path, columns: Sequence[str], better: Literal["higher", "lower"]
+) -> StudyResults:
+    """Return the results of a file of scores; what is said of them names it."""
+    frame = foreign.read_table(path)
+    names = foreign.ScoreColumns.parse(columns, [str(name) for name in frame.columns])
+    try:
+        results = _of_table(foreign.results_of(frame, names, better))
+    except SpecError as error:
+        raise SpecError(f"{path}: {error}") from None
+    return replace(results, remarks=tuple(f"{path}: {line}" for line in results.remarks))
+
+
+def _of_table(table: foreign.Foreign) -> StudyResults:
+    return StudyResults(table.outline, table.results, (), table.remarks)
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from ...core.plugins.trust import is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
@@ -31,7 +31,13 @@ def open_study(directory: Path) -> Iterator[Store]:
 
 
 def load_results(
-    sources: Sequence[Path], *, study: str | None = None, where: str | None = None, trust: bool
+    sources: Sequence[Path],
+    *,
+    study: str | None = None,
+    where: str | None = None,
+    trust: bool,
+    columns: Sequence[str] = (),
+    better: Literal["higher", "lower"] = "higher",
 ) -> StudyResults:
     """Return the results at some places, as a study analyses them, or a choice of the trials."""
     from ..api.study import load
@@ -39,7 +45,7 @@ def load_results(
     if trust:
         for source in sources:
             trust_files(source)
-    results = load(*sources)
+    results = load(*sources, columns=columns, better=better)
     for remark in results.remarks:
         say(remark)
     results = results if where is None else results.where(where)

@@ -9,12 +9,11 @@ condition.
 """
 
 import base64
-import io
 import platform
 import re
 import tempfile
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from pkgutil import resolve_name
@@ -30,12 +29,12 @@ from ...core.plugins.words import show
 from ...scenarios import SCENARIOS
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
-from ..presentation.figures import apply_style
+from ..presentation.headlines import headlines
 from ..presentation.progress import count
-from ..presentation.tables import tabulate
+from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import identity_lines
 from ..results.contrasts import contrasts
-from ..results.results import read
+from ..results.results import Results, read
 from ..spec.controls import control_lines
 from ..spec.outline import StudyOutline, sources_of
 from ..spec.tables import dumps
@@ -45,6 +44,7 @@ from ..store.store import Store
 from ..trials.keeping import spec_of
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import installed
+from .pictures import hierarchy_pictures, pictures
 
 MOST_BYTES = 1_500_000
 """Of all packed episodes together."""
@@ -104,12 +104,14 @@ class Replays(NamedTuple):
         return sentences
 
 
-def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTES) -> Replays:
+def replays(
+    store: Store, results: Results, trials: Iterable[Planned], most_bytes: int = MOST_BYTES
+) -> Replays:
     """Pack the recordings of finished trials, in their order, until there is no more room.
 
     Those that no canvas can play are drawn by their scenarios, one for each condition.
     """
-    reached = _reached(store)
+    reached = _reached(results)
     done = {(condition, seed) for condition, seed, _ in reached}
     scenes = list[Json]()
     episodes = list[Json]()
@@ -190,9 +192,9 @@ def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
     return None, {}
 
 
-def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:
+def _reached(results: Results) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode reached the goal, by condition, seed and number."""
-    training = read(store).episodes.query("phase == 'training'")
+    training = results.episodes.query("phase == 'training'")
     success = training.set_index(["condition", "seed", "episode"])["success"]
     reached: Mapping[tuple[str, int, int], bool] = success.astype(bool).to_dict()
     return reached
@@ -219,9 +221,10 @@ def page(directory: Path) -> str:
             for condition, seed, error in store.failed()
         ]
         trials = store.planned()
-        packed = replays(store, trials)
+        packed = replays(store, results, trials)
         sources = sources_of(store)
         settings = store.settings()
+        drawn = hierarchy_pictures(store)
     with sources.active():
         analysis = analyse_as(outline.study, results)
         figures = draw_figures(load_study(outline.study), analysis)
@@ -229,8 +232,8 @@ def page(directory: Path) -> str:
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included
     there = {label: own for label, own in settings.items() if label in results.conditions}
-    notes = (*notes, *control_lines(there))
-    return _template().render(
+    notes = (*headlines(results, there), *notes, *control_lines(there))
+    return _template("page").render(
         study=outline.study,
         extent=extent(outline),
         compared=", ".join(next(iter(outline.columns.values()))),
@@ -242,6 +245,7 @@ def page(directory: Path) -> str:
         pictures=pictures(figures),
         replays=packed,
         topologies=topologies(outline),
+        hierarchies=drawn,
         failed=failed,
         seeds=runs(outline.seeds),
         spec=dumps(outline.table),
@@ -253,7 +257,55 @@ def page(directory: Path) -> str:
     )
 
 
-def _template() -> jinja2.Template:
+def comparison_page(
+    title: str,
+    sources: str,
+    notes: Sequence[str],
+    table: SummaryTable,
+    figures: Mapping[str, Figure],
+) -> str:
+    """Return a comparison as one self-contained page of HTML.
+
+    Parameters
+    ----------
+    title
+        What is compared.
+    sources
+        Where the results are from.
+    notes
+        What is said of them, in lines.
+    table, figures
+        What is shown.
+    """
+    return _template("comparison").render(
+        title=title,
+        sources=sources,
+        notes="\n".join(notes),
+        table=table,
+        pictures=pictures(figures),
+        versions=versions(),
+        css=_read_own("page.css"),
+        js=_read_own("page.js"),
+    )
+
+
+def check_path(file: Path) -> None:
+    """Refuse to write a page to where no HTML file can be.
+
+    Raises
+    ------
+    SpecError
+        If it is a directory, has another suffix, or is in no directory.
+    """
+    if file.is_dir() or not file.name:
+        raise SpecError(f"--out {file}: is a directory")
+    if file.suffix not in (".html", ".htm"):
+        raise SpecError(f"--out {file}: suffix must be .html or .htm")
+    if not file.parent.is_dir():
+        raise SpecError(f"--out {file}: there is no directory {file.parent}")
+
+
+def _template(name: str) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER),
         autoescape=True,
@@ -262,7 +314,7 @@ def _template() -> jinja2.Template:
         lstrip_blocks=True,
     )
     environment.filters["count"] = count
-    return environment.get_template("page.html.jinja")
+    return environment.get_template(f"{name}.html.jinja")
 
 
 def brief(notes: str) -> str:
@@ -276,53 +328,6 @@ def brief(notes: str) -> str:
 def _read_own(name: str) -> Markup:
     """Return a file of this package, which is HTML already."""
     return Markup((FOLDER / name).read_text(encoding="utf-8"))
-
-
-class Picture(NamedTuple):
-    """A figure."""
-
-    name: str
-    """Its file's, without suffix."""
-    svg: Markup
-    """An element that can stand in a page beside others."""
-    pdf: str
-    """The same figure, in base64."""
-
-    @property
-    def title(self) -> str:
-        """The name in words."""
-        return self.name.replace("-", " ").replace("_", " ")
-
-
-def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
-    """Return a study's figures, by name, as they stand in a page and are taken away from it."""
-    drawings = []
-    with apply_style():
-        for number, (name, figure) in enumerate(figures.items(), 1):
-            svg = io.StringIO()
-            figure.savefig(svg, format="svg", metadata={"Date": None})
-            text = embed(svg.getvalue(), f"figure{number}-")
-            pdf = io.BytesIO()
-            figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
-            encoded = base64.b64encode(pdf.getvalue()).decode("ascii")
-            drawings.append(Picture(name, Markup(text), encoded))
-    return drawings
-
-
-def embed(svg: str, prefix: str) -> str:
-    """Return an SVG file's root element, its ids and its style kept from those of other ones.
-
-    Examples
-    --------
-    >>> embed('<?xml version="1.0"?><svg><style>*{a: b}</style><g id="x"/></svg>', "f-")
-    '<svg id="f-"><style>#f- *{a: b}</style><g id="f-x"/></svg>'
-    """
-    svg = svg[svg.index("<svg") :].strip()
-    svg = re.sub(r"\s*<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
-    svg = re.sub(r'\bid="', f'id="{prefix}', svg)
-    svg = re.sub(r'(url\(|href=")#', rf"\1#{prefix}", svg)
-    svg = re.sub(r"(<style[^>]*>)\s*\*", rf"\1#{prefix} *", svg)
-    return svg.replace("<svg", f'<svg id="{prefix}"', 1)
 
 
 PACKAGES = (

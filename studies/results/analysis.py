@@ -77,8 +77,8 @@ class Difference:
         """Value, interval, p as it is and adjusted, as text."""
         value, low, high = map(_format_difference, self.estimate)
         interval = f"{value} [{low}, {high}]"
-        raw = _format_p(self.raw)
-        adjusted = _format_p(self.p)
+        raw = format_p(self.raw)
+        adjusted = format_p(self.p)
         return f"{interval}, p {adjusted} ({raw.removeprefix('= ')} unadjusted)"
 
 
@@ -88,7 +88,8 @@ def _format_difference(value: ArrayLike) -> str:
     return "0.00" if text in ("+0.00", "-0.00") else text
 
 
-def _format_p(p: float) -> str:
+def format_p(p: float) -> str:
+    """Return how p is shown, its sign before it."""
     return "< .001" if p < 0.001 else f"= {p:.2g}"
 
 

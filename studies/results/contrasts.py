@@ -3,12 +3,21 @@
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from ...core.interface.measures import Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
-from .analysis import NOTHING, BySeed, Difference, Summary, differences, identity_lines, verdicts
+from .analysis import (
+    NOTHING,
+    BySeed,
+    Difference,
+    Summary,
+    differences,
+    identity_lines,
+    select_shared,
+    verdicts,
+)
 from .power import power_lines
 from .results import SECONDS, Results, describe_number
 from .statistics import Array, Estimate, bootstrap, rate
@@ -78,12 +87,6 @@ class Contrasts(NamedTuple):
         """What is compared, to be read in a sentence."""
         return f"{self.phase} {self.measure.heading}".strip()
 
-    @property
-    def power(self) -> tuple[str, ...]:
-        """What the comparisons could have detected, line by line."""
-        samples = [d.sample for d in self.differences]
-        return tuple(power_lines(samples, self._of_phase, of_rates=self.measure.is_rate))
-
 
 def contrasts(
     results: Results,
@@ -113,11 +116,7 @@ def contrasts(
     SpecError
         If the results have no such measure, phase, key or reference.
     """
-    if phase is None:
-        evaluated = {*results.of_phase("evaluation")}
-        is_whole = evaluated and evaluated >= {*results.of_phase("training")}
-        phase = "evaluation" if is_whole else "training"
-    shown_as, values, phase = _values(results, measure, phase)
+    shown_as, values, phase = _values(results, measure, phase or _usual_phase(results))
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
     pairs = {
         setting: [(name, measure, values[c], values[members[0][1]]) for name, c in members[1:]]
@@ -147,6 +146,25 @@ def contrasts(
             )
         )
     return Contrasts(shown_as, phase, tuple(compared_groups), results.identical)
+
+
+def power_with_first(results: Results) -> tuple[str, ...]:
+    """Return what comparisons of success with the first condition can find, line by line.
+
+    As `contrasts` of the same say it, whose tests take seconds where seeds are thousands.
+    """
+    measure, values, phase = _values(results, SUCCESS.name, _usual_phase(results))
+    base, *others = (values[c] for c in results.columns if c in values)
+    pairs = [select_shared([own, base]) for own in others]
+    samples = [own - reference for own, reference in pairs if len(own) >= 2]
+    return tuple(power_lines(samples, f"{phase} {measure.heading}", of_rates=measure.is_rate))
+
+
+def _usual_phase(results: Results) -> str:
+    """Return the phase of evaluation, if all trained conditions have it, else that of training."""
+    evaluated = {*results.of_phase("evaluation")}
+    is_whole = evaluated and evaluated >= {*results.of_phase("training")}
+    return "evaluation" if is_whole else "training"
 
 
 def _estimate(

@@ -11,7 +11,7 @@ paired one flips the signs of the differences of n seeds, so its p is a multiple
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -131,8 +131,29 @@ def _draw_runs(n_runs: int, resamples: int, seed: int) -> NDArray[Any]:
 
     In few bytes. They are kept, as the conditions of a study mostly have equally many seeds.
     """
-    runs = np.random.default_rng(seed).integers(n_runs, size=(resamples, n_runs))
-    return runs.astype(np.min_scalar_type(n_runs - 1))
+    return draw_runs(np.random.default_rng(seed), n_runs, resamples)
+
+
+def draw_runs(rng: np.random.Generator, n_runs: int, resamples: int) -> NDArray[Any]:
+    """Return ``rng.integers(n_runs, size=(resamples, n_runs))``, drawn in blocks, in few bytes."""
+    runs = np.empty((resamples, n_runs), dtype=np.min_scalar_type(n_runs - 1))
+    for rows in blocks(resamples, n_runs):
+        many = rows.stop - rows.start
+        runs[rows] = rng.integers(n_runs, size=(many, n_runs), dtype=np.uint32)
+    return runs
+
+
+def blocks(rows: int, width: int) -> Iterator[slice]:
+    """Yield which of some rows are dealt with together, so that they hold `AT_ONCE` values.
+
+    Examples
+    --------
+    >>> list(blocks(5, AT_ONCE // 2))
+    [slice(0, 2, None), slice(2, 4, None), slice(4, 5, None)]
+    """
+    many = max(1, AT_ONCE // width)
+    for begin in range(0, rows, many):
+        yield slice(begin, min(begin + many, rows))
 
 
 def _tail(level: float, n_runs: int) -> float:
@@ -304,35 +325,29 @@ def paired_permutation(
     return float((1 + reaching.sum()) / (1 + permutations))
 
 
-BITS = 10
+BITS = 8
 """Signs of which all patterns are summed up once; longer patterns are put together of these."""
 
 
 @lru_cache(maxsize=2)
-def _flips(n: int, permutations: int, seed: int) -> NDArray[np.uint16]:
+def _flips(n: int, permutations: int, seed: int) -> NDArray[np.uint8]:
     """Return patterns of flipped signs, all of them or so many, as numbers ``(n / BITS, m)``.
 
     They are drawn in blocks: all signs at once would take a gigabyte for a thousand seeds.
     """
-    is_all = 2**n <= permutations
-    m = 2**n if is_all else permutations
-    starts = range(0, n, BITS)
-    numbers = np.empty((len(starts), m), dtype=np.uint16)
+    parts = -(-n // BITS)
+    if 2**n <= permutations:
+        return np.arange(2**n, dtype="<u4").view(np.uint8).reshape(-1, 4)[:, :parts].T.copy()
+    numbers = np.empty((parts, permutations), dtype=np.uint8)
     rng = np.random.default_rng(seed)
-    rows = max(1, AT_ONCE // n)
-    for begin in range(0, m, rows):
-        end = min(begin + rows, m)
-        if is_all:
-            flipped = np.arange(begin, end)[:, None] >> np.arange(n) & 1
-        else:
-            flipped = 1 - rng.integers(0, 2, size=(end - begin, n))
-        for part, start in enumerate(starts):
-            signs = flipped[:, start : start + BITS]
-            numbers[part, begin:end] = signs @ 2 ** np.arange(signs.shape[1])
+    for rows in blocks(permutations, n):
+        # The highest bits of these are what `integers(0, 2)` returns, which takes seven times.
+        drawn = rng.integers(2**32, size=(rows.stop - rows.start, n), dtype=np.uint32)
+        numbers[:, rows] = np.packbits(drawn < 2**31, axis=1, bitorder="little").T
     return numbers
 
 
-def _reaching(difference: Array, rounding: Array, flipped: NDArray[np.uint16]) -> NDArray[np.bool_]:
+def _reaching(difference: Array, rounding: Array, flipped: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return which patterns of flipped signs, see `_flips`, reach the sum of differences, S >= 0.
 
     With the flipped ones summing up to F, the pattern's sum is S - 2 F: its size is S or more if

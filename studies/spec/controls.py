@@ -49,6 +49,13 @@ def control_of(condition: str, settings: Mapping[str, Settings]) -> str | None:
     return None
 
 
+def is_drawn(settings: Settings) -> bool:
+    """Return whether a condition that learns nothing draws actions at random, if only by ties."""
+    learner = settings["learner"]
+    rule = learner.get("decision", {}).get("rule")
+    return learner["kind"] == "frozen" and rule not in WITH_REWARDS
+
+
 def _decision_of(settings: Settings) -> object:
     """Return what tells how zero weights decide."""
     learner = settings["learner"]

@@ -336,14 +336,19 @@ def _refused_of_decision(learner: LearnerSettings) -> tuple[str, ...]:
 def _left_out(
     given: Layers, table: Layer, dropped: Container[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the keys of given layers that a table is without, and the kinds that are why."""
+    """Return the keys of given layers that a table is without, and the kinds that are why.
+
+    A preset's scenario is of its own kind alone: what it says of that to no effect is expected.
+    """
     written = {key for layer in given for key, value in flat(layer) if value != {}}
     there = dict(flat(table))
     keys = sorted(key for key in written if key in dropped or key not in there)
     usual = dict(flat(_lay(given))) if keys else {}
     changed = [k for k, v in there.items() if k.endswith(".kind") and usual.get(k, v) != v]
-    kinds = [kind for key in keys if (kind := _cause(key, changed)) is not None]
-    return tuple(keys), tuple(f"{kind} = {there[kind]!r}" for kind in dict.fromkeys(kinds))
+    causes = {key: _cause(key, changed) for key in keys}
+    unexpected = {key: kind for key, kind in causes.items() if kind != "scenario.kind"}
+    kinds = dict.fromkeys(kind for kind in unexpected.values() if kind is not None)
+    return tuple(unexpected), tuple(f"{kind} = {there[kind]!r}" for kind in kinds)
 
 
 def _cause(key: str, kinds: Iterable[str]) -> str | None:

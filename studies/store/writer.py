@@ -80,9 +80,8 @@ class Running(AbstractContextManager["Running"]):
         self._write()
 
     def end(self, identity: str) -> None:
-        """Note that a trial has come back."""
+        """Forget a trial that has come back; who looks counts what is done as done."""
         self._begun.pop(identity, None)
-        self._write()
 
     def _write(self) -> None:
         temporary = self._path.with_name(f".{MARK}.new")

@@ -75,6 +75,8 @@ def curves_of(measure: Measure, training: Mapping[str, Array]) -> dict[str, Esti
 def analyse(results: Results) -> Analysis:
     """Estimate the table and what the curves need; seeds are the unit of sampling."""
     conditions = results.of_phase("training")
+    if not conditions:
+        return _of_evaluations(results)
     table = []
     measures = results.measures or EPISODES[1:]  # foreign ones may have the return alone
     for condition in conditions:
@@ -89,12 +91,38 @@ def analyse(results: Results) -> Analysis:
             if title == EVALUATED:
                 estimates |= evaluated(results, condition)
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
+    _leave_out_same(table)
     followed = []
     for m in measures:
         own = [c for c in conditions if results.has(c, "training", m.name)]
         if own and (m.name == SUCCESS.name or not m.is_rate):
             followed.append((m, {c: results.values(c, m.name) for c in own}))
     return Analysis(tuple(table), cases=followed)
+
+
+def _leave_out_same(table: Sequence[Summary]) -> None:
+    """Leave out rates of evaluation that are its success, wherever they are known."""
+    for title in {title for line in table for title in line.estimates}:
+        if title.endswith(", evaluation") and all(
+            line.estimates[title] == line.estimates.get(EVALUATED)
+            for line in table
+            if title in line.estimates
+        ):
+            for line in table:
+                line.estimates.pop(title, None)
+
+
+def _of_evaluations(results: Results) -> Analysis:
+    """Estimate what was measured after training: results of others may have no more."""
+    table = []
+    for condition in results.of_phase("evaluation"):
+        estimates = {}
+        for m in results.measures:
+            values = results.values(condition, m.name, "evaluation")
+            means = values.mean(axis=1)
+            estimates[m.heading] = rate(values) if m.is_rate else bootstrap(means, bounds=m.bounds)
+        table.append(Summary(condition, len(results.seeds(condition)), estimates))
+    return Analysis(tuple(table))
 
 
 def draw(analysis: Analysis) -> Figures:
@@ -106,6 +134,8 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures as f  # matplotlib takes its time
 
     followed = analysis.cases
+    if not followed:
+        return {}
     width = 3.6 * COLUMNS
     figure, panels = f.grid(len(followed), COLUMNS, (3.6, 2.1), (0.0, 1.2), width, sharex=True)
     seeds = {line.condition: line.seeds for line in analysis.table}

@@ -302,29 +302,9 @@ def _of_spec(path: str) -> list[view.HierarchyView] | None:
     if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
         return None
 
-    from ....topologies.view import HierarchyView
     from ...spec.spec import Spec
+    from ...trials.hierarchies import hierarchies_of
 
     spec = Spec.load(Path(path))
-    distinct: dict[tuple[object, ...], HierarchyView] = {}
     with spec.sources.active():
-        for condition in spec.conditions():
-            others = {f"{condition.label}, {name}": s for name, s in condition.evaluations}
-            for label, settings in ({condition.label: condition.settings} | others).items():
-                with refused(after=f" (condition {label!r})"):
-                    scenario, hierarchy = settings.arrange(settings.scenario.build())
-                n_actions = len(scenario.action_set)
-                failures = settings.topology.failures
-                content = (
-                    hierarchy.agents,
-                    hierarchy.edges,
-                    hierarchy.told,
-                    hierarchy.considers,
-                    failures,
-                    n_actions,
-                )
-                if content not in distinct:
-                    distinct[content] = HierarchyView(
-                        label, hierarchy, scenario.groups, n_actions, failures
-                    )
-    return list(distinct.values())
+        return list(hierarchies_of(spec))

@@ -94,7 +94,7 @@ class Compared(TypedDict):
     """What is compared, see `StudyResults.compare`."""
 
     by: str | None
-    measure: str
+    measure: str | None
     phase: str | None
     reference: str | None
 
@@ -110,8 +110,8 @@ class Compared(TypedDict):
 @click.option(
     "--measure",
     metavar="NAME",
-    default="success",
-    help="A measure of episodes, steps, return, or a number of whole trials.",
+    help="A measure of episodes, steps, return, or a number of whole trials; by default success, "
+    "or the first score of a table.",
 )
 @click.option("--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one.")
 @click.option(
@@ -123,10 +123,28 @@ class Compared(TypedDict):
 )
 @options.plot
 @options.where
+@click.option(
+    "--columns",
+    multiple=True,
+    metavar="ROLE=COLUMN",
+    help="What the columns of a table of scores are, with commas between: condition and score "
+    "(each may be several, as condition=model+topology), seed, item; by default those called so.",
+)
+@click.option(
+    "--better",
+    type=click.Choice(["higher", "lower"]),
+    default="higher",
+    show_default=True,
+    help="Which scores of a table are better.",
+)
+@options.out("A page to write: verdicts, table, statistics and figure.", "FILE.html")
 @options.form
 @options.trust
 def compare(
     sources: tuple[Path, ...],
+    columns: tuple[str, ...],
+    better: Literal["higher", "lower"],
+    out: Path | None,
     statistics: bool,
     plot: Path | None,
     where: str | None,
@@ -136,15 +154,21 @@ def compare(
 ) -> int:
     """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
 
-    DIR is where a study is kept, FILE.json a file of results. Conditions are compared on the seeds
-    that both have, on equal worlds.
+    DIR is where a study is kept, FILE.json a file of results, of marl-eval too. Conditions are
+    compared on the seeds that both have, on equal worlds.
+
+    FILE may also be a table of scores that others have measured, .csv, .jsonl or .parquet: a row
+    for each score of a condition, by run (seed), or on an item, or both.
     """
-    comparison = load_results(sources, where=where, trust=trust).compare(**compared)
+    loaded = load_results(sources, where=where, trust=trust, columns=columns, better=better)
+    comparison = loaded.compare(**compared)
     if plot is not None:
         from ...presentation.figures import write
 
         with refused():
             write(comparison.figure(), plot)
+    if out is not None:
+        comparison.report(out, ", ".join(map(str, sources)))
     if form != "table":
         print_data(in_form(comparison.table, form))
         if statistics:

@@ -17,7 +17,9 @@ from nested_agents.core.hierarchy.turns import levels_of, slots_of
 from nested_agents.core.interface.experience import Experience
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.learners import LEARNERS
+from nested_agents.core.learners.fitted_q import FittedQSettings
 from nested_agents.core.learners.td import TDLambdaSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
 TD = {"kind": "td-lambda", "step_size": 0.1}
 
@@ -94,6 +96,45 @@ def test_frozen_leaders_and_followers_that_learn(world, tmp_path) -> None:
     successor = Team(settings, world, chain_of(world.agents), policy_seed(2))
     successor.continue_from(team)
     assert (successor.parts[1].learner.theta == followers.learner.theta).all()
+
+
+@pytest.fixture
+def taken_in(monkeypatch):
+    """Return a function that lets agents learn nothing, and lists what they would learn from."""
+
+    def watch(part) -> list:
+        calls: list = []
+        monkeypatch.setattr(part.learner, "observe_decision", lambda *own: calls.append(own) or 0)
+        return calls
+
+    return watch
+
+
+def test_every_part_is_paid_its_own_rewards(world, taken_in) -> None:
+    team = Team(mixed(("cart1", TD), ("*", TD)), world, chain_of(world.agents), policy_seed(0))
+    states = world.reset(0)
+    decision = team.act(look(world, states))
+    calls = [taken_in(part) for part in team.parts]
+    paid = Transition(states, np.array([1.0, 2.0, 3.0, 4.0]), False, False, {})
+    team.learn(Experience(look(world, states), decision, paid, last=False))
+    for ((left, taken, entered, rewards, _),), members in zip(calls, ([2, 3], [0, 1]), strict=True):
+        assert rewards.tolist() == [1.0 + member for member in members]
+        assert taken.tolist() == decision.joint_action[members].tolist()
+        assert (left[:, : states.shape[1]] == states[members]).all()
+        assert (entered == states[members]).all()
+
+
+def test_mirror_images_of_agents_do_what_these_do(taken_in) -> None:
+    world = BoxPushingSettings(robots=2).build()
+    silent = Hierarchy(world.agents, [])
+    team = Team(FittedQSettings(mirrored=True), world, silent, policy_seed(0))
+    seen = look(world, world.reset(0))
+    (calls,) = [taken_in(part) for part in team.parts]
+    decision = team.act(seen)
+    joint = decision.joint_action
+    team.learn(Experience(seen, decision, world.step(joint), last=False))
+    ((_, taken, *_),) = calls
+    assert taken.tolist() == [*joint.tolist(), *joint.tolist()]
 
 
 def test_a_team_of_equal_parts_decides_as_one_of_one_kind(world) -> None:

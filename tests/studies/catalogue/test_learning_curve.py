@@ -37,10 +37,17 @@ def test_the_table_takes_the_ends_of_training_and_the_evaluation():
     assert values["final distance [m]"] == np.mean([7, 8, 9, 10, 11])
     assert float(never.estimates["success last 5"].value) == 0.0
     assert list(learns.estimates) == [
-        "success first 5", "success last 5", "evaluation success", "stopped at goal, evaluation",
-        "evaluation steps", "final distance [m]", "final orientation error [rad]",
-        "time in contact",
+        "success first 5", "success last 5", "evaluation success", "evaluation steps",
+        "final distance [m]", "final orientation error [rad]", "time in contact",
     ]  # fmt: skip
+
+
+def test_a_rate_has_a_column_where_it_is_not_the_success():
+    results = made_up()
+    results.evaluation["never"]["stopped_at_goal"] = arrays(4, 3, 1)["success"]
+    learns, never = analyse(results.frames()).table
+    assert "stopped at goal, evaluation" in learns.estimates
+    assert float(never.estimates["stopped at goal, evaluation"].value) == 1.0
 
 
 def test_curves_have_a_point_for_every_episode():

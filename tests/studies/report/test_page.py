@@ -30,8 +30,10 @@ def sections(html):
 
 def test_a_finished_study_has_everything(html):
     assert sections(html) == [
-        "summary", "table", "figures", "replay", "spec", "versions",
+        "summary", "table", "figures", "hierarchy", "replay", "spec", "versions",
     ]  # fmt: skip
+    assert html.count('aria-label="hierarchy: default') == 1
+    assert 'aria-label="hierarchy: frozen' not in html, "it is the same"
     assert "All 6 trials are done." in html
     rates = html[html.index('<dl class="rates" aria-label="evaluation success">') :]
     rates = rates[: rates.index("</dl>")]
@@ -76,7 +78,7 @@ def test_damaged_rows_are_not_published(finished, tmp_path, capsys):
 
 def test_an_empty_study(kept, tmp_path):
     html = page(kept(tmp_path, done=0))
-    assert sections(html) == ["summary", "spec", "versions"]
+    assert sections(html) == ["summary", "hierarchy", "spec", "versions"]
     assert "There is nothing to show yet." in html
 
 

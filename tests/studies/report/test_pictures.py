@@ -2,7 +2,7 @@ import re
 
 from matplotlib.figure import Figure
 
-from nested_agents.studies.report.page import pictures
+from nested_agents.studies.report.pictures import pictures
 
 
 def line():

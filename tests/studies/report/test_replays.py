@@ -4,6 +4,7 @@ import json
 from nested_agents.scenarios.box_pushing.pictures import rendering
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.studies.report.page import replays
+from nested_agents.studies.results import results
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import spec_of
 from nested_agents.studies.trials.trial import trials_of
@@ -11,7 +12,7 @@ from nested_agents.studies.trials.trial import trials_of
 
 def read(directory, **options):
     with Store.open(directory) as store:
-        return replays(store, trials_of(spec_of(store)), **options)
+        return replays(store, results.read(store), trials_of(spec_of(store)), **options)
 
 
 def test_first_and_last_of_all_finished_trials(kept, tmp_path):

@@ -17,6 +17,7 @@ from nested_agents.studies.results.statistics import (
     _flips,
     _tail,
     bootstrap,
+    draw_runs,
     friedman,
     holm,
     paired_permutation,
@@ -268,6 +269,12 @@ def test_signs_are_those_that_are_drawn_at_once(n: int) -> None:
     numbers = _flips(n, EXACT, 3)
     signs = [part[:, None] >> np.arange(BITS) & 1 for part in numbers]
     assert np.array_equal(np.concatenate(signs, axis=1)[:, :n], expected)
+
+
+@pytest.mark.parametrize("n", [2, 9, 300, 2000])
+def test_resamples_are_those_that_are_drawn_at_once(n: int) -> None:
+    expected = np.random.default_rng(3).integers(n, size=(1500, n))
+    assert np.array_equal(draw_runs(np.random.default_rng(3), n, 1500), expected)
 
 
 def test_a_test_of_many_seeds_takes_little_memory() -> None:

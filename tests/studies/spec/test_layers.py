@@ -125,8 +125,10 @@ def test_the_kind_of_a_part_drops_what_is_another_ones() -> None:
         "learner.decision.teammates: of the preset, left out for "
         "learner.decision.evaluator.kind = 'best-response'",
     )
-    (remark,) = build({"scenario": {"kind": "line-up"}}).warnings()
-    assert remark.endswith("left out for scenario.kind = 'line-up'")
+    assert not build({"scenario": {"kind": "line-up"}}).warnings()
+    walled = {"kind": "line-up", "reward": {"of": "robot"}}
+    with pytest.raises(SpecError, match=r"scenario\.reward"):
+        build({"scenario": walled})
 
 
 def test_a_control_stays_one_whatever_evaluates() -> None:

@@ -1,0 +1,40 @@
+"""The hierarchies of a study's conditions and evaluations, each once."""
+
+from collections.abc import Iterator
+
+from ...topologies.view import HierarchyView
+from ..errors import refused
+from ..spec.conditions import ConditionSettings
+from ..spec.spec import Spec
+
+
+def hierarchies_of(spec: Spec) -> Iterator[HierarchyView]:
+    """Yield the distinct hierarchies of a spec, each called by the first that has it.
+
+    Raises
+    ------
+    SpecError
+        If one cannot be built; one line.
+    """
+    seen = set[object]()
+    for label, settings in _labelled(spec):
+        world = settings.scenario.model_dump_json(), settings.agents, settings.topology
+        if world in seen:
+            continue
+        seen.add(world)
+        with refused(after=f" (condition {label!r})"):
+            scenario, hierarchy = settings.arrange(settings.scenario.build())
+        n_actions = len(scenario.action_set)
+        failures = settings.topology.failures
+        relations = hierarchy.told, hierarchy.considers
+        content = hierarchy.agents, hierarchy.edges, relations, failures, n_actions
+        if content not in seen:
+            seen.add(content)
+            yield HierarchyView(label, hierarchy, scenario.groups, n_actions, failures)
+
+
+def _labelled(spec: Spec) -> Iterator[tuple[str, ConditionSettings]]:
+    for condition in spec.conditions():
+        yield condition.label, condition.settings
+        for name, settings in condition.evaluations:
+            yield f"{condition.label}, {name}", settings

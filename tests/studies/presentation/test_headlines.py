@@ -1,0 +1,40 @@
+"""Sentences on what the teams of a study have learned."""
+
+import numpy as np
+import pytest
+
+from nested_agents.core.interface.measures import SUCCESS
+from nested_agents.studies.presentation.headlines import headlines
+from nested_agents.studies.results.results import from_arrays
+from nested_agents.studies.spec.spec import Spec
+
+RATES = {"default": 9, "frozen": 0, "random": 0, "planner": 10}
+
+
+def lines_of(rates: dict[str, int], seeds: int = 8) -> str:
+    """Return what is said of conditions by the successes of ten evaluation episodes."""
+    spec = Spec.of({"sweep": {"preset": list(rates)}})
+    arrays = {c: {"success": np.tile(np.arange(10) < n, (seeds, 1))} for c, n in rates.items()}
+    of_seeds = {c: range(seeds) for c in rates}
+    columns = {c: {"preset": c} for c in rates}
+    results = from_arrays({"evaluation": arrays}, of_seeds, {}, {}, columns, (SUCCESS,))
+    settings = {c.label: c.settings.model_dump() for c in spec.conditions()}
+    return " ".join(line.strip() for line in headlines(results, settings))
+
+
+def test_a_team_has_learned_if_it_is_better_than_its_untrained_weights() -> None:
+    text = lines_of(RATES)
+    assert text.startswith("default: learned (8 seeds). Evaluation success .90 [")
+    assert "untrained (frozen) 0 [0, .32] (p = 0.023)" in text
+    assert "planner 1.0 [.68, 1.0], better." in text
+    assert "random" not in text, "it is the control by ties"
+
+
+def test_what_few_seeds_leave_open_is_not_called_learned() -> None:
+    assert lines_of(RATES, seeds=4).startswith("default: not seen to learn (4 seeds).")
+    assert lines_of({"default": 0, "frozen": 0}).startswith("default: not seen to learn (8 seeds).")
+
+
+@pytest.mark.parametrize("presets", [("frozen", "random"), ("default", "planner"), ("default",)])
+def test_without_a_team_or_its_control_nothing_is_said(presets) -> None:
+    assert not lines_of({preset: 5 for preset in presets})
