@@ -2,8 +2,7 @@
 
 First a worker: its resident memory after each thing that it imports, up to a trial of two steps.
 Then a study of many made-up trials: processor time and greatest memory of the commands that read
-it. Its rows are written as those of any study, but not waited for. Last, a study of as many real
-trials of two steps, run, interrupted and resumed: what a trial takes beside the work itself.
+it. Its rows are written as those of any study, but not waited for.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 from rich.console import Console
@@ -97,7 +97,8 @@ def fill(directory: Path, conditions: int, seeds: int, episodes: int) -> None:
         }
     )  # fmt: skip
     trials = trials_of(spec)
-    with open_to_run(directory, spec, trials, check_conditions(spec)) as store:
+    opened = open_to_run(directory, spec, trials, check_conditions(spec))
+    with mock.patch("os.fsync"), opened as store:
         store._db.execute("PRAGMA synchronous = OFF")
         for trial in trials:
             save(store, trial, made_up(trial, store), total=1.0)
@@ -122,7 +123,10 @@ def made_up(trial: Trial, store: Store) -> TrialResult:
 
 def commands(directory: Path) -> list[Row]:
     """Return what each command takes, and `nested_agents.load`."""
-    lines = {" ".join(words).replace(" DIR", ""): _line(words, directory) for words in COMMANDS}
+    lines = {
+        " ".join(word for word in words if "DIR" not in word): _line(words, directory)
+        for words in COMMANDS
+    }
     lines["na.load"] = ["-c", LOAD, str(directory)]
     rows: list[Row] = []
     for name, line in lines.items():

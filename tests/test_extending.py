@@ -27,7 +27,8 @@ def block(section: str, language: str) -> str:
 def test_all_kinds_have_an_example() -> None:
     assert set(SECTIONS) == {
         "topology", "scenario", "state variable", "learner", "learner that acts by itself",
-        "evaluator", "exploration", "study", "an environment of Gymnasium or PettingZoo",
+        "function that decides", "evaluator", "exploration", "study",
+        "an environment of Gymnasium or PettingZoo",
     }  # fmt: skip
 
 

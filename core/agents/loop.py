@@ -43,6 +43,8 @@ class StepRecord:
     """Seconds that the team took to decide; the scenario reports its own in ``transition.info``."""
     learning: float
     """Seconds that the team took to learn."""
+    spent: Mapping[str, float]
+    """What the decision cost, by the names of `Team.costs`."""
 
 
 class EpisodeSummary(NamedTuple):
@@ -134,6 +136,7 @@ def control_loop(
                 last=last,
                 deciding=decided - begin,
                 learning=perf_counter() - moved,
+                spent=team.spent,
             )
             if last:
                 break

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ..hierarchy.failures import MessageFailure, Messages
+from ..hierarchy.failures import MessageFailure, Messages, ReparentedAgents
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Slot, Turn, slots_of
 from ..interface.agents import Agents, Counts, Memory, Placement, under
 from ..interface.experience import Decision, Experience, Observation
+from ..interface.measures import Measure
 from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
 from ..numerics import AnyArray, IntArray
@@ -47,6 +48,10 @@ class Team:
         The agents, kind by kind.
     messages
         Who is told what.
+    costs
+        What is measured of an episode of what its decisions cost; without functions nothing.
+    spent
+        What its last decision cost, by their names.
 
     Raises
     ------
@@ -73,7 +78,6 @@ class Team:
             hierarchy, failures = Hierarchy(world.agents, []), ()
         self.hierarchy = hierarchy
         self.action_set = world.action_set
-        self.messages = Messages(hierarchy, failures, len(world.action_set))
         kinds = settings.members(world, hierarchy)
         seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
         parts: list[Agents[Any]] = []
@@ -85,10 +89,19 @@ class Team:
             placement = Placement(world, hierarchy, members, own_seed, messages_fail=fail)
             parts.append(own.agents(placement))
         self.parts = tuple(parts)
+        self.costs = costs_of(parts)
+        self.spent: Mapping[str, float] = {}
+        self._has_contents = any(part.has_contents for part in parts)
+        self.messages = Messages(
+            hierarchy, failures, len(world.action_set), has_contents=self._has_contents
+        )
 
     @cached_property
     def _slots(self) -> tuple[Slot, ...]:
-        return slots_of(self.hierarchy, self._part_of, [part.at_once for part in self.parts])
+        # Who is told by another superior may not decide at once with it.
+        one_by_one = any(isinstance(f, ReparentedAgents) for f in self.messages.failures)
+        at_once = [part.at_once and not one_by_one for part in self.parts]
+        return slots_of(self.hierarchy, self._part_of, at_once)
 
     def only(self, kind: type[A]) -> A:
         """Return the team's agents, if all are of one kind, and of this one.
@@ -144,6 +157,8 @@ class Team:
     def begin_world(self, seed: int | np.random.SeedSequence, episode: int) -> None:
         """Begin a world; what fails of the messages in it follows from `seed`."""
         self.messages.begin(seed, episode)
+        for part in self.parts:
+            part.begin_world(episode)
 
     def begin_episode(self) -> None:
         """Begin an episode of learning."""
@@ -160,7 +175,11 @@ class Team:
         joint = self.parts[0].decide_all(inputs[0]) if len(inputs) == 1 else None
         if joint is None:
             joint = self._walk(seen, inputs)
-        self.messages.advance(joint)
+        if self._has_contents:
+            self.messages.advance(joint, self._contents(inputs))
+            self.spent = self._spent(inputs)
+        else:
+            self.messages.advance(joint)
         for part, own in zip(self.parts, inputs, strict=True):
             part.conclude(own, joint)
         return Decision(joint, inputs)
@@ -172,7 +191,9 @@ class Team:
         decided = joint.T  # a view with the agents first, however many worlds there are
         fail = bool(self.messages.failures)
         for part, agents, receivers, senders in self._slots:
-            if fail:
+            if self.parts[part].has_contents:
+                turn = self.messages.turn_with_contents(agents, joint, self._contents(inputs))
+            elif fail:
                 turn = self.messages.failed_turn(agents, joint)
             else:
                 turn = Turn(agents, receivers, senders, decided[senders].T)
@@ -180,6 +201,21 @@ class Team:
             if fail:
                 joint[self.messages.absent(agents)] = self.action_set.neutral
         return joint
+
+    def _contents(self, inputs: tuple[Any, ...]) -> Mapping[int, object]:
+        """Return by agent what has been said beside actions so far."""
+        contents: dict[int, object] = {}
+        for part, own in zip(self.parts, inputs, strict=True):
+            contents.update(part.contents(own))
+        return contents
+
+    def _spent(self, inputs: tuple[Any, ...]) -> Mapping[str, float]:
+        """Return what a decision has cost, by the names of `costs`."""
+        total = {measure.name: 0.0 for measure in self.costs}
+        for part, own in zip(self.parts, inputs, strict=True):
+            for name, value in part.spent(own).items():
+                total[name] += value
+        return total
 
     def learn(self, experience: Experience) -> None:
         """Learn from what a decision led to."""
@@ -247,3 +283,23 @@ class Team:
             return
         for k, part in enumerate(self.parts):
             part.restore(under(f"part{k}.", arrays))
+
+
+def costs_of(parts: Sequence[Agents[Any]]) -> tuple[Measure, ...]:
+    """Return what decisions of some parts cost, each once.
+
+    Raises
+    ------
+    ValueError
+        If two parts give the same cost in different units; one line.
+    """
+    by_name: dict[str, Measure] = {}
+    for part in parts:
+        for measure in part.costs:
+            known = by_name.setdefault(measure.name, measure)
+            if known != measure:
+                raise ValueError(
+                    f"learner.costs.{measure.name} = {measure.unit!r}: another part of the team "
+                    f"gives it in {known.unit!r}"
+                )
+    return tuple(by_name.values())

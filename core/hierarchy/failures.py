@@ -7,7 +7,7 @@ and policies stay paired. How an agent reads what it was not told is the team's 
 `nested_agents.core.learners.learner`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
@@ -97,8 +97,12 @@ STREAM = 2**32 - 2
 failures of a scenario have 0, 1, ..., and sensor noise the key after this."""
 
 
+NOTHING: Mapping[int, object] = {}
+"""What is said beside actions by agents who tell nothing else."""
 LOST = -1
 """What arrives where a message does not."""
+GARBLED = -1
+"""Age of a message whose content nobody can read any more."""
 
 
 class Sent(NamedTuple):
@@ -139,6 +143,10 @@ class MessageFailure(Scheduled):
         """Return what arrives ``(k,)``, `LOST` where nothing does."""
         return sent.actions
 
+    def ages(self, sent: Sent, arrived: IntArray, ages: IntArray) -> IntArray:
+        """Return how many decisions ago was said what arrives ``(k,)``, or `GARBLED`."""
+        return np.where(arrived == sent.actions, ages, GARBLED)
+
 
 class LostMessages(MessageFailure):
     """Each message of the agents is lost with a probability."""
@@ -169,6 +177,10 @@ class DelayedMessages(MessageFailure):
         """Return what the agents did as many decisions before."""
         is_early = len(sent.past) < self.decisions
         return np.full_like(sent.actions, LOST) if is_early else sent.past[-self.decisions]
+
+    def ages(self, sent: Sent, arrived: IntArray, ages: IntArray) -> IntArray:
+        """Return as many decisions more."""
+        return ages + self.decisions
 
 
 class NoisyMessages(MessageFailure):
@@ -210,8 +222,22 @@ AnyMessageFailure = Annotated[
 """Any failure of messages: a table distinguished by `kind`."""
 
 
+class Arrived(NamedTuple):
+    """The messages that arrive at an agent."""
+
+    senders: IntArray
+    """``(k,)`` whose they are."""
+    actions: IntArray
+    """``(k,)`` what these have decided, as it arrives."""
+    ages: IntArray
+    """``(k,)`` how many decisions ago that was said, or `GARBLED`."""
+
+
 class Messages:
     """The messages of a team: which agent is told which actions in a decision.
+
+    What is said beside an action, its content, has the fate of the message. Agents who tell more
+    than actions are also told what their neighbours did and said in the decision before.
 
     Parameters
     ----------
@@ -221,6 +247,8 @@ class Messages:
         What fails, and when.
     n_actions
         Actions of every agent.
+    has_contents
+        Whether there are agents who tell more than actions.
 
     Raises
     ------
@@ -232,13 +260,18 @@ class Messages:
     >>> chain = Hierarchy("abc", [("a", "b"), ("b", "c")])
     >>> messages = Messages(chain, [LostMessages(agents="a")], n_actions=4)
     >>> messages.begin(0, episode=0)
-    >>> senders, actions = messages.heard(2, np.array([3, 1, 0]))
-    >>> senders.tolist(), actions.tolist()
+    >>> arrived = messages.heard(2, np.array([3, 1, 0]))
+    >>> arrived.senders.tolist(), arrived.actions.tolist()
     ([1], [1])
     """
 
     def __init__(
-        self, hierarchy: Hierarchy, failures: Sequence[MessageFailure], n_actions: int
+        self,
+        hierarchy: Hierarchy,
+        failures: Sequence[MessageFailure],
+        n_actions: int,
+        *,
+        has_contents: bool = False,
     ) -> None:
         n = len(hierarchy)
         self.failures, self._n_actions = tuple(failures), n_actions
@@ -252,7 +285,12 @@ class Messages:
             for k, failure in enumerate(failures)
             if isinstance(failure, ReparentedAgents)
         }
-        self._memory = max([failure.memory for failure in failures], default=0)
+        beside: list[list[int]] = [[] for _ in range(n)]
+        for a, b in hierarchy.neighbours if hierarchy.told != "none" else ():
+            beside[a].append(b)
+            beside[b].append(a)
+        self._beside = [np.array(sorted(others), dtype=np.int64) for others in beside]
+        self._memory = max([failure.memory for failure in failures], default=0) + has_contents
         self.begin(0, 0)
 
     def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:
@@ -260,12 +298,14 @@ class Messages:
         self._rng = stream_of(seed, STREAM)
         self._episode, self._step = episode, 0
         self._past: list[IntArray] = []
+        self._contents: list[Mapping[int, object]] = []
         self._strike()
 
-    def advance(self, joint_action: IntArray) -> None:
-        """Note what all did in a decision, after which the next one comes."""
+    def advance(self, joint_action: IntArray, contents: Mapping[int, object] = NOTHING) -> None:
+        """Note what all did in a decision, and said beside, after which the next one comes."""
         if self._memory:
             self._past = [*self._past, joint_action.copy()][-self._memory :]
+            self._contents = [*self._contents, contents][-self._memory :]
         self._step += 1
         self._strike()
 
@@ -291,26 +331,65 @@ class Messages:
 
     def failed_turn(self, agents: IntArray, joint_action: IntArray) -> Turn:
         """Return the turn of some agents, with what of the messages arrives and as it does."""
-        messages = [self.heard(agent, joint_action) for agent in agents.tolist()]
-        senders = [senders for senders, _ in messages]
-        receivers = np.repeat(agents, [len(of_agent) for of_agent in senders])
-        actions = np.concatenate([actions for _, actions in messages])
-        return Turn(agents, receivers, np.concatenate(senders), actions)
+        return _turn(agents, [self.heard(agent, joint_action) for agent in agents.tolist()])
 
-    def heard(self, agent: int, joint_action: IntArray) -> tuple[IntArray, IntArray]:
-        """Return whom an agent hears of, ``(k,)``, and what, given what has been decided."""
+    def turn_with_contents(
+        self, agents: IntArray, joint_action: IntArray, contents: Mapping[int, object]
+    ) -> Turn:
+        """Return the turn of some agents who are also told what is said beside actions.
+
+        Their neighbours' actions and contents are those of the decision before.
+        """
+        every = [
+            arrived
+            for agent in agents.tolist()
+            for arrived in (self.heard(agent, joint_action), self.heard_before(agent))
+        ]
+        by_age = [contents, *reversed(self._contents)]
+        contents_of = [
+            None if age == GARBLED else by_age[age].get(sender)
+            for arrived in every
+            for sender, age in zip(arrived.senders.tolist(), arrived.ages.tolist(), strict=True)
+        ]
+        turn = _turn(np.repeat(agents, 2), every)
+        return turn._replace(agents=agents, contents=tuple(contents_of))
+
+    def heard(self, agent: int, joint_action: IntArray) -> Arrived:
+        """Return whom an agent hears of, and what, given what has been decided."""
         senders = self.told[agent]
         for k in self._active:
             senders = self._told_instead[k][agent] if k in self._told_instead else senders
+        return self._arrived(senders, joint_action, self._past, 0)
+
+    def heard_before(self, agent: int) -> Arrived:
+        """Return what an agent hears of its neighbours: what they did in the decision before."""
+        *past, last = self._past or [np.zeros(len(self.told), dtype=np.int64)]
+        senders = self._beside[agent] if self._past else self._beside[agent][:0]
+        return self._arrived(senders, last, past, 1)
+
+    def _arrived(
+        self, senders: IntArray, joint_action: IntArray, before: Sequence[IntArray], age: int
+    ) -> Arrived:
+        """Return what arrives of what some agents say of a decision, an age ago."""
         actions = joint_action[senders]
+        ages = np.full(len(senders), age)
         for k in self._active:
             concerned = np.flatnonzero(self._masks[k][senders])
-            past = [joint[senders[concerned]] for joint in self._past]
+            past = [joint[senders[concerned]] for joint in before]
             sent = Sent(actions[concerned], past, self._n_actions, self._rng)
-            actions[concerned] = self.failures[k].passed(sent)
+            passed = self.failures[k].passed(sent)
+            ages[concerned] = self.failures[k].ages(sent, passed, ages[concerned])
+            actions[concerned] = passed
             arrive = actions != LOST
-            senders, actions = senders[arrive], actions[arrive]
-        return senders, actions
+            senders, actions, ages = senders[arrive], actions[arrive], ages[arrive]
+        return Arrived(senders, actions, ages)
+
+
+def _turn(agents: IntArray, arrived: Sequence[Arrived]) -> Turn:
+    """Return the turn of some agents at which messages arrive."""
+    receivers = np.repeat(agents, [len(own.senders) for own in arrived])
+    senders = np.concatenate([own.senders for own in arrived])
+    return Turn(agents, receivers, senders, np.concatenate([own.actions for own in arrived]))
 
 
 def _reparented(

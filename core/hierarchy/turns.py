@@ -24,6 +24,8 @@ class Turn(NamedTuple):
     """``(m,)`` whose action it is."""
     actions: IntArray
     """``(m,)`` the action."""
+    contents: tuple[object, ...] = ()
+    """``(m,)`` what is said beside it; empty: nobody says more."""
 
 
 class Slot(NamedTuple):

@@ -20,6 +20,7 @@ from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn
 from ..numerics import AnyArray, IntArray
 from .experience import Experience, Observation
+from .measures import Measure
 from .scenario import Scenario
 
 I = TypeVar("I")  # noqa: E741 - the inputs of a kind of agents
@@ -87,6 +88,10 @@ class Agents(ABC, Generic[I]):
     """Whether their policy is one of probabilities, so that sampled actions are evaluated, too."""
     rng: np.random.Generator
     """Source of all that is random in what they do."""
+    has_contents: ClassVar[bool] = False
+    """Whether they tell and are told more than actions, and neighbours what was said before."""
+    costs: tuple[Measure, ...] = ()
+    """What is measured of an episode of what their decisions cost, see `spent`."""
 
     @property
     def counts(self) -> Counts:
@@ -107,6 +112,9 @@ class Agents(ABC, Generic[I]):
             One line.
         """
 
+    def begin_world(self, episode: int) -> None:
+        """Begin an episode, of learning or not."""
+
     def begin_episode(self) -> None:
         """Begin an episode of learning."""
 
@@ -124,6 +132,14 @@ class Agents(ABC, Generic[I]):
         Asked of the agents of a team that are its only part.
         """
         return None
+
+    def contents(self, inputs: I) -> Mapping[int, object]:
+        """Return by agent what has been said beside its action, in this decision so far."""
+        return {}
+
+    def spent(self, inputs: I) -> Mapping[str, float]:
+        """Return what a decision has cost, by the names of `costs`."""
+        return {}
 
     def conclude(self, inputs: I, joint_action: IntArray) -> None:
         """Take in what all have decided, before it is done."""

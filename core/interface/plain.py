@@ -7,6 +7,7 @@ self-models inherit `Scenario`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from inspect import isfunction, signature
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,18 @@ MISSING = object()
 def offered(thing: object, name: str, otherwise: Any = None) -> Any:
     """Return what an object of a user has by a name, or something else if it has not."""
     return getattr(thing, name, otherwise)
+
+
+def decides(thing: object) -> bool:
+    """Return whether a user's function, or a class by its method ``decide``, decides for agents.
+
+    >>> decides(lambda observation, told, rng: 0), decides(lambda rules, rows: 0)
+    (True, False)
+    """
+    own = offered(thing, "decide") if isinstance(thing, type) else thing
+    if not isfunction(own):
+        return False
+    return bool({"observation", "observations"} & signature(own).parameters.keys())
 
 
 def as_scenario(thing: object) -> Scenario:

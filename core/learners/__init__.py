@@ -6,11 +6,22 @@ and is not learned from. A terminal state counts as entered again for ever: its 
 R(s) / (1 - discount). Siblings differ where their mathematics differs.
 """
 
+from pkgutil import resolve_name
+
+from ..interface.plain import decides
 from ..interface.scenario import Scenario
 from ..plugins.registry import SettingsRegistry
 from .learner import CORE, LearnerSettings, TeamSettings
 
 PEERS = f"{CORE}.networks.settings"
+FUNCTIONS = f"{CORE}.functions.settings:FunctionSettings"
+
+
+def base_of(thing: object) -> type[TeamSettings]:
+    """Return which settings a user's thing has: those of a function that decides, or a learner."""
+    base: type[TeamSettings] = resolve_name(FUNCTIONS) if decides(thing) else LearnerSettings
+    return base
+
 
 LEARNERS = SettingsRegistry(
     "learner",
@@ -34,6 +45,7 @@ LEARNERS = SettingsRegistry(
     },
     LearnerSettings,
     TeamSettings,
+    base_of=base_of,
 )
 """Learners by name."""
 

@@ -180,6 +180,8 @@ class SettingsRegistry(Registry):
         What the settings of things of the kind inherit.
     root
         What those inherit at least that are of another sort; none: there is no other sort.
+    base_of
+        Says which settings stand for a thing of a user's that has none; none: `base`.
 
     Examples
     --------
@@ -203,9 +205,11 @@ class SettingsRegistry(Registry):
         base: type[Settings],
         root: type[Settings] | None = None,
         moved: Mapping[str, str] | None = None,
+        base_of: Callable[[object], type[Settings]] | None = None,
     ) -> None:
         super().__init__(kind, built_in, moved)
         self.base = base
+        self._base_of = base_of or (lambda thing: base)
         self.root = root or base
         self._adapted: dict[tuple[str, int], tuple[object, type[Settings]]] = {}
 
@@ -236,14 +240,17 @@ class SettingsRegistry(Registry):
 
     def _derived(self, name: str, thing: object) -> type[Settings]:
         is_model = isinstance(thing, type) and issubclass(thing, Settings)
-        own = thing if is_model else getattr(thing, "Settings", self.base)
+        own = thing if is_model else getattr(thing, "Settings", self._base_of(thing))
         if not (isinstance(own, type) and issubclass(own, self.root)):
             base = f"{self.base.__module__}.{self.base.__qualname__}"
             raise ValueError(f"is no {self.kind}, whose Settings inherit {base}")
         if not callable(thing):
             raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
         has_own = hasattr(thing, "Settings")
-        fields = {} if is_model or has_own else _parameters(thing)
+        made_by: object = thing
+        if isinstance(thing, type) and own is not self.base:
+            made_by = vars(thing).get("__init__")
+        fields = {} if is_model or has_own else _parameters(made_by)
         derived = create_model(
             own.__qualname__,
             __base__=own,

@@ -5,7 +5,8 @@ Who wants to see how it goes passes an `Observer`.
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
+from functools import partial
 from pathlib import Path
 
 from ...core.interface.measures import Measure
@@ -17,8 +18,8 @@ from ..store.store import Store
 from ..trials.arrangement import check_conditions
 from ..trials.keeping import open_to_run, pending
 from ..trials.trial import Trial, trials_of
-from ..workers.runner import Backend, Observer, run_trials
-from ..workers.workers import start_workers
+from ..workers.runner import Backend, Observer, Outcome, run_trials
+from ..workers.workers import check_workers, start_workers
 from .study import Place, StudyResults
 
 
@@ -69,10 +70,13 @@ def run_study(
     observer = observer or Observer()
     measures = examine(spec, may_fail=True)
     trials = chosen or trials_of(spec)
-    with (
-        start_workers(backend, jobs, address, len(trials)) as workers,
-        open_to_run(directory, spec, trials, measures, accept_code=accept_code) as store,
-    ):
+    check_workers(backend, jobs, address)
+    with ExitStack() as stack:
+        start = partial(start_workers, backend, jobs, address)
+        # A cluster that cannot be reached is told before anything is written.
+        workers = None if address is None else stack.enter_context(start(len(trials)))
+        opened = open_to_run(directory, spec, trials, measures, accept_code=accept_code)
+        store = stack.enter_context(opened)
         if retry_failed:
             store.forget_failed()
         left = pending(store, trials)
@@ -82,13 +86,15 @@ def run_study(
             run_one = measure_by_name if is_own else load_study(spec.study).measure
         for note in (*store.notes, *spec.warnings()):
             observer.note(note)
+        outcomes: Iterator[Outcome] = iter(())
         if left:
+            workers = workers or stack.enter_context(start(len(left)))
             observer.announce(spec, directory, workers.processes)
-        if left and not workers.processes:
-            observer.note("there is no worker yet: waiting for one")
+            if not workers.processes:
+                observer.note("there is no worker yet: waiting for one")
+            outcomes = stack.enter_context(closing(run_trials(left, store, run_one, workers)))
         try:
-            with closing(run_trials(left, store, run_one, workers)) as outcomes:
-                observer.follow(outcomes, len(trials), len(trials) - len(left))
+            observer.follow(outcomes, len(trials), len(trials) - len(left))
         except KeyboardInterrupt:
             observer.note(
                 f"interrupted: {store.counts()['done']} of {len(trials)} trials are kept in "

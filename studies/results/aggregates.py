@@ -7,8 +7,9 @@ authors' library rliable; where all runs of a task ended alike, they have no wid
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +89,8 @@ def _drawn(sizes: tuple[int, ...]) -> list[NDArray[Any]]:
     return [draw_runs(rng, size, RESAMPLES) for size in sizes]
 
 
-class Aggregates(NamedTuple):
+@dataclass(frozen=True)
+class Aggregates:
     """Conditions by the statistics of the field, aggregated over tasks."""
 
     title: str
@@ -97,13 +99,25 @@ class Aggregates(NamedTuple):
     """A line for each condition, the reference first."""
     thresholds: Array
     """``(k,)`` scores."""
-    profiles: Mapping[str, Estimate]
-    """By condition, the share of runs above each threshold ``(k,)``."""
-    curves: Mapping[str, Estimate]
-    """By condition, the interquartile mean in each episode of training; empty if it is not measured
-    there."""
     notes: tuple[str, ...]
     """What the columns are."""
+    scores: Mapping[str, Tasks] = field(repr=False)
+    """By condition, the runs of each task."""
+    training: Mapping[str, Tasks] = field(repr=False)
+    """By condition, of each task ``(n_runs, n_episodes)``; empty if it is not measured there."""
+
+    @cached_property
+    def profiles(self) -> dict[str, Estimate]:
+        """By condition, the share of runs above each threshold ``(k,)``."""
+        return {name: _profile(own, self.thresholds) for name, own in self.scores.items()}
+
+    @cached_property
+    def curves(self) -> dict[str, Estimate]:
+        """By condition, the interquartile mean in each episode of training; of many it takes time.
+
+        Empty if it is not measured there.
+        """
+        return {name: _curve(own) for name, own in self.training.items()}
 
 
 def aggregate(contrasts: Contrasts) -> Aggregates:
@@ -136,8 +150,8 @@ def aggregate(contrasts: Contrasts) -> Aggregates:
         title=contrasts.title,
         table=tuple(table),
         thresholds=thresholds,
-        profiles={name: _profile(own, thresholds) for name, own in scores.items()},
-        curves={name: _curve([g.training[name] for g in groups]) for name in trained},
+        scores=scores,
+        training={name: [g.training[name] for g in groups] for name in trained},
         notes=(
             f"{contrasts.title}. Intervals: percentiles, seeds resampled within "
             f"{len(groups)} of {len(contrasts.groups)} tasks.",

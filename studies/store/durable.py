@@ -5,6 +5,7 @@ import hashlib
 import io
 import os
 import stat
+import sys
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -27,6 +28,10 @@ TEAM = "team"
 """The name of what is kept of a trained team, beside those of recorded episodes."""
 
 
+Place = str | os.PathLike[str]
+"""Of a file."""
+
+
 class NotRecordedError(SpecError):
     """A file of recordings is sound, and holds none of this name."""
 
@@ -35,7 +40,7 @@ MOST_BYTES = 2**30
 """Of a file that is read whole."""
 
 
-def check_file(path: Path) -> None:
+def check_file(path: Place) -> None:
     """Refuse what has no end or makes its reader wait: a pipe, a device, a file of a terabyte.
 
     Raises
@@ -43,14 +48,14 @@ def check_file(path: Path) -> None:
     OSError
         If it is such, or is not there.
     """
-    status = path.stat()
+    status = os.stat(path)
     if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
         raise OSError(errno.EINVAL, "is a pipe, a socket or a device, not a file", str(path))
     if status.st_size > MOST_BYTES:
         raise OSError(errno.EFBIG, f"is larger than allowed, {MOST_BYTES} bytes", str(path))
 
 
-def read_bytes(path: Path) -> bytes:
+def read_bytes(path: Place) -> bytes:
     """Return the content of a file.
 
     Raises
@@ -59,7 +64,8 @@ def read_bytes(path: Path) -> bytes:
         If it is none, see `check_file`, or cannot be read.
     """
     check_file(path)
-    return path.read_bytes()
+    with open(path, "rb", buffering=0) as file:
+        return file.read()
 
 
 def read_text(path: Path) -> str:
@@ -101,11 +107,12 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         if isinstance(error, OSError) and error.filename in (None, str(temporary)):
             error.filename = str(path)  # no other name means anything to the user
         raise
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    if sys.platform != "win32":  # which opens no folders
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
 
 
 def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str:
@@ -118,7 +125,7 @@ def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def sha256(path: Path) -> str | None:
+def sha256(path: Place) -> str | None:
     """Return the SHA-256 of a file; none if it cannot be read."""
     try:
         return hashlib.sha256(read_bytes(path)).hexdigest()

@@ -14,9 +14,11 @@ The view `results` is made for other tools::
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +105,7 @@ class Store:
             f"SELECT {', '.join(Planned._fields)} FROM planned ORDER BY position"
         )
         return tuple(
-            Planned(identity, condition, seed, {int(k): v for k, v in json.loads(kept).items()})
+            Planned(identity, condition, seed, dict(_recorded(kept)))
             for identity, condition, seed, kept in rows
         )
 
@@ -145,16 +147,15 @@ class Store:
     def _damaged_rows(self) -> dict[str, str]:
         """Return by identity whose rows are not what was written, one line each."""
         written = dict(self._db.execute("SELECT identity, sha256 FROM checksums").fetchall())
+        actual = dict(trial_checksums(self._db))
+        damaged = [i for i in actual | written if actual.get(i) != written.get(i)]
+        if not damaged:
+            return {}
         known = "SELECT identity, condition, seed FROM "
         trials = self._db.execute(f"{known} trials UNION ALL {known} planned")
         names = {identity: f"{condition}, seed {seed}" for identity, condition, seed in trials}
-        actual = dict(trial_checksums(self._db))
         path = self.directory / DATABASE
-        return {
-            identity: f"{path}: {names.get(identity, identity)}: rows are damaged"
-            for identity in actual | written
-            if actual.get(identity) != written.get(identity)
-        }
+        return {i: f"{path}: {names.get(i, i)}: rows are damaged" for i in damaged}
 
     def failed(self) -> list[tuple[str, int, str]]:
         """Return condition, seed and traceback of every failed trial."""
@@ -304,11 +305,12 @@ class Store:
     def damage(self) -> dict[str, str]:
         """Return by identity which trials are not as they were written, one line each."""
         damaged = self._damaged_rows()
+        folder = os.fspath(self.directory / "recordings")  # paths of thousands take their time
         query = (
             "SELECT identity, condition, seed, recording_sha256 FROM trials WHERE state = 'done'"
         )
         for identity, condition, seed, written in self._db.execute(query).fetchall():
-            path = self._recordings(identity)
+            path = f"{folder}/{identity}.npz"
             if identity not in damaged and (digest := durable.sha256(path)) != written:
                 what = "is missing" if digest is None else "is damaged"
                 damaged[identity] = f"{path}: {what} ({condition}, seed {seed})"
@@ -367,13 +369,16 @@ class Store:
     @contextmanager
     def _changing(self, *identities: str) -> Iterator[None]:
         """Change trials in one transaction; then note the checksums of some, and how many are."""
-        count = "SELECT count(*) FROM checksums"
+        # Of those named alone: all would be counted anew for every trial.
+        places = ", ".join("?" * len(identities))
+        where = f"WHERE identity IN ({places})" if identities else ""
+        count = f"SELECT count(*) FROM checksums {where}"
         with transaction(self._db):
-            (before,) = self._db.execute(count).fetchone()
+            (before,) = self._db.execute(count, identities).fetchone()
             yield
             for identity in identities:
                 self._insert("checksums", list(trial_checksums(self._db, identity)))
-            (after,) = self._db.execute(count).fetchone()
+            (after,) = self._db.execute(count, identities).fetchone()
             self._db.execute("UPDATE ledger SET trials = trials + ?", (after - before,))
 
     def _insert(self, table: str, rows: list[tuple[object, ...]]) -> None:
@@ -383,3 +388,9 @@ class Store:
         self._db.execute("DELETE FROM trials WHERE identity = ?", (trial.identity,))
         row = (trial.identity, trial.condition, trial.seed, state, error, digest, self._code)
         self._insert("trials", [row])
+
+
+@lru_cache(maxsize=64)
+def _recorded(text: str) -> dict[int, str]:
+    """Return names of recorded episodes by number, of the text that notes them."""
+    return {int(number): name for number, name in json.loads(text).items()}

@@ -38,6 +38,11 @@ class Arrangement(NamedTuple):
     team: Team
     """The agents."""
 
+    @property
+    def measures(self) -> tuple[Measure, ...]:
+        """What is measured of an episode: of the world, then what decisions cost."""
+        return (*measures_of(self.world.measures), *self.team.costs)
+
 
 def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     """Return the world of a condition and its untrained team.
@@ -137,9 +142,7 @@ def check_conditions(
         for condition in conditions:
             where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
             try:
-                measures += [
-                    measures_of(there.world.measures) for there in _arrangements(condition)
-                ]
+                measures += [there.measures for there in _arrangements(condition)]
                 if spec.keep_teams:
                     _check_saved(condition.settings)
             except ValueError as error:

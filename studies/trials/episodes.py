@@ -17,6 +17,9 @@ from ...core.interface.scenario import Transition
 from ..errors import SpecError
 from ..store.database import AFTER, BEFORE
 
+NOTHING: Mapping[str, float] = {}
+"""What decisions cost that ask no function."""
+
 
 class EpisodeRow(NamedTuple):
     """The measurements of one episode."""
@@ -73,8 +76,8 @@ class EpisodeMeter:
         self._steps = 0
         self._return = 0.0
 
-    def add(self, transition: Transition) -> None:
-        """Take in one step.
+    def add(self, transition: Transition, spent: Mapping[str, float] = NOTHING) -> None:
+        """Take in one step, and what the decision cost that led to it.
 
         Raises
         ------
@@ -83,7 +86,8 @@ class EpisodeMeter:
         """
         self._steps += 1
         for measure in self._measures:
-            value = value_at(measure, transition)
+            source = measure.source
+            value = spent[source] if source in spent else value_at(measure, transition)
             before = self._values[measure.name]
             self._values[measure.name] = GATHER[measure.gathering](before, value)
         self._return += float(np.mean(transition.reward))

@@ -20,7 +20,6 @@ from ...core.agents.loop import (
     world_seed,
 )
 from ...core.agents.team import Team
-from ...core.interface.measures import measures_of
 from ...core.interface.plain import as_scenario
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario
@@ -103,7 +102,7 @@ class Session:
         self.world, self.scenario, self.team = self._own
         self._stages = trial.curriculum  # those that the team has not gone through
         self._rows: list[EpisodeRow] = []
-        self._measures = measures_of(self.world.measures)
+        self._measures = self._own.measures
         self._recordings: dict[str, Recording] = {}
         self._watch = Stopwatch()
         self.deciding = self._watch.decisions
@@ -240,14 +239,14 @@ class Session:
         The number of an episode in its row is counted from `counted_from`. If nobody needs to see
         the steps, whole episodes may be run `at_once`, compiled.
         """
-        measures = measures_of(there.world.measures)
+        measures = there.measures
         self._measures = join_measures((self._measures, measures))
         if at_once and self._at_once(there, phase, counted_from, **loop):
             return
         for record in control_loop(there.scenario, there.team, seed=self.trial.seed, **loop):
             if record.step == 0:
                 meter = EpisodeMeter(phase, record.episode - counted_from, measures)
-            meter.add(record.transition)
+            meter.add(record.transition, record.spent)
             for observe in filter(None, observers):
                 observe(record)
             if record.last:

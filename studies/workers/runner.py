@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 import traceback
@@ -150,6 +151,10 @@ def undisturbed() -> Iterator[None]:
 def beginning_processes() -> Iterator[None]:
     """Put off Ctrl-C; the processes begun meanwhile never hear of it: it is for the parent."""
     resource_tracker.ensure_running()  # would unblock the signal when the first process begins
+    if sys.platform == "win32":  # which blocks no signals
+        with undisturbed():
+            yield
+        return
     with undisturbed():
         usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
@@ -200,9 +205,9 @@ def run_trials(
     lost: list[Trial] = []
     with Running(store.directory, workers.processes) as running:
         again = (_alone(trial, run_trial, workers, running) for trial in lost)
-        with closing(workers.arrivals(trials, run_trial, running.begin)) as arriving:
+        arrivals = workers.arrivals(trials, run_trial, running.begin, running.end)
+        with closing(arrivals) as arriving:
             for outcome in chain(arriving, again):
-                running.end(outcome.trial.identity)
                 if outcome.lost:
                     lost.append(outcome.trial)
                 else:
@@ -212,7 +217,8 @@ def run_trials(
 
 def _alone(trial: Trial, run_trial: RunTrial, workers: Workers[F], running: Running) -> Outcome:
     for _ in range(ATTEMPTS):
-        with closing(workers.arrivals([trial], run_trial, running.begin)) as arriving:
+        arrivals = workers.arrivals([trial], run_trial, running.begin, running.end)
+        with closing(arrivals) as arriving:
             (outcome,) = arriving
         if not outcome.lost:
             return outcome
@@ -285,7 +291,11 @@ class Workers(ABC, Generic[F]):
         """End the trials that are running."""
 
     def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
+        self,
+        trials: Sequence[Trial],
+        run_trial: RunTrial,
+        started: Callable[[str], None],
+        ended: Callable[[str], None],
     ) -> Generator[Outcome]:
         """Run trials and yield what becomes of each, in whatever order; closing stops them.
 
@@ -297,19 +307,25 @@ class Workers(ABC, Generic[F]):
             Runs one of them; a module-level function, since workers import it by name.
         started
             Called with the identity of each trial when it is handed to a worker.
+        ended
+            Called with it when the trial has come back, before a next one is handed out.
         """
         waiting = iter(trials)
         left = len(trials)
         running: dict[F, Trial] = {}
         finished: SimpleQueue[F] = SimpleQueue()
+
+        def hand_out() -> None:
+            for trial in islice(waiting, max(self.processes - len(running), 0)):
+                with beginning_processes():
+                    future = self.submit(run_trial, trial)
+                    running[future] = trial
+                started(trial.identity)
+                future.add_done_callback(finished.put)
+
         try:
             while left:
-                for trial in islice(waiting, max(self.processes - len(running), 0)):
-                    with beginning_processes():
-                        future = self.submit(run_trial, trial)
-                        running[future] = trial
-                    started(trial.identity)
-                    future.add_done_callback(finished.put)
+                hand_out()
                 try:
                     future = finished.get(timeout=POLL)
                 except Empty:
@@ -318,8 +334,10 @@ class Workers(ABC, Generic[F]):
                 if outcome is None:
                     future.add_done_callback(finished.put)
                     continue
-                del running[future]
+                ended(running.pop(future).identity)
+                del future  # else a Dask worker keeps its result, which is run again if it dies
                 left -= 1
+                hand_out()  # the worker goes on while this one is kept
                 yield outcome
         finally:
             if running:

@@ -30,6 +30,16 @@ def check_jobs(jobs: int) -> None:
         raise SpecError(f"--jobs {jobs}: must be at least 1")
 
 
+def check_workers(backend: Backend, jobs: int | None, address: str | None) -> None:
+    """Refuse workers that cannot be, before anything is written; see `start_workers`."""
+    if jobs is not None:
+        check_jobs(jobs)
+    if backend not in (known := get_args(Backend)):
+        raise SpecError(f"backend = {backend!r}: {closest(backend, known)}")
+    if backend == "loky" and address is not None:
+        raise SpecError(f"--address {address}: is for --backend dask only")
+
+
 @contextmanager
 def start_workers(
     backend: Backend, jobs: int | None, address: str | None, trials: int
@@ -52,14 +62,9 @@ def start_workers(
     SpecError
         If there are none to be had; one line says why.
     """
-    if jobs is not None:
-        check_jobs(jobs)
-    if backend not in (known := get_args(Backend)):
-        raise SpecError(f"backend = {backend!r}: {closest(backend, known)}")
+    check_workers(backend, jobs, address)
     wanted = max(1, min(jobs or cores(), trials))
     if backend == "loky":
-        if address is not None:
-            raise SpecError(f"--address {address}: is for --backend dask only")
         yield LokyWorkers(wanted)
         return
     try:

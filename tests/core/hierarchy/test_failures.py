@@ -27,7 +27,7 @@ def messages(*failures: MessageFailure, hierarchy: Hierarchy = CHAIN) -> Message
 
 
 def heard(made: Messages, agent: int, decided: np.ndarray = DECIDED) -> dict[int, int]:
-    senders, actions = made.heard(agent, decided)
+    senders, actions, _ = made.heard(agent, decided)
     return dict(zip(senders.tolist(), actions.tolist(), strict=True))
 
 

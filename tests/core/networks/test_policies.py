@@ -224,7 +224,7 @@ def test_what_is_told_is_what_arrives(failure: str, edges: Any) -> None:
         joint[messages.absent(np.arange(3))] = 0
         arriving = np.zeros((3, 2, n_actions))
         for agent in hierarchy.order:
-            senders, actions = messages.heard(agent, joint)
+            senders, actions, _ = messages.heard(agent, joint)
             arriving[agent, senders, actions] = 1.0
         messages.advance(joint)
         assert agents.width == 2 * n_actions, "of a and b, who decide before another"

@@ -44,7 +44,8 @@ def test_what_a_run_has_handed_out_is_running(study):
         save(store, made_up.TRIALS[5], made_up.measure(made_up.TRIALS[5]), 4.0)
         assert read(study).running == ()
         running.end(made_up.TRIALS[5].identity)
-        assert look(study)[1] == {}
+        running.begin(made_up.TRIALS[4].identity)
+        assert [*look(study)[1]] == [made_up.TRIALS[4].identity]
     assert look(study) is None
 
 

@@ -19,7 +19,7 @@ class Here:
 
     processes = 1
 
-    def arrivals(self, trials, measure, started):
+    def arrivals(self, trials, measure, started, ended):
         for trial in trials:
             started(trial.identity)
             yield attempt(measure, trial)

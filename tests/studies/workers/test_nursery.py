@@ -210,9 +210,9 @@ def test_a_trial_that_dies_costs_no_other(dies, reason, tmp_path, capsys) -> Non
 def test_of_a_worker_it_is_told_too_and_nothing_that_loky_advises() -> None:
     workers = LokyWorkers(1)
     trial = next(t for t in made_up.TRIALS if (t.condition, t.seed) == ("frozen", 1))
-    (outcome,) = workers.arrivals([trial], made_up_harm.exits, lambda _: None)
+    (outcome,) = workers.arrivals([trial], made_up_harm.exits, print, print)
     assert (outcome.lost, outcome.error) == (True, "exit code 3")
-    (outcome,) = workers.arrivals([trial], made_up_harm.crashes, lambda _: None)
+    (outcome,) = workers.arrivals([trial], made_up_harm.crashes, print, print)
     assert (outcome.lost, outcome.error) == (True, "killed by SIGSEGV")
 
 

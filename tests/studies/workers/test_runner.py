@@ -146,16 +146,21 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path, monkeypatch):
 
 
 def test_never_more_trials_are_said_to_run_than_there_are_processes():
-    started, left = [], set(made_up.TRIALS)
-    for arrival in LokyWorkers(2).arrivals(made_up.TRIALS, made_up.slow, started.append):
-        left.remove(arrival.trial)
-        running = [trial for trial in left if trial.identity in started]
-        assert len(running) == min(1, len(left))  # the next is handed out once this one is kept
+    started, running = [], set()
+
+    def begin(identity):
+        started.append(identity)
+        running.add(identity)
+        assert len(running) <= 2
+
+    arriving = LokyWorkers(2).arrivals(made_up.TRIALS, made_up.slow, begin, running.remove)
+    for at, _ in enumerate(arriving, 1):  # the next is handed out before this one is kept
+        assert len(running) == min(2, len(made_up.TRIALS) - at)
     assert len(started) == len(set(started)) == len(made_up.TRIALS)
 
 
 def test_whoever_stops_waits_for_no_trial():
-    arriving = LokyWorkers(2).arrivals(made_up.TRIALS, made_up.endless, lambda _: None)
+    arriving = LokyWorkers(2).arrivals(made_up.TRIALS, made_up.endless, print, print)
     assert {next(arriving).error, next(arriving).error} == {None}
     begin = time.monotonic()
     arriving.close()

@@ -1,0 +1,277 @@
+"""Functions as agents: what they are given, what they may answer, what they say and cost."""
+
+import asyncio
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from acting import look
+
+from nested_agents.core.agents.loop import policy_seed
+from nested_agents.core.agents.team import Team
+from nested_agents.core.functions.agents import FunctionAgents
+from nested_agents.core.functions.plain import Caller, CallError
+from nested_agents.core.functions.replies import read_reply
+from nested_agents.core.hierarchy.failures import (
+    DelayedMessages,
+    LostMessages,
+    NoisyMessages,
+    ReparentedAgents,
+)
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.learners import LEARNERS
+from nested_agents.core.plugins.sources import Sources
+from nested_agents.scenarios.line_up import LineUpSettings
+
+SOURCE = '''
+import asyncio, time
+CALLS = []
+def plain(observation, told, rng, agent, actions, step, *, far: float = 0.5):
+    """Halts near the line."""
+    CALLS.append((agent, dict(observation), dict(told), float(rng.random()), actions, step, far))
+    return {"action": "zero", "message": {"from": agent}, "costs": {"tokens": 2}}
+def many(observations, told, rngs, agents):
+    CALLS.append(list(agents))
+    return [k % 2 for k in range(len(observations))]
+async def slow(observation, told, agent):
+    CALLS.append(1)
+    await asyncio.sleep(0.05)
+    return "zero"
+class Counts:
+    """Remembers how often it was asked."""
+    def __init__(self, *, first: int = 0):
+        self.asked = first
+    def decide(self, observation):
+        self.asked += 1
+        return self.asked - 1
+def jumps(observation): return "jump"
+def fails(observation, agent):
+    if agent == "cart2": raise ZeroDivisionError("so")
+    return 0
+def leaves(observation): raise SystemExit
+def hangs(observation):
+    while True:
+        try: time.sleep(10)
+        except Exception: pass
+async def hangs_async(observation): await asyncio.sleep(10)
+def odd(observation, goal): return 0
+def short(observations): return [0]
+def own_timeout(observation): raise TimeoutError("the network's")
+def echo(observation, told, agent, step):
+    CALLS.append((step, agent, {k: tuple(m) for k, m in told.items()}))
+    return {"action": step % 4, "message": f"{agent}{step}"}
+'''
+
+
+def team_of(name: str, n: int = 3, hierarchy: Hierarchy | None = None, failures=(), **more):
+    """A team of a function of `SOURCE`, its world, and what it notes."""
+    sources = Sources(texts={"f.py": SOURCE})
+    with sources.active():
+        settings = LEARNERS.parsed(f"f.py:{name}", **more)
+        world = LineUpSettings(carts=n).build()
+        hierarchy = hierarchy or Hierarchy(world.agents, list(pairwise(world.agents)))
+        team = Team(settings, world, hierarchy, policy_seed(3), failures)
+        calls = sources.load("f.py:CALLS")
+        calls.clear()
+    team.begin_world(0, 0)
+    return team, world, calls
+
+
+def test_a_function_is_given_names_and_is_told_by_name() -> None:
+    team, world, calls = team_of("plain", far=0.25, costs={"tokens": "1"})
+    states = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
+    decision = team.act(look(world, states))
+    assert decision.joint_action.tolist() == [3, 3, 3]
+    agent, seen, told, _, actions, step, far = calls[2]
+    assert (agent, seen) == ("cart3", {"distance": 0.5, "lead": 0.6})
+    assert {k: (m.action, m.content) for k, m in told.items()} == {
+        "cart1": ("zero", {"from": "cart1"}),
+        "cart2": ("zero", {"from": "cart2"}),
+    }
+    assert (actions, step, far) == (world.action_set.names, 0, 0.25)
+    # three messages of {"from":"cart1"}, 16 bytes each; two tokens each
+    assert team.spent == {"calls": 3, "messages": 3, "message_bytes": 48, "tokens": 6}
+
+
+def test_random_numbers_follow_from_agent_step_and_episode_alone() -> None:
+    def drawn(hierarchy: Hierarchy | None) -> dict:
+        team, world, calls = team_of("plain", hierarchy=hierarchy, costs={"tokens": "1"})
+        for episode in (0, 1):
+            team.begin_world(0, episode)
+            for _ in range(2):
+                team.act(look(world))
+        return {(k // 6, call[0], call[5]): call[3] for k, call in enumerate(calls)}
+
+    chain = drawn(None)
+    names = [f"cart{i}" for i in (1, 2, 3)]
+    assert chain == drawn(Hierarchy(names, [("cart3", "cart1")]))
+    assert len(set(chain.values())) == 12
+
+
+def test_several_agents_are_asked_in_one_call_if_the_function_says_so() -> None:
+    names = ["cart1", "cart2", "cart3"]
+    star = Hierarchy(names, [("cart1", "cart2"), ("cart1", "cart3")])
+    team, world, calls = team_of("many", hierarchy=star)
+    assert team.act(look(world)).joint_action.tolist() == [0, 0, 1]
+    assert calls == [["cart1"], ["cart2", "cart3"]]
+
+
+@pytest.mark.parametrize(("at_once", "least"), [(8, 0.05), (2, 0.2)])
+def test_async_calls_run_at_once_up_to_a_limit(at_once: int, least: float) -> None:
+    names = [f"cart{k + 1}" for k in range(8)]
+    team, world, calls = team_of("slow", 8, Hierarchy(names, []), calls_at_once=at_once)
+    begin = time.perf_counter()
+    assert team.act(look(world)).joint_action.tolist() == [3] * 8
+    spent = time.perf_counter() - begin
+    assert len(calls) == 8
+    assert least <= spent < 0.39
+
+
+def test_an_object_remembers_for_an_episode() -> None:
+    team, world, _ = team_of("Counts", first=1)
+    assert [team.act(look(world)).joint_action.tolist() for _ in range(2)] == [[1] * 3, [2] * 3]
+    team.begin_world(0, 1)
+    assert team.act(look(world)).joint_action.tolist() == [1] * 3
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "complaint"),
+    [
+        ("jumps", {}, r"agent 'cart1': f\.py:jumps returns the action 'jump', allowed: increase"),
+        ("fails", {}, r"agent 'cart2': f\.py:fails raises ZeroDivisionError: so in line \d+ of"),
+        ("leaves", {}, r"agent 'cart1': f\.py:leaves raises SystemExit"),
+        ("hangs", {"timeout": 0.1}, r"agent 'cart1': .* within learner\.timeout = 0\.1 s"),
+        ("hangs_async", {"timeout": 0.1}, r"agent 'cart1': .* within learner\.timeout = 0\.1 s"),
+        ("own_timeout", {}, r"agent 'cart1': .* raises TimeoutError: the network's"),
+        ("short", {}, r"agent 'cart1': .* allowed: a list of 3 answers"),
+        ("plain", {}, r"agent 'cart1': f\.py:plain returns costs\.tokens, learner\.costs names no"),
+    ],
+)
+def test_what_a_function_does_wrong_names_the_agent(name, settings, complaint) -> None:
+    alone = Hierarchy(["cart1", "cart2", "cart3"], [])
+    team, world, _ = team_of(name, hierarchy=alone, **settings)
+    with pytest.raises(CallError, match=complaint) as caught:
+        team.act(look(world))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_function_that_takes_something_else_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"parameter 'goal' of decide, allowed: observation, told"):
+        team_of("odd")
+
+
+@pytest.mark.parametrize(
+    ("answer", "complaint"),
+    [
+        (True, "the action True"),
+        (2, "the action 2"),
+        (-1, "the action -1"),
+        (None, "the action None"),
+        ({"message": "so"}, "the action None"),
+        ({"action": 0, "says": 1}, "answers with 'says'"),
+        ({"action": 0, "message": {1, 2}}, "allowed: what JSON holds"),
+        ({"action": 0, "message": float("nan")}, "allowed: what JSON holds"),
+        ({"action": 0, "costs": 3}, "numbers by name"),
+        ({"action": 0, "costs": {"t": -1}}, r"costs\.t = -1, allowed: numbers from 0"),
+        ({"action": 0, "costs": {"t": "many"}}, r"costs\.t = 'many'"),
+        ({"action": 0, "costs": {"x": 1}}, r"costs\.x, learner\.costs names t"),
+    ],
+)
+def test_answers_that_mean_nothing_are_refused(answer, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        read_reply(answer, ("left", "right"), {"t": "1"})
+
+
+def test_neighbours_are_told_what_was_said_in_the_decision_before() -> None:
+    names = ["cart1", "cart2", "cart3"]
+    beside = Hierarchy(names, [], [("cart1", "cart2")])
+    team, world, calls = team_of("echo", hierarchy=beside)
+    for _ in range(2):
+        team.act(look(world))
+    assert calls[:3] == [(0, name, {}) for name in names]
+    assert calls[3:] == [
+        (1, "cart1", {"cart2": ("increase", "cart20")}),
+        (1, "cart2", {"cart1": ("increase", "cart10")}),
+        (1, "cart3", {}),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("failure", "told"),
+    [
+        (LostMessages(agents="cart1"), [{}, {}, {}]),
+        (
+            DelayedMessages(agents="cart1", decisions=2),
+            [{}, {}, {"cart1": ("increase", "cart10")}],
+        ),
+    ],
+)
+def test_a_content_has_the_fate_of_its_message(failure, told) -> None:
+    team, world, calls = team_of("echo", 2, failures=[failure])
+    for _ in range(3):
+        team.act(look(world))
+    assert [own for _, agent, own in calls if agent == "cart2"] == told
+
+
+def test_nobody_can_read_what_noise_has_replaced() -> None:
+    team, world, calls = team_of("echo", 2, failures=[NoisyMessages(agents="*", probability=1.0)])
+    for _ in range(40):
+        team.act(look(world))
+    heard = [(step, own["cart1"]) for step, agent, own in calls if agent == "cart2"]
+    names = world.action_set.names
+    is_same = [action == names[step % 4] for step, (action, _) in heard]
+    assert 0 < sum(is_same) < 40
+    assert [content is not None for _, (_, content) in heard] == is_same
+
+
+def test_delays_of_neighbours_add_to_the_decision_before() -> None:
+    beside = Hierarchy(["cart1", "cart2"], [], [("cart1", "cart2")])
+    failure = DelayedMessages(agents="cart1", decisions=1)
+    team, world, calls = team_of("echo", 2, beside, [failure])
+    for _ in range(3):
+        team.act(look(world))
+    heard = [own for _, agent, own in calls if agent == "cart2"]
+    assert heard == [{}, {}, {"cart1": ("increase", "cart10")}]
+
+
+def test_actions_alone_are_heard_if_the_receiver_wants_no_more() -> None:
+    team, world, calls = team_of("echo", 2, hears="actions")
+    team.act(look(world))
+    assert calls[1][2] == {"cart1": ("increase", None)}
+    assert team.spent == {"calls": 2, "messages": 1, "message_bytes": 0}
+
+
+def test_whoever_has_another_superior_is_told_what_that_one_decides() -> None:
+    names = ["cart1", "cart2", "cart3"]
+    star = Hierarchy(names, [("cart1", "cart2"), ("cart1", "cart3")])
+    reparented = ReparentedAgents(agents="cart3", superior="cart2")
+    team, world, calls = team_of("echo", hierarchy=star, failures=[reparented])
+    for _ in range(2):
+        team.act(look(world))
+    # cart2 has decided `decrease`, not the neutral action
+    assert calls[-1][2]["cart2"] == ("decrease", "cart21")
+
+
+def test_functions_and_learners_are_one_team() -> None:
+    with Sources(texts={"f.py": SOURCE}).active():
+        parts = [
+            {"agents": "cart1", "learner": {"kind": "f.py:Counts"}},
+            {"agents": "*", "learner": {"kind": "td-lambda"}},
+        ]
+        settings = LEARNERS.model("mixed").model_validate({"kind": "mixed", "parts": parts})
+        world = LineUpSettings(carts=3).build()
+        chain = Hierarchy(world.agents, list(pairwise(world.agents)))
+        team = Team(settings, world, chain, policy_seed(0))
+    seen = look(world, world.reset(0))
+    assert [int(team.act(seen).joint_action[0]) for _ in range(3)] == [0, 1, 2]
+    assert isinstance(team.parts[0], FunctionAgents)
+    team.restore(team.arrays())
+
+
+def test_calls_in_another_thread_have_no_alarm() -> None:
+    caller = Caller("f", lambda observation: 1, {})
+    query = object.__new__(type("Asked", (), {}))
+    query.__dict__.update(agent="a", observation={})
+    answers = asyncio.run(asyncio.to_thread(lambda: list(caller.answers([query], 1.0, 1))))
+    assert [answer for _, answer in answers] == [1]
