@@ -20,6 +20,7 @@ SCENARIOS = SettingsRegistry(
         "box-pushing": f"{__name__}.box_pushing.config:BoxPushingSettings",
         "matrix-game": f"{__name__}.matrix_games.scenario:MatrixGameSettings",
         "team-game": f"{__name__}.matrix_games.team_games:TeamGameSettings",
+        "signals": f"{__name__}.signals.scenario:SignalsSettings",
         "kinematic-chain": f"{__name__}.kinematic_chain.config:KinematicChainSettings",
         "line-up": f"{__name__}.line_up:LineUpSettings",
         "gymnasium": f"{__name__}.adapters.settings:GymnasiumSettings",

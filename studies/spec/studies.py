@@ -12,6 +12,7 @@ NAMES = (
     "hierarchies",
     "edges",
     "fit",
+    "signals",
     "games",
     "related",
     "peers",

@@ -1,0 +1,1 @@
+"""Private information: every agent has a noisy signal of a state that all must name."""
