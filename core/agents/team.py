@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
 
 A = TypeVar("A", bound=Agents[Any])
+MESSAGES = Measure("messages", "messages", gathering="sum", better="lower", least=0.0)
+"""What of a decision's cost is counted here, where agents say more than actions: the messages that
+have arrived, whatever agents are of."""
 
 
 class Team:
@@ -92,6 +95,7 @@ class Team:
         self.parts = tuple(parts)
         self.costs = costs_of(parts)
         self.spent: Mapping[str, float] = {}
+        self._messages = 0
         self._has_contents = any(part.has_contents for part in parts)
         self.messages = Messages(
             hierarchy, failures, len(world.action_set), has_contents=self._has_contents
@@ -199,7 +203,7 @@ class Team:
         decided = joint.T  # a view with the agents first, however many worlds there are
         fail = bool(self.messages.failures)
         gone = self.messages.gone
-        some_left = bool(gone.any())
+        some_left = fail and bool(gone.any())
         if some_left:
             joint[..., gone] = self._joint_of_left()[gone]
         for part, agents, receivers, senders in self._slots:
@@ -214,6 +218,7 @@ class Team:
             else:
                 turn = Turn(agents, receivers, senders, decided[senders].T)
             decided[agents] = self.parts[part].decide(inputs[part], turn).T
+            self._messages += len(turn.senders)
             if fail:
                 joint[self.messages.absent(agents)] = self.action_set.neutral
         return joint
@@ -239,6 +244,8 @@ class Team:
     def _spent(self, inputs: tuple[Any, ...]) -> Mapping[str, float]:
         """Return what a decision has cost, by the names of `costs`."""
         total = {measure.name: 0.0 for measure in self.costs}
+        total[MESSAGES.name] = float(self._messages)
+        self._messages = 0
         for part, own in zip(self.parts, inputs, strict=True):
             for name, value in part.spent(own).items():
                 total[name] += value
@@ -321,6 +328,8 @@ def costs_of(parts: Sequence[Agents[Any]]) -> tuple[Measure, ...]:
         If two parts give the same cost in different units; one line.
     """
     by_name: dict[str, Measure] = {}
+    if any(part.has_contents for part in parts):
+        by_name[MESSAGES.name] = MESSAGES
     for part in parts:
         for measure in part.costs:
             known = by_name.setdefault(measure.name, measure)

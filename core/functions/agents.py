@@ -26,10 +26,9 @@ from .settings import FunctionSettings
 
 COUNTED = (
     Measure("calls", "calls", gathering="sum", better="lower", least=0),
-    Measure("messages", "messages", gathering="sum", better="lower", least=0),
     Measure("message_bytes", "size of messages", "B", gathering="sum", better="lower", least=0),
 )
-"""What is measured of functions without being said: answers, messages that arrived, their size."""
+"""What is measured of functions without being said: answers, and the size of contents."""
 
 
 @dataclass
@@ -40,10 +39,8 @@ class FunctionInputs:
     """``(n, d)`` the states that all agents are in."""
     replies: dict[int, Reply] = field(default_factory=dict)
     """What each has answered, by agent."""
-    messages: int = 0
-    """How many messages arrived with a content, or as an action alone."""
     message_bytes: int = 0
-    """Size of their contents [B]."""
+    """Size of all contents that have arrived [B]."""
 
 
 class FunctionAgents(Agents[FunctionInputs]):
@@ -128,7 +125,6 @@ class FunctionAgents(Agents[FunctionInputs]):
                 message = message._replace(content=deepcopy(content))
             told[receiver][self._agents[sender]] = message
             inputs.message_bytes += size
-        inputs.messages += len(turn.senders)
         return told
 
     def contents(self, inputs: FunctionInputs) -> Mapping[int, object]:
@@ -139,7 +135,7 @@ class FunctionAgents(Agents[FunctionInputs]):
     def spent(self, inputs: FunctionInputs) -> Mapping[str, float]:
         """Return what all answers of a decision have cost."""
         total = {measure.name: 0.0 for measure in self.costs}
-        counts = (len(inputs.replies), inputs.messages, inputs.message_bytes)
+        counts = (len(inputs.replies), inputs.message_bytes)
         for measure, count in zip(COUNTED, counts, strict=True):
             if measure.name not in self.settings.costs:
                 total[measure.name] = float(count)

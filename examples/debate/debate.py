@@ -19,7 +19,10 @@ ANSWERS = ("yes", "no")
 
 
 class Debate:
-    """A question, drafts of its answer that may be wrong, and rounds of answers."""
+    """A question, drafts of its answer that may be wrong, and rounds of answers.
+
+    An agent is paid 1 in every round in which it is right.
+    """
 
     class Settings(na.ScenarioSettings):
         """The ``[scenario]`` table of a spec."""
@@ -30,6 +33,8 @@ class Debate:
         """Error rate of the first agent; between it and the last one rates rise evenly."""
         greatest_error: float = 0.4
         """Error rate of the last agent."""
+        leader_error: float | None = None
+        """Error rate of the first agent, if it is another one."""
         speaks: Literal["most", "last", "all"] = "most"
         """Whose answer is the team's: that of most, of the last agent, or of all: then the team is
         wrong as soon as one of them is."""
@@ -48,6 +53,8 @@ class Debate:
         draft = na.Variable("draft", "1", 0, 1, centres=(0.0, 1.0), labels=ANSWERS)
         self.state_space = na.StateSpace("debate", (draft,), 1)
         self.errors = np.linspace(settings.least_error, settings.greatest_error, n)
+        if settings.leader_error is not None:
+            self.errors[0] = settings.leader_error
         self.speaks = settings.speaks
 
     def reset(self, seed, episode=0):
@@ -69,7 +76,7 @@ class Debate:
             "wrong": float(wrong.mean()),
             "amplification": error / float(self.errors.mean()),
         }
-        return na.Transition(self.drafts, 1.0 - error, False, False, info)
+        return na.Transition(self.drafts, (~wrong).astype(float), False, False, info)
 
 
 def team_errors(wrong, speaks):
@@ -89,6 +96,11 @@ def answer(observation, told, actions):
     same = said.count(draft)
     other = actions[1 - actions.index(draft)]
     return {"action": draft if 2 * same >= len(said) else other, "message": len(said)}
+
+
+def lead(observation, actions):
+    """Answer the own draft, as a leader that knows better."""
+    return actions[int(observation["draft"])]
 
 
 def exact(hierarchy, errors, speaks="most", rounds=1):
