@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -312,8 +313,9 @@ def test_tracked_files_configure_no_index(tracked: list[Path]) -> None:
     assert found == []
 
 
-def test_the_lock_has_hashes_and_no_host() -> None:
-    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", ["requirements.lock", "box2d.lock"])
+def test_the_locks_have_hashes_and_no_host(name: str) -> None:
+    lock = (ROOT / name).read_text(encoding="utf-8")
     assert "://" not in lock
     pinned = re.findall(r"^[a-z0-9][\w.-]*==\S+.*(?:\n    --hash=.*)*", lock, re.MULTILINE)
     assert pinned
@@ -324,30 +326,39 @@ def test_host_naming_locks_are_not_tracked(tracked: list[Path]) -> None:
     assert [p.name for p in tracked if p.name == "uv.lock" or p.name.startswith("pylock")] == []
 
 
-@pytest.mark.parametrize(
-    ("environment", "complaint"),
-    [
-        ({"PYTHON": "no-such-python"}, "needs python3 >= 3.11, found none"),
-        ({"CXX": "no-such-compiler"}, "needs a C++ compiler (no-such-compiler)"),
-    ],
-)
-def test_dev_says_in_one_line_what_the_machine_lacks(
-    tmp_path: Path, environment: dict[str, str], complaint: str
-) -> None:
-    for name in ("dev", "pyproject.toml", "requirements.lock"):
+def test_dev_says_in_one_line_what_the_machine_lacks(tmp_path: Path) -> None:
+    for name in ("dev", "pyproject.toml", "requirements.lock", "box2d.lock"):
         shutil.copy(ROOT / name, tmp_path)
     run = subprocess.run(
         [tmp_path / "dev", "setup"],
-        env={**os.environ, **environment},
+        env={**os.environ, "PYTHON": "no-such-python"},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
         check=False,
     )
     assert (run.returncode, run.stdout) == (2, "")
-    assert run.stderr.startswith(f"dev: {complaint}")
+    assert run.stderr.startswith("dev: needs python3 >= 3.11, found none")
     assert run.stderr.count("\n") == 1
     assert not (tmp_path / ".venv").exists()
+
+
+@pytest.mark.parametrize(
+    ("compiler", "python", "missing"),
+    [
+        ("true", sys.executable, ""),
+        ("no-such-compiler", sys.executable, "C++ compiler (no-such-compiler)"),
+        ("true", "false", "Python headers (Python.h; Debian has them in python3-dev)"),
+    ],
+)
+def test_dev_knows_what_it_takes_to_build_box2d(compiler: str, python: str, missing: str) -> None:
+    (function,) = re.findall(
+        r"^lacking\(\) {.*?^}", (ROOT / "dev").read_text("utf-8"), re.DOTALL | re.MULTILINE
+    )
+    line = ["sh", "-c", f'{function}\nlacking "$1"', "sh", python]
+    environment = {**os.environ, "CXX": compiler}
+    run = subprocess.run(line, env=environment, capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == missing
 
 
 def test_dev_refuses_an_unknown_command() -> None:

@@ -134,6 +134,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             and not placement.messages_fail
             and all_hear_all(hierarchy)
         )
+        self._neutral = np.full(n, self.action_set.neutral)
+        own_rows = dict(zip(self.members.tolist(), self.rows.tolist(), strict=True))
+        self._row_of = [own_rows.get(agent) for agent in range(n)]
         self.explorer = as_explorer(settings.exploration.build(n))
         self.rng = np.random.Generator(np.random.PCG64(placement.seed))
         self.seen: FloatArray = np.ones((n, n_actions))
@@ -227,9 +230,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             left = np.hstack([left, nobody])
         prediction = None if self.settings.values_actions else self.foresight.predict(seen)
         theta = self.learner.theta
-        weights = [UNKNOWN] * len(self.hierarchy)
-        for agent, row in zip(self.members.tolist(), self.rows.tolist(), strict=True):
-            weights[agent] = theta[row]
+        weights = [UNKNOWN if row is None else theta[row] for row in self._row_of]
         return FuzzyInputs(
             left=left,
             previous=seen.previous if self.settings.decision.unseen == "last" else None,
@@ -251,7 +252,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             return None
         first = Deliberation(
             agent=self.hierarchy.order[0],
-            joint_action=np.full(n, self.action_set.neutral),
+            joint_action=self._neutral.copy(),
             prediction=inputs.prediction,
             weights=inputs.weights,
             frequencies=inputs.frequencies,
@@ -275,10 +276,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
     def _choose(self, inputs: FuzzyInputs, agent: int, senders: IntArray, actions: IntArray) -> int:
         """Return the action of an agent that has been told those of others."""
         assert self.evaluator is not None
-        if inputs.previous is None:
-            known = np.full(len(self.hierarchy), self.action_set.neutral)
-        else:
-            known = inputs.previous.copy()
+        known = (self._neutral if inputs.previous is None else inputs.previous).copy()
         known[senders] = actions
         if self._senders:
             told = known[self._senders[agent]]

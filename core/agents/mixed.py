@@ -1,8 +1,9 @@
 """Teams of several kinds of agents: who is of which, as settings of a learner.
 
 Every part of a team has settings of its own. An agent is of the first part that names it, by its
-name or a pattern of it, its role, its body, or its level in the hierarchy (``level1`` is the
-first). Values decide of agents of one part only: nobody knows the weights of another kind.
+name, its role, its body, or its level in the hierarchy (``level1`` is the first), or by a pattern
+of these. Two parts may reach for an agent by a pattern, ``*`` for the rest, but only one may name
+it. Values decide of agents of one part only: nobody knows the weights of another kind.
 """
 
 from __future__ import annotations
@@ -58,10 +59,11 @@ class MixedSettings(TeamSettings):
         Raises
         ------
         ValueError
-            If an agent is of no part, or a part has no agents; one line.
+            If an agent is of no part or of two, or a part has no agents; one line.
         """
         names = _names_of(scenario, hierarchy)
-        part_of = [self._part_named(own) for own in names]
+        named = zip(scenario.agents, names, strict=True)
+        part_of = [self._part_named(agent, own) for agent, own in named]
         if None in part_of:
             nobody = scenario.agents[part_of.index(None)]
             raise ValueError(f"learner.parts: nobody decides for agent {nobody!r}")
@@ -77,7 +79,16 @@ class MixedSettings(TeamSettings):
             kinds.append(MembersOf(own, part.learner))
         return kinds
 
-    def _part_named(self, names: Sequence[str]) -> int | None:
+    def _part_named(self, agent: str, names: Sequence[str]) -> int | None:
+        """Return the part of an agent that is called by any of some names."""
+        by_name = [k for k, part in enumerate(self.parts) if {*part.agents} & {*names}]
+        if len(by_name) > 1:
+            first, second = by_name[:2]
+            raise ValueError(
+                f"learner.parts[{second}].agents = {list(self.parts[second].agents)}: agent "
+                f"{agent!r} is of learner.parts[{first}] already; a pattern such as '*' names "
+                "those that are left"
+            )
         for k, part in enumerate(self.parts):
             if any(fnmatchcase(name, pattern) for name in names for pattern in part.agents):
                 return k

@@ -188,6 +188,7 @@ class Team:
         """Let the agents decide, turn by turn; each is told what those above it have decided."""
         worlds = seen.present.shape[:-2]
         joint = np.full((*worlds, len(self.hierarchy)), self.action_set.neutral)
+        decided = joint.T  # a view with the agents first, however many worlds there are
         fail = bool(self.messages.failures)
         for part, agents, receivers, senders in self._slots:
             if self.parts[part].has_contents:
@@ -195,8 +196,8 @@ class Team:
             elif fail:
                 turn = self.messages.failed_turn(agents, joint)
             else:
-                turn = Turn(agents, receivers, senders, joint[..., senders])
-            joint[..., agents] = self.parts[part].decide(inputs[part], turn)
+                turn = Turn(agents, receivers, senders, decided[senders].T)
+            decided[agents] = self.parts[part].decide(inputs[part], turn).T
             if fail:
                 joint[self.messages.absent(agents)] = self.action_set.neutral
         return joint

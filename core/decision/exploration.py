@@ -198,6 +198,7 @@ class Bursts(Explorer):
         # The episode, then per agent: decisions left in its burst, the action held.
         self.memory: FloatArray = np.zeros(1 + 2 * n_agents)
         self.memory[0] = -1.0
+        self._of_episode = (np.nan, 0.0, 0.0)
 
     @property
     def rate(self) -> float:
@@ -212,8 +213,12 @@ class Bursts(Explorer):
         Starting with probability p a burst of mean length l makes l p / (1 - p + l p) of all
         decisions explorative; solved for p at the wanted rate.
         """
-        length, rate = self.settings.length, self.rate
-        return Exploring(self.memory, rate / (length - rate * (length - 1.0)), 1.0 / length)
+        episode = float(self.memory[0])
+        if self._of_episode[0] != episode:
+            length = self.settings.length
+            rate = self.rate
+            self._of_episode = episode, rate / (length - rate * (length - 1.0)), 1.0 / length
+        return Exploring(self.memory, *self._of_episode[1:])
 
     def begin_episode(self) -> None:
         """Count the episode and end every burst."""

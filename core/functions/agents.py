@@ -17,10 +17,10 @@ from ..hierarchy.turns import Turn
 from ..interface.agents import Agents, Memory, Placement
 from ..interface.experience import Observation
 from ..interface.measures import Measure
-from ..learners import LEARNERS
 from ..numerics import AnyArray, FloatArray, IntArray
-from .plain import Caller, CallError, HeardMessage, Query
-from .replies import Reply, read_reply
+from .asking import Asking
+from .plain import HeardMessage, Query
+from .replies import Reply
 from .settings import FunctionSettings
 
 COUNTED = (
@@ -71,9 +71,7 @@ class FunctionAgents(Agents[FunctionInputs]):
         self._agents = tuple(scenario.agents)
         self._actions = scenario.action_set.names
         self._variables = [variable.name for variable in scenario.state_space.variables]
-        own = type(settings).model_fields.keys() - FunctionSettings.model_fields.keys()
-        named = {name: value for name, value in settings if name in own}
-        self._caller = Caller(settings.kind, LEARNERS.find(settings.kind), named)
+        self._asking = Asking(settings, self._actions)
         self.rng = np.random.Generator(np.random.PCG64(placement.seed))
         self._key = placement.seed.generate_state(2, np.uint64)
         counted = [measure for measure in COUNTED if measure.name not in settings.costs]
@@ -90,7 +88,7 @@ class FunctionAgents(Agents[FunctionInputs]):
         """Begin an episode: nobody remembers the one before."""
         self._episode = episode
         self._step = 0
-        self._caller.begin()
+        self._asking.begin()
 
     def perceive(self, seen: Observation, *, explore: bool) -> FunctionInputs:
         """Return what all see."""
@@ -98,23 +96,18 @@ class FunctionAgents(Agents[FunctionInputs]):
 
     def decide(self, inputs: FunctionInputs, turn: Turn) -> IntArray:
         """Return what some agents answer to what they see and have been told."""
-        queries = {self._agents[agent]: agent for agent in turn.agents.tolist()}
+        agents = turn.agents.tolist()
         told = self._told(inputs, turn)
-        asked = [self._query(inputs, agent, told[agent]) for agent in queries.values()]
-        settings = self.settings
-        for query, answer in self._caller.answers(asked, settings.timeout, settings.calls_at_once):
-            try:
-                reply = read_reply(answer, self._actions, settings.costs)
-            except ValueError as error:
-                raise CallError(f"agent {query.agent!r}: {settings.kind} {error}") from None
-            inputs.replies[queries[query.agent]] = reply
-        return np.array([inputs.replies[agent].action for agent in queries.values()])
+        queries = [self._query(inputs, agent, told[agent]) for agent in agents]
+        inputs.replies |= dict(zip(agents, self._asking.replies(queries), strict=True))
+        return np.array([inputs.replies[agent].action for agent in agents])
 
     def _query(self, inputs: FunctionInputs, agent: int, told: Mapping[str, HeardMessage]) -> Query:
         seen = dict(zip(self._variables, inputs.present[agent].tolist(), strict=True))
         place = [0, agent, self._step, self._episode]
         rng = np.random.Generator(np.random.Philox(counter=place, key=self._key))
-        return Query(self._agents[agent], seen, told, rng, self._actions, self._step)
+        seed = (*self._key.tolist(), *place[1:])
+        return Query(self._agents[agent], seen, told, rng, self._actions, self._step, seed)
 
     def _told(self, inputs: FunctionInputs, turn: Turn) -> dict[int, dict[str, HeardMessage]]:
         """Return the messages of each agent by sender, in agent order, and count them."""

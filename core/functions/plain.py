@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..interface.plain import offered
 from ..plugins import sources
 
 TAKES = ("observation", "told", "rng", "agent", "actions", "step")
@@ -27,6 +28,9 @@ TAKES_MANY = ("observations", "told", "rngs", "agents", "actions", "step")
 """What one may take that decides for several agents at once: lists, an entry for each."""
 SHARED = ("actions", "step")
 """Which of these are the same for all."""
+
+MEMORY = ("memory", "restore")
+"""What an object must have whose answers are recorded."""
 
 
 class HeardMessage(NamedTuple):
@@ -54,6 +58,8 @@ class Query:
     """Names of all actions."""
     step: int
     """Number of the decision in its episode, from 0."""
+    seed: tuple[int, ...] = ()
+    """What its random numbers follow from."""
 
 
 class CallError(ValueError):
@@ -88,7 +94,7 @@ class Caller:
         self._thing = thing
         self._named = dict(named)
         self.is_class = isinstance(thing, type)
-        decide = thing.decide if self.is_class else thing
+        decide = offered(thing, "decide") if self.is_class else thing
         own = [p for p in signature(decide).parameters.values() if p.kind is not p.KEYWORD_ONLY]
         given = [p.name for p in own][self.is_class :]
         self.is_batched = "observations" in given
@@ -142,13 +148,48 @@ class Caller:
                     answer = self._call(query)
                 yield query, answer
 
-    def _function(self, agent: str) -> Callable[..., Any]:
-        """Return what decides for an agent."""
-        if not self.is_class:
-            return self._thing
+    def question(self, query: Query) -> dict[str, Any]:
+        """Return all that an answer may depend on, but for the function itself."""
+        given: dict[str, Any] = {}
+        for one, many in zip(TAKES, TAKES_MANY, strict=True):
+            if one in self.takes or many in self.takes:
+                given[one] = query.seed if one == "rng" else vars(query)[one]
+        if self.is_class:
+            given["memory"] = self.memory(query.agent)
+        return given
+
+    def memory(self, agent: str) -> Any:
+        """Return what the object of an agent remembers, if there are such."""
+        return self._object(agent).memory() if self.is_class else None
+
+    def restore(self, agent: str, memory: Any) -> None:
+        """Let the object of an agent, if there is one, remember what it did."""
+        if self.is_class:
+            self._object(agent).restore(memory)
+
+    def check_memory(self) -> None:
+        """Refuse objects whose memory cannot be kept beside their answers.
+
+        Raises
+        ------
+        ValueError
+            One line.
+        """
+        if self.is_class and not all(callable(vars(self._thing).get(n)) for n in MEMORY):
+            raise ValueError(
+                f"learner.recorded = true: {self._name} remembers, and needs methods memory() and "
+                "restore(memory) of what JSON holds, to go on after a recorded answer"
+            )
+
+    def _object(self, agent: str) -> Any:
         if agent not in self._objects:
             self._objects[agent] = self._thing(**self._named)
-        return self._objects[agent].decide
+        return self._objects[agent]
+
+    def _function(self, agent: str) -> Callable[..., Any]:
+        """Return what decides for an agent."""
+        decide: Callable[..., Any] = self._object(agent).decide if self.is_class else self._thing
+        return decide
 
     def _call(self, query: Query) -> Any:
         given = {name: vars(query)[name] for name in self.takes}

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .recorded import canonical
+
 KEYS = ("action", "message", "costs")
 """What a table may hold."""
 
@@ -28,21 +30,7 @@ class Reply(NamedTuple):
     @property
     def size(self) -> int:
         """Bytes of what it says."""
-        return 0 if self.message is None else len(text_of(self.message).encode())
-
-
-def text_of(content: object) -> str:
-    """Return the one JSON text of a content.
-
-    Raises
-    ------
-    ValueError
-        If JSON does not hold it.
-    """
-    try:
-        return json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    except (TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"message {content!r:.60}: {error}; allowed: what JSON holds") from None
+        return 0 if self.message is None else len(canonical(self.message).encode())
 
 
 def read_reply(answer: Any, actions: Sequence[str], costs: Mapping[str, str]) -> Reply:
@@ -75,7 +63,7 @@ def read_reply(answer: Any, actions: Sequence[str], costs: Mapping[str, str]) ->
         if key not in KEYS:
             raise ValueError(f"answers with {key!r}, allowed: {', '.join(KEYS)}")
     message = answer.get("message")
-    content = None if message is None else json.loads(text_of(message))
+    content = None if message is None else json.loads(canonical(message))
     return Reply(_action(answer.get("action"), actions), content, _costs(answer, costs))
 
 

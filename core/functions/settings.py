@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ..learners.learner import CORE, TeamSettings
-from ..plugins.settings import Positive
+from ..plugins.settings import Positive, unwritten
 
 Unit = Annotated[str, Field(min_length=1)]
 """In words of the SI, or a currency; ``"1"`` for a pure number."""
@@ -26,3 +26,5 @@ class FunctionSettings(TeamSettings):
     """Longest time that an answer may take [s]."""
     calls_at_once: Annotated[int, Field(ge=1)] = 8
     """Most calls under way at a time, if the function is ``async``."""
+    recorded: Annotated[bool, unwritten(False)] = False
+    """Whether answers are kept with the study, so that nobody is asked the same again."""

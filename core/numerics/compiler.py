@@ -20,7 +20,6 @@ here the files that its own file imports, and those that these import, count as 
 
 import atexit
 import contextlib
-import fcntl
 import gc
 import hashlib
 import importlib
@@ -35,6 +34,8 @@ from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import IO, Any, TypeVar, cast
+
+from . import locks
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -219,7 +220,7 @@ def _alone(file: Any) -> Iterator[None]:
                 folder = Path(file._cache_path)
                 folder.mkdir(parents=True, exist_ok=True)
                 lock = stack.enter_context((folder / LOCK).open("w"))
-                fcntl.flock(lock, fcntl.LOCK_EX)
+                locks.lock(lock, wait=True)
         yield
 
 

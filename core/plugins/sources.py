@@ -22,7 +22,7 @@ from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from .trust import LIBRARIES, is_trusted, module_text, sha256, trust
 
@@ -30,8 +30,19 @@ FOLDER = "sources"
 """Where a study keeps copies, below its own directory."""
 MOST_BYTES = 1_000_000
 """Of a file; a larger one is no program."""
+ANSWERS = "answers.db"
+"""Where a study keeps what functions have answered, see `core.functions.recorded`."""
 GRAPHS = (".graphml", ".json", ".toml")
 """Suffixes of files that hold a hierarchy."""
+
+
+class Answers(NamedTuple):
+    """Where a study keeps what functions of users have answered."""
+
+    path: Path
+    """The file."""
+    calls: bool = True
+    """Whether they may be called for answers that are missing."""
 
 
 class Sources:
@@ -50,6 +61,11 @@ class Sources:
         What brought the `texts` along, and names modules, if it is not the user's own: these are
         run only if they are trusted, see `is_trusted`.
 
+    Attributes
+    ----------
+    answers
+        Where functions' answers are kept; none: nowhere.
+
     Examples
     --------
     >>> sources = Sources(texts={"arm.py": "LINKS = 3  # links"})
@@ -67,6 +83,7 @@ class Sources:
         brought_by: str | None = None,
     ) -> None:
         self.folder = folder
+        self.answers: Answers | None = None
         self._texts = dict(texts or {})
         self._studies = [place for place in (study, folder) if place is not None]
         self._brought = dict.fromkeys(self._texts, brought_by) if brought_by else {}
@@ -83,7 +100,8 @@ class Sources:
 
     def __getstate__(self) -> dict[str, Any]:
         # Of what was sent to a worker all that is known is that its sender has run it.
-        return {**vars(Sources(None, self._texts)), "_was_sent": True}
+        own = {"_was_sent": True, "answers": self.answers}
+        return {**vars(Sources(None, self._texts)), **own}
 
     @property
     def texts(self) -> dict[str, str]:
@@ -95,6 +113,7 @@ class Sources:
         sources = Sources(None, {name: self.text(name) for name in sorted(names)})
         sources._brought = {name: by for name, by in self._brought.items() if name in names}
         sources._brought_by = self._brought_by
+        sources.answers = self.answers
         return sources
 
     def text(self, name: str) -> str:

@@ -9,7 +9,6 @@ that it comes to depends on what else the machine does, which is seen while plan
 """
 
 import os
-import resource
 import subprocess
 import sys
 import time
@@ -196,12 +195,20 @@ def _estimate(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Rang
     busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
     least = FASTER * busy**0.5  # other programs may stop
     most = SLOWER * busy  # or go on
-    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-    peak *= 1 if sys.platform == "darwin" else 1024
-    memory = peak + max(each.memory for each in tried)
+    memory = _peak() + max(each.memory for each in tried)
     shortest = least * (starting + quick)
     longest = most * (starting + loading + slow)
     return (float(shortest), float(longest)), processes * memory
+
+
+def _peak() -> float:
+    """Return the most memory that this process has had [bytes]; none where no system tells it."""
+    if sys.platform == "win32":
+        return 0.0
+    import resource
+
+    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    return peak * (1 if sys.platform == "darwin" else 1024)
 
 
 def try_out(trial: Trial) -> ConditionCost:

@@ -7,7 +7,6 @@ click command of that name in a module of `commands`.
 
 import codecs
 import os
-import resource
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -126,6 +125,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _check_address_space() -> None:
     """Refuse to begin what a limit of the shell would not let end."""
+    if sys.platform == "win32":
+        return
+    import resource
+
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit != resource.RLIM_INFINITY and limit < LEAST_ADDRESSES:
         least = LEAST_ADDRESSES // 1024

@@ -130,6 +130,30 @@ def running(command: Callable[..., int]) -> Callable[..., int]:
     return jobs(_backend(_address(_accept_code(command))))
 
 
+class AnswerOptions(TypedDict):
+    """The options of recorded answers of functions."""
+
+    answers: Path | None
+    calls: bool
+
+
+def recorded(command: Callable[..., int]) -> Callable[..., int]:
+    """Add the options of recorded answers, see `AnswerOptions`."""
+    answers = click.option(
+        "--answers",
+        type=PATH,
+        metavar="DIR|FILE",
+        help="Take over recorded answers of functions: of another study, or a file answers.db.",
+    )
+    calls = click.option(
+        "--calls/--no-calls",
+        default=True,
+        help="Whether functions may be called for answers that are not recorded; if not, a trial "
+        "that lacks one fails.",
+    )
+    return answers(calls(command))
+
+
 trust = flag(
     "--trust",
     "Run, from now on, the Python files that came with the study, and import the modules that it "

@@ -7,7 +7,6 @@ is never taken for damage.
 """
 
 import errno
-import fcntl
 import os
 import shutil
 import sqlite3
@@ -17,6 +16,7 @@ from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
+from ...core.numerics import locks
 from ..errors import SpecError
 
 CIRCUMSTANCES = (
@@ -254,7 +254,7 @@ def has_locks(path: Path) -> bool:
     probe = path.with_name(f"{path.name}-lock")
     try:
         with open(probe, "w") as file:
-            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            locks.lock_record(file)
     except OSError as error:
         return error.errno not in NO_LOCKS
     finally:

@@ -1,6 +1,5 @@
 """Who writes to the directory of a study: one process at a time, and which trials it runs."""
 
-import fcntl
 import json
 import os
 import time
@@ -9,6 +8,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
+from ...core.numerics import locks
 from ..errors import SpecError
 from . import durable
 from .connection import NO_LOCKS, NoLocksError
@@ -45,7 +45,7 @@ def _take(lock: TextIO, directory: Path) -> None:
     """Take the lock of a directory; it is not waited for, but for a look at it."""
     for wait in (0.05, 0.1, 0.0):
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            locks.lock(lock)
             return
         except OSError as error:
             if error.errno in NO_LOCKS:
@@ -102,7 +102,7 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
     try:
         durable.check_file(directory / LOCK)
         with open(directory / LOCK) as lock:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            locks.lock(lock, shared=True)
         return None
     except BlockingIOError:
         pass  # somebody writes there

@@ -68,7 +68,8 @@ def call_for(
     One that names Python files of a user's has a process of its own, and is pickled: whoever hands
     it on runs none of these files.
     """
-    if any(name.endswith(".py") for name in trial.sources.texts):
+    is_own = any(name.endswith(".py") for name in trial.sources.texts)
+    if is_own and sys.platform != "win32":  # which forks no processes
         return run_apart, pickle.dumps((run_trial, trial)), trial.seed
     return attempt, run_trial, trial
 

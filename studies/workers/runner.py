@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 import traceback
@@ -150,6 +151,10 @@ def undisturbed() -> Iterator[None]:
 def beginning_processes() -> Iterator[None]:
     """Put off Ctrl-C; the processes begun meanwhile never hear of it: it is for the parent."""
     resource_tracker.ensure_running()  # would unblock the signal when the first process begins
+    if sys.platform == "win32":  # which blocks no signals
+        with undisturbed():
+            yield
+        return
     with undisturbed():
         usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:

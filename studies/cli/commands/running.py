@@ -10,6 +10,10 @@ from .. import options
 from ..display import print_data, print_table, print_text, show_results
 
 
+class Rerun(options.RunOptions, options.AnswerOptions):
+    """The options of ``run`` and ``retry`` that say how trials are run."""
+
+
 @click.command()
 @options.out(
     "Where to keep the study; made if it does not exist. The same command again continues it.",
@@ -63,6 +67,7 @@ def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
     required=True,
 )
 @options.running
+@options.recorded
 @options.trust
 @options.figures
 @options.changes
@@ -72,7 +77,7 @@ def run(
     trust: bool,
     figures: tuple[str, ...],
     changes: tuple[str, ...],
-    **running: Unpack[options.RunOptions],
+    **running: Unpack[Rerun],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
 
@@ -173,8 +178,9 @@ def plan(spec: Path, changes: tuple[str, ...], **supposed: Unpack[Supposed]) -> 
 @click.command()
 @options.directory
 @options.running
+@options.recorded
 @options.trust
-def retry(directory: Path, trust: bool, **running: Unpack[options.RunOptions]) -> int:
+def retry(directory: Path, trust: bool, **running: Unpack[Rerun]) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
     DIR is where the study is kept.

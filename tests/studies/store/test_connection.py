@@ -139,10 +139,10 @@ def test_without_locks_one_line_says_what_to_do_and_what_is_there_is_read(act, e
 
 
 def test_a_directory_that_cannot_be_locked_is_told(tmp_path, monkeypatch):
-    def refuse(*_):
+    def refuse(*_, **__):
         raise OSError(37, "No locks available")
 
-    monkeypatch.setattr(writer.fcntl, "flock", refuse)
+    monkeypatch.setattr(writer.locks, "lock", refuse)
     with pytest.raises(SpecError, match="has no file locks"), made_up.opened(tmp_path / "study"):
         pass
 
