@@ -74,10 +74,10 @@ class SchemaWriter:
         if held or name in checked or any(isinstance(m, OPEN) for m in info.metadata):
             return {}
         try:
-            found = TypeAdapter(info.annotation).json_schema()
+            own = TypeAdapter(info.annotation).json_schema()
         except Exception:  # of what pydantic knows no schema
             return {}
-        return {} if "$defs" in found else found | _bounds(info)
+        return {} if "$defs" in own else own | _bounds(info)
 
     def named(self, name: str, model: type[Settings], *, is_whole: bool) -> Schema:
         """Return a reference to the schema of a model's table."""
@@ -170,11 +170,11 @@ def _spec(writer: SchemaWriter) -> Schema:
     }
 
     def laid(model: type[Settings]) -> Schema:
-        found = writer.table(model)
-        for name in layers.keys() & found["properties"].keys():
+        table = writer.table(model)
+        for name in layers.keys() & table["properties"].keys():
             text = meaning(model, name)
-            found["properties"][name] = layers[name] | {"description": text}
-        return found
+            table["properties"][name] = layers[name] | {"description": text}
+        return table
 
     whole = laid(Spec)
     known = whole["properties"]
@@ -182,7 +182,7 @@ def _spec(writer: SchemaWriter) -> Schema:
     override = laid(Override)
     override["properties"]["curriculum"] = {"type": "array", "items": stage}
     override["properties"]["sweep"] = LISTS
-    names = {
+    names: dict[str, Schema] = {
         "study": {"anyOf": [{"enum": STUDIES.names()}, {"type": "string"}]},
         "preset": {"anyOf": [{"enum": list(PRESETS)}, {"type": "string"}]},
         "seeds": {"anyOf": [{"type": "integer", "minimum": 1}, NUMBERS]},
