@@ -68,7 +68,7 @@ MODULES = {
     "scenarios": ("Where agents act.", (
         "box_pushing.config", "box_pushing.world.settings",
         "box_pushing.prediction.settings", "box_pushing.scenario",
-        "box_pushing.environments", "adapters.passing_down", "adapters.adapted",
+        "environments", "box_pushing.environments", "adapters.passing_down", "adapters.adapted",
         "adapters.settings", "box_pushing.states.relational",
         "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
         "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.starts",

@@ -13,7 +13,7 @@ an agent span a joint step: from its turn to its next turn, with the reward that
 which is all that came between.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, cast
 
@@ -24,8 +24,9 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import AgentSelector
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
+from ...core.hierarchy.failures import MessageFailure, Messages
 from ...core.hierarchy.hierarchy import Hierarchy
-from ...core.numerics import FloatArray
+from ...core.numerics import FloatArray, IntArray
 
 
 class PassingDownEnv(parallel_to_aec_wrapper):
@@ -43,6 +44,10 @@ class PassingDownEnv(parallel_to_aec_wrapper):
         A PettingZoo parallel environment.
     hierarchy
         Over its possible agents; None: a chain in their order.
+    failures
+        What fails of the messages by which agents hear what was decided above, by episode and step
+        as in a ``[topology]`` table; then all agents must have the same Discrete actions. What is
+        random of it follows from the seed of `reset`.
 
     Attributes
     ----------
@@ -66,7 +71,12 @@ class PassingDownEnv(parallel_to_aec_wrapper):
     ('robot1.right', [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     """
 
-    def __init__(self, env: ParallelEnv[str, Any, Any], hierarchy: Hierarchy | None = None) -> None:
+    def __init__(
+        self,
+        env: ParallelEnv[str, Any, Any],
+        hierarchy: Hierarchy | None = None,
+        failures: Sequence[MessageFailure] = (),
+    ) -> None:
         names = list(env.possible_agents)
         hierarchy = hierarchy or Hierarchy(names, pairwise(names))
         if set(hierarchy.agents) != set(names):
@@ -78,9 +88,16 @@ class PassingDownEnv(parallel_to_aec_wrapper):
         self.hierarchy = hierarchy
         team = hierarchy.agents
         self._order = [team[i] for i in hierarchy.order]
-        self._above = {name: {team[j] for j in hierarchy.above(i)} for i, name in enumerate(team)}
+        self._place = {name: i for i, name in enumerate(team)}
         self._choices = {name: _choices(name, env.action_space(name)) for name in names}
         self._spaces = {name: self._space(name) for name in names}
+        counts = {tuple(choices.tolist()) for choices in self._choices.values()}
+        alike = next(iter(counts)) if len(counts) == 1 else ()
+        if failures and len(alike) != 1:
+            raise ValueError("failures: messages can fail where all agents have equal actions")
+        self._messages = Messages(hierarchy, failures, n_actions=int(sum(alike)))
+        self._seed = 0
+        self._episode = -1
 
     def _space(self, name: str) -> Box:
         own = self.env.observation_space(name)
@@ -97,30 +114,56 @@ class PassingDownEnv(parallel_to_aec_wrapper):
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
         """Start an episode; the agent at the top of the hierarchy is the first to act."""
         super().reset(seed=seed, options=options)
+        if seed is not None:
+            self._seed = seed
+            self._episode = -1
+        self._episode += 1
+        self._messages.begin(np.random.SeedSequence([self._seed, self._episode]), self._episode)
         self._begin_step()
 
     def _begin_step(self) -> None:
         self._actions = dict.fromkeys(self.agents)
+        self._arrived: dict[str, dict[str, Any]] = {}
         waiting = [name for name in self._order if name in self.env.agents]
         if waiting:
             self._agent_selector = AgentSelector(waiting)
             self.agent_selection = self._agent_selector.reset()
 
     def _deads_step_first(self) -> Any:
-        self._begin_step()  # PettingZoo calls this when the world has gone on
+        if self._messages.failures:  # PettingZoo calls this when the world has gone on
+            self._messages.advance(self._joint())
+        self._begin_step()
         return super()._deads_step_first()
 
     def observe(self, agent: str) -> FloatArray:
         """Return what an agent observes, and the actions that it has been passed so far."""
         own = self._observations[agent]
+        heard = self._heard(agent)
         parts = [own]
         for name, choices in self._choices.items():
             part = np.zeros(int(choices.sum()))
-            decided = self._actions.get(name)
-            if decided is not None and name in self._above[agent]:
-                part[np.cumsum(choices) - choices + decided] = 1.0
+            if name in heard:
+                part[np.cumsum(choices) - choices + heard[name]] = 1.0
             parts.append(part)
         return np.concatenate(parts).astype(own.dtype)
+
+    def _joint(self) -> IntArray:
+        """Return what has been decided ``(n,)`` in this step; 0 of those who have not."""
+        decided = [self._actions.get(name) for name in self.hierarchy.agents]
+        return np.array([0 if action is None else action for action in decided], dtype=np.int64)
+
+    def _heard(self, agent: str) -> dict[str, Any]:
+        """Return the actions that an agent hears of, by whose they are; what fails, at its turn."""
+        place = self._place[agent]
+        team = self.hierarchy.agents
+        if not self._messages.failures:
+            above = [team[i] for i in self.hierarchy.above(place)]
+            return {name: a for name in above if (a := self._actions.get(name)) is not None}
+        if agent == self.agent_selection and agent not in self._arrived:
+            senders, actions, _ = self._messages.heard(place, self._joint())
+            there = zip(senders.tolist(), actions.tolist(), strict=True)
+            self._arrived[agent] = {team[i]: a for i, a in there if team[i] in self._actions}
+        return self._arrived.get(agent, {})
 
     def step(self, action: Any) -> None:
         """Pass the action of the selected agent down; after the last one the world goes on.

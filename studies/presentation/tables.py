@@ -181,14 +181,13 @@ class SummaryTable:
         """Lines that say what stands in the cells."""
         if not self.rows:
             return ["no trial has finished"]
-        lines = ["Means over seeds, and below them their 95 % intervals."]
-        return lines + [self.remark] * bool(self.remark)
+        return ["Means over seeds, and below them their 95 % intervals.", self.remark]
 
     @property
     def remark(self) -> str:
-        """What must be said of intervals of few seeds, if there are any; else nothing."""
+        """What must be said of the intervals."""
         if all(seeds >= FEW for _, seeds, _ in self.rows):
-            return ""
+            return "Intervals: of rates Wilson's, else by bootstrap (short if values are skewed)."
         return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
 
     @cached_property

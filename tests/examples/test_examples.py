@@ -23,11 +23,14 @@ def test_random_policy(capsys: pytest.CaptureFixture[str]) -> None:
     assert lines[2] == "failed wheels: 1"
 
 
-def test_ppo(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    path = EXAMPLES / "train_ppo.py"
+@pytest.mark.parametrize("name", ["train_ppo.py", "train_arm.py"])
+def test_ppo(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = EXAMPLES / name
     compile(path.read_text(encoding="utf-8"), str(path), "exec")
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
-    monkeypatch.setattr("sys.argv", ["train_ppo.py", "1024"])
+    monkeypatch.setattr("sys.argv", [name, "1024"])
     runpy.run_path(str(path), run_name="__main__")
     lines = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in lines] == ["before training", "after 1024 steps"]

@@ -6,10 +6,12 @@ consider nobody, that expect something else of the unseen, whose messages are lo
 are the same; but a team that acts under relations which it was not trained under meets situations
 that it has not learned in, and a part of each difference is this shift of distribution.
 
-One measure was fixed beforehand: evaluation success. For each condition of training, every
-evaluation is compared with that under the hierarchy of training, as in the study `hierarchies`.
+For each condition of training, every evaluation is compared with that under the hierarchy of
+training by evaluation success, as in the study `hierarchies`; and over all conditions by success
+and decisions to the goal, equal measures of one question.
 """
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -22,7 +24,9 @@ from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..hierarchies import HierarchyCase, analysis_of, estimates
+from ..hierarchies import analysis_of, estimates
+from ..hierarchies.cases import HierarchyCase
+from ..hierarchies.pooled import effects, lines_of
 from ..study import check_evaluated, check_evaluations, check_rule_bases, distinct
 
 PUBLISHED = ("success",)
@@ -69,7 +73,9 @@ def analyse(results: Results) -> Analysis:
             deciding = numbers[f"decision.{name}"]
             values = estimates(results, condition, phase, deciding, numbers[f"messages.{name}"])
             cases.append(HierarchyCase(condition, name, value_of, robots, sizes, values, phase))
-    return analysis_of(results, cases, TRAINED)
+    analysis = analysis_of(results, cases, TRAINED)
+    pooled = lines_of(effects(results, cases, TRAINED), TRAINED)
+    return replace(analysis, notes=(*analysis.notes, *pooled))
 
 
 def draw(analysis: Analysis) -> Figures:

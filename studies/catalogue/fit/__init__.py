@@ -17,7 +17,8 @@ from ...spec.spec import Spec
 from ...spec.tables import label
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..hierarchies import HierarchyCase, analysis_of
+from ..hierarchies import analysis_of
+from ..hierarchies.cases import HierarchyCase
 from ..study import check_evaluated, distinct
 
 PUBLISHED = ("success",)

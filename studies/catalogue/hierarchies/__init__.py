@@ -13,7 +13,7 @@ hierarchy that succeeds only where it is easy looks quick.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ..scaling import NUMBERS, measure
 from ..study import check_evaluated, distinct
+from .cases import HierarchyCase
+from .pooled import effects, lines_of
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -47,35 +49,6 @@ def check(spec: Spec) -> None:
         )
 
 
-class HierarchyCase(NamedTuple):
-    """One hierarchy under which teams are evaluated."""
-
-    condition: str
-    """Its label."""
-    hierarchy: str
-    """Its label without the number of robots and whose value decides."""
-    value_of: str
-    """Whose value decides; empty if that is not swept."""
-    robots: int
-    """Number of bodies."""
-    sizes: Sizes
-    """Those of all cases, and what bodies are called."""
-    values: dict[str, Estimate]
-    """Estimates by title."""
-    phase: str = "evaluation"
-    """Of its episodes."""
-
-    @property
-    def setting(self) -> str:
-        """What it has in common with those that it is compared with."""
-        return f"{self.sizes.shown(self.robots)}, {self.value_of}".strip(", ")
-
-    @property
-    def label(self) -> str:
-        """How its line of the table is called."""
-        return f"{self.setting}, {self.hierarchy}".removeprefix(", ")
-
-
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
 
@@ -95,7 +68,9 @@ def analyse(results: Results) -> Analysis:
             results, condition, "evaluation", numbers["decision_median"], numbers["messages"]
         )
         cases.append(HierarchyCase(condition, hierarchy, value_of, robots, sizes, values))
-    return analysis_of(results, cases, REFERENCE)
+    analysis = analysis_of(results, cases, REFERENCE)
+    pooled = lines_of(effects(results, cases, REFERENCE), REFERENCE)
+    return replace(analysis, notes=(*analysis.notes, *pooled))
 
 
 def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str) -> Analysis:

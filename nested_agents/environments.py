@@ -1,0 +1,148 @@
+"""Our worlds in the registries of Gymnasium and PettingZoo.
+
+Importing this module registers them::
+
+    gymnasium.make("nested_agents.environments:NestedAgents/Arm-v0", joints=4)
+    gymnasium.make_vec("nested_agents.environments:NestedAgents/BoxPushing-v0", 8, robots=4)
+
+    import nested_agents.environments
+    weak = [{"kind": "weak", "wheels": "*", "gain": 0.5}]
+    pettingzoo.make("parallel", "NestedAgents/BoxPushing-v0", failures=weak)
+    pettingzoo.make("aec", "NestedAgents/Arm-v0", topology={"kind": "tree", "failures": [...]})
+
+Keywords are those of the ``[scenario]`` table of a spec, what fails of wheels and joints included.
+An AEC environment takes a ``topology`` beside, which says who decides after whom, and what fails of
+the messages in which agents hear the actions decided above them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import pettingzoo
+
+if TYPE_CHECKING:
+    from .core.interface.scenario import Scenario
+    from .scenarios.adapters.passing_down import PassingDownEnv
+    from .scenarios.environments import AgentsEnv, JointEnv
+
+WORLDS = {
+    "BoxPushing": ("box-pushing", 450),
+    "Arm": ("kinematic-chain", 60),
+    "LineUp": ("line-up", 40),
+    "Signals": ("signals", 20),
+    "MatrixGame": ("matrix-game", 1),
+    "TeamGame": ("team-game", 1),
+}
+"""The kind of scenario of an id, and the most steps of its episodes."""
+
+
+def env_id(name: str) -> str:
+    """Return the id of one of `WORLDS`.
+
+    >>> env_id("Arm")
+    'NestedAgents/Arm-v0'
+    """
+    return f"NestedAgents/{name}-v0"
+
+
+def register() -> None:
+    """Register all ids with both libraries; again, nothing happens."""
+    for name, (kind, steps) in WORLDS.items():
+        options = {"kind": kind, "steps": steps}
+        known = env_id(name)
+        if known not in gymnasium.registry:
+            gymnasium.register(known, f"{__name__}:joint", kwargs=options)
+        if known not in pettingzoo.parallel_registry:
+            pettingzoo.register("parallel", known, f"{__name__}:parallel", kwargs=options)
+        if known not in pettingzoo.aec_registry:
+            pettingzoo.register("aec", known, f"{__name__}:turns", kwargs=options)
+
+
+def joint(kind: str, steps: int, **options: Any) -> JointEnv:
+    """Return a Gymnasium environment in which one player acts for all agents.
+
+    Parameters
+    ----------
+    kind
+        Of scenario.
+    steps
+        Most steps of an episode.
+    **options
+        Keys of the ``[scenario]`` table; ``by_agent = true``, by which the state of every agent
+        stands in a row of its own; those of
+        `nested_agents.scenarios.box_pushing.environments.BoxPushingEnv` for boxes.
+
+    Raises
+    ------
+    ValueError
+        If there is no such key, or a value is out of range; one line.
+    """
+    if kind == "box-pushing":
+        from .scenarios.box_pushing.environments import BoxPushingEnv
+
+        return BoxPushingEnv(steps=steps, **options)
+    from .scenarios.environments import JointEnv
+
+    rows, mode = options.pop("by_agent", False), options.pop("render_mode", None)
+    return JointEnv(_world(kind, options), steps=steps, by_agent=rows, render_mode=mode)
+
+
+def parallel(kind: str, steps: int, **options: Any) -> AgentsEnv:
+    """Return a PettingZoo parallel environment with a player for every agent; see `joint`.
+
+    With ``players = "bodies"`` there is one for every body: for every robot, not every wheel.
+    """
+    players = options.pop("players", "agents")
+    if players not in ("agents", "bodies"):
+        raise ValueError(f"players = {players!r}, allowed: agents, bodies")
+    if kind == "box-pushing":
+        from .scenarios.box_pushing.environments import RobotsEnv, WheelsEnv
+
+        return (WheelsEnv if players == "agents" else RobotsEnv)(steps=steps, **options)
+    from .scenarios.environments import AgentsEnv, BodiesEnv
+
+    mode = options.pop("render_mode", None)
+    make = AgentsEnv if players == "agents" else BodiesEnv
+    return make(_world(kind, options), steps=steps, render_mode=mode)
+
+
+def _world(kind: str, table: Mapping[str, Any]) -> Scenario:
+    """Return the world of a ``[scenario]`` table."""
+    from .core.interface.plain import as_scenario
+    from .core.plugins.settings import tuples
+    from .scenarios import SCENARIOS
+
+    return as_scenario(SCENARIOS.parsed(kind, **tuples(table)).build())
+
+
+def turns(
+    kind: str, steps: int, topology: str | Mapping[str, Any] = "chain", **options: Any
+) -> PassingDownEnv:
+    """Return a PettingZoo AEC environment whose agents take turns from the top down.
+
+    Parameters
+    ----------
+    kind, steps, **options
+        As those of `joint`.
+    topology
+        Who decides after whom, and what fails of the messages down, as specs have it.
+
+    Raises
+    ------
+    ValueError
+        If there is no such key or topology, or a value is out of range; one line.
+    """
+    from .scenarios.adapters.passing_down import PassingDownEnv
+    from .topologies import build, parse
+
+    env = parallel(kind, steps, **options)
+    settings = parse(topology)
+    world = env.scenario
+    hierarchy = build(settings, world.agents, world.groups, world.interactions)
+    return PassingDownEnv(env, hierarchy, settings.failures)
+
+
+register()
