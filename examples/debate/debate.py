@@ -90,12 +90,12 @@ def team_errors(wrong, speaks):
 
 
 def answer(observation, told, actions):
-    """Answer what most have said, the own draft among them, which decides a tie."""
+    """Answer what most have answers, the own draft among them, which decides a tie."""
     draft = actions[int(observation["draft"])]
-    said = [draft, *(message.action for message in told.values())]
-    same = said.count(draft)
+    answers = [draft, *(message.action for message in told.values())]
+    same = answers.count(draft)
     other = actions[1 - actions.index(draft)]
-    return {"action": draft if 2 * same >= len(said) else other, "message": len(said)}
+    return {"action": draft if 2 * same >= len(answers) else other, "message": len(answers)}
 
 
 def lead(observation, actions):
