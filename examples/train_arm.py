@@ -17,8 +17,10 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecNormalize
 
+from nested_agents.environments import env_id
+
 STEPS = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000
-WORLD = sys.argv[2] if len(sys.argv) > 2 else "NestedAgents/Arm-v0"
+WORLD = sys.argv[2] if len(sys.argv) > 2 else env_id("Arm")
 WEAK = {"kind": "weak", "joints": "joint2", "gain": 0.5, "episode": 40}
 OPTIONS = {"joints": 3, "failures": [WEAK]} if "Arm" in WORLD else {}
 EPISODES = 20

@@ -41,6 +41,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "plan": (".commands.running", "Tell what a study will take, and what it can find."),
     "table": (".commands.reading", "Print the results of a study: conditions against estimates."),
     "compare": (".commands.reading", "Compare conditions of one study or several, seed by seed."),
+    "fit": (".commands.fitting", "Fit how results grow with the size of teams, and predict."),
     "results": (".commands.reading", "Print what every episode of a study measured."),
     "status": (".commands.reading", "Tell how far a study is, what failed, and how long is left."),
     "retry": (".commands.running", "Run the failed trials of a study again."),
@@ -52,6 +53,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         ".commands.describing",
         "List the keys of a spec: type, default, what is allowed, meaning.",
     ),
+    "schema": (".commands.describing", "Write the JSON schema of specs, for editors."),
     "topology": (".commands.describing", "List the topologies, or show one of them."),
     "check": (".commands.checking", "Check that scenarios keep their promises."),
     "combine": (".commands.describing", "Try every learner with every part of a condition."),
@@ -173,7 +175,15 @@ def run_to_status(program: str, run: Callable[[], int]) -> int:
     return 2
 
 
+COMPLETE = "_NESTED_AGENTS_COMPLETE"
+"""What a shell sets to be told how a command line goes on."""
+
+
 def _run(arguments: list[str]) -> int:
+    if instruction := os.environ.get(COMPLETE):
+        from click.shell_completion import shell_complete
+
+        return shell_complete(nested_agents, {}, PROGRAM, COMPLETE, instruction)
     # Not `nested_agents.main`, which has its own answers to a closed pipe and to Ctrl-C.
     try:
         with nested_agents.make_context(PROGRAM, arguments) as context:

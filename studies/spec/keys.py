@@ -213,7 +213,7 @@ def _table(
 ) -> Table:
     laid = _laid_by_preset(name, kinds[0])
     keys = tuple(
-        _key(field, info, _meaning(model, field), laid.get(field))
+        _key(field, info, meaning(model, field), laid.get(field))
         for field, info in model.model_fields.items()
         if field != "kind" and not (field in base and base[field].default == info.default)
     )
@@ -249,7 +249,7 @@ def nearest(prefix: str) -> str:
     return near(prefix, names) or f"known: {', '.join(tops)}"
 
 
-def _meaning(model: type[Settings], field: str) -> str:
+def meaning(model: type[Settings], field: str) -> str:
     """Return the docstring of a field, in one line."""
     declaring = (cls for cls in model.__mro__ if field in inspect.get_annotations(cls))
     written = _docstrings(next(declaring, model)).get(field)

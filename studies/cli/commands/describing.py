@@ -69,6 +69,29 @@ def keys(prefix: str | None) -> int:
     return 0
 
 
+@click.command()
+@click.argument("kind", metavar="[KIND]", default="spec")
+@options.out("Where to write; by default it is printed.", "FILE.json")
+def schema(kind: str, out: Path | None) -> int:
+    """Write the JSON schema of specs: what editors complete and check, with its meaning.
+
+    KIND is spec, a table such as learner, or one kind of it, such as scenario.box-pushing. An
+    editor that knows TOML reads it if a spec begins with the line #:schema FILE.json.
+    """
+    import json
+
+    from ...spec.schema import schema as schema_of
+    from ...store import durable
+
+    text = json.dumps(schema_of(kind), indent=1) + "\n"
+    if out is None:
+        print_data(text)
+        return 0
+    durable.write(out, text.encode())
+    print_text(out)
+    return 0
+
+
 MOST_AGENTS = 10_000
 """Of one row: its integers have some fifty thousand digits."""
 RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
