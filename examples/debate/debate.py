@@ -90,7 +90,7 @@ def team_errors(wrong, speaks):
 
 
 def answer(observation, told, actions):
-    """Answer what most have answers, the own draft among them, which decides a tie."""
+    """Answer what most have answered, the own draft among them, which decides a tie."""
     draft = actions[int(observation["draft"])]
     answers = [draft, *(message.action for message in told.values())]
     same = answers.count(draft)
