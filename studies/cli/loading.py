@@ -9,10 +9,11 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Literal
 
-from ...core.plugins.trust import is_trusted, module_text, modules_in
+from ...core.plugins.trust import LIBRARIES, is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
 from ..presentation.progress import count, duration, say
 from ..spec.outline import StudyOutline, other_spec, outdated
+from ..store.database import DATABASE
 from ..store.store import Store
 from ..store.writer import look
 from ..workers.runner import cores
@@ -43,8 +44,7 @@ def load_results(
     from ..api.study import load
 
     if trust:
-        for source in sources:
-            trust_files(source)
+        trust_files(*sources)
     results = load(*sources, columns=columns, better=better)
     for remark in results.remarks:
         say(remark)
@@ -52,8 +52,22 @@ def load_results(
     return results if study is None else results.as_study(study)
 
 
-def trust_files(source: Path) -> None:
-    """Allow what a study keeps and names to be run and imported, and say what.
+def trust_files(*sources: Path) -> None:
+    """Allow what studies keep and name to be run and imported, and say what."""
+    for source in sources:
+        for title, text in untrusted(source).items():
+            say(f"{title} is trusted from now on")
+            trust_text(text)
+
+
+def trust_beside(*places: Path) -> None:
+    """Do so for the studies that places are, or lie in as their specs do."""
+    folders = {place if place.is_dir() else place.parent for place in map(Path.resolve, places)}
+    trust_files(*(folder for folder in folders if (folder / DATABASE).exists()))
+
+
+def untrusted(source: Path) -> dict[str, str]:
+    """Return the code of others that a study brings along or names, by what it is.
 
     These are the Python files that are kept with it, and modules by name; those of a file of
     results are named in its spec.
@@ -68,12 +82,9 @@ def trust_files(source: Path) -> None:
         from ..results import published  # pandas takes its time
 
         tables = published.load(source).outline.table
-    modules = dict(modules_in(tables))
+    modules = {m for m, _ in modules_in(tables) if m.partition(".")[0] not in LIBRARIES}
     texts |= {f"{name}, which {source} names,": module_text(name) for name in modules}
-    for title, text in texts.items():
-        if not is_trusted(text):
-            say(f"{title} is trusted from now on")
-            trust_text(text)
+    return {title: text for title, text in texts.items() if not is_trusted(text)}
 
 
 @dataclass(frozen=True)

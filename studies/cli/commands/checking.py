@@ -40,8 +40,9 @@ class ScenarioCase(NamedTuple):
 @click.command()
 @click.argument("source", metavar="SPEC.toml|FILE.py:NAME")
 @options.number("--steps", "N", 40, "Most steps of the episodes that are played for it.")
+@options.trust
 @options.changes
-def check(source: str, steps: int, changes: tuple[str, ...]) -> int:
+def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int:
     """Check what every scenario must promise, such as equal bits for equal seeds.
 
     A table shows the values met of every variable beside its range, and the root mean square error
@@ -55,10 +56,13 @@ def check(source: str, steps: int, changes: tuple[str, ...]) -> int:
     from pandas import DataFrame
 
     from ....scenarios.checking.checker import ScenarioError, check_scenario
+    from ..loading import trust_beside
 
     is_spec = not source.partition(":")[0].endswith(".py")
     if not is_spec and changes:
         raise SpecError("--set: lays values over a spec, not over a Python file")
+    if is_spec and trust:
+        trust_beside(Path(source))
     cases = _cases_of_spec(source, changes) if is_spec else [_case_of_file(source)]
     faults = 0
     for case in cases:

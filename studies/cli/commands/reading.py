@@ -10,12 +10,13 @@ from typing import Literal, TypedDict, Unpack
 import click
 
 from ...errors import SpecError, printable, refused
+from ...presentation.progress import say
 from ...spec.outline import StudyOutline, sources_of
 from ...store import durable
 from ...store.store import Store
 from .. import options
 from ..display import Form, in_form, print_data, print_study, print_table, print_text
-from ..loading import describe, load_results, open_study, progress, trust_files
+from ..loading import describe, load_results, open_study, progress, trust_files, untrusted
 
 PERIOD = 2.0
 """How often a study that is watched is looked at [s]."""
@@ -299,6 +300,11 @@ def report(directory: Path, out: Path | None, trust: bool) -> int:
     DIR is where the study is kept; it may be unfinished.
     """
     path = load_results([directory], trust=trust).report(out)
+    if left_out := untrusted(directory):
+        say(
+            f"{' '.join(left_out)} is not trusted: hierarchies and films that it makes are left "
+            "out; --trust shows them"
+        )
     print_text(f"{path}: {path.stat().st_size / 1e6:.1f} MB, nothing outside it is needed")
     return 0
 

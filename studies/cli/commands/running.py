@@ -88,11 +88,10 @@ def run(
     from ...presentation.progress import Terminal
     from ...spec.spec import Spec
     from ...store.database import DATABASE, SPEC_FILE
-    from ..loading import trust_files
+    from ..loading import trust_beside
 
-    for directory in {out.resolve(), spec.resolve().parent} if trust else ():
-        if (directory / DATABASE).exists():
-            trust_files(directory)
+    if trust:
+        trust_beside(out, spec)
     try:
         changed = Spec.load(spec, changes, study=out)
     except SpecError as error:
@@ -129,8 +128,11 @@ class TuneOptions(Budget, options.RunOptions):
 @options.number("--first-seed", "N", 10_000, "Of these seeds; at least 10000.")
 @options.number("--draw", "N", 0, "Seed of the draw.")
 @options.running
+@options.trust
 @options.changes
-def tune(spec: Path, out: Path, changes: tuple[str, ...], **choice: Unpack[TuneOptions]) -> int:
+def tune(
+    spec: Path, out: Path, trust: bool, changes: tuple[str, ...], **choice: Unpack[TuneOptions]
+) -> int:
     """Look for better settings of a spec, on seeds that no report uses; again, it continues.
 
     SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
@@ -138,7 +140,10 @@ def tune(spec: Path, out: Path, changes: tuple[str, ...], **choice: Unpack[TuneO
     """
     from ...api import tuning
     from ...spec.spec import Spec
+    from ..loading import trust_beside
 
+    if trust:
+        trust_beside(out, spec)
     tuned = tuning.tune(Spec.load(spec, changes, study=out), out, **choice)
     print_table(tuned.study.table(tuned.columns))
     print_text("", *tuned.lines, "")
@@ -162,15 +167,19 @@ class Supposed(TypedDict):
 @options.number("--deviation", "SD", 0.25, "Supposed standard deviation of differences of seeds.")
 @options.number("--smallest", "D", 0.2, "The smallest difference of success rates of interest.")
 @click.option("--timed/--no-timed", default=True, help="Try episodes of every condition.")
+@options.trust
 @options.changes
-def plan(spec: Path, changes: tuple[str, ...], **supposed: Unpack[Supposed]) -> int:
+def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Unpack[Supposed]) -> int:
     """Tell trials, time, memory and the differences that a study can find, before it is run.
 
     SPEC.toml says what to run. Episodes of every condition are tried out for a second.
     """
     from ...api import planning
     from ...spec.spec import Spec
+    from ..loading import trust_beside
 
+    if trust:
+        trust_beside(spec)
     print_text(planning.plan(Spec.load(spec, changes), **supposed))
     return 0
 

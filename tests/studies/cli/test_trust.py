@@ -143,6 +143,38 @@ def test_the_kept_spec_runs_elsewhere_with_the_copies_beside_it(
     assert main([*again, "--trust"]) == 0
 
 
+@pytest.mark.parametrize("command", ["check", "plan"])
+def test_a_spec_kept_with_a_study_is_looked_at_by_trust_alone(
+    command: str, foreign: Path, mark: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = [command, str(foreign / SPEC_FILE), "--set", "study=learning-curve"]
+    assert main(line) == 2
+    assert "--trust runs it" in capsys.readouterr().err
+    assert not mark.exists()
+    assert main([*line, "--trust"]) == 0
+    assert mark.exists()
+
+
+def test_a_report_says_what_it_leaves_out(
+    theirs: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    spec = tmp_path / "spec.toml"
+    spec.write_text(SPEC.replace('"mine.py:STUDY"', '"learning-curve"'))
+    shutil.copy(theirs / "mine.py", tmp_path)
+    assert main(["run", str(spec), "--out", str(tmp_path / "study"), "--jobs", "1"]) == 0
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "ours"))
+    monkeypatch.setattr(trust, "_noted", set())
+    forget_modules()
+    capsys.readouterr()
+    assert main(["report", str(tmp_path / "study")]) == 0
+    assert "is not trusted: hierarchies and films" in capsys.readouterr().err
+    assert main(["report", str(tmp_path / "study"), "--trust"]) == 0
+    assert "left out" not in capsys.readouterr().err
+
+
 PAYLOAD = """
 from nested_agents.core.decision.exploration import BurstExploration
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
