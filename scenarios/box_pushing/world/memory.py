@@ -6,6 +6,7 @@ numba is imported with this module, so that nothing imports it before a kernel i
 from typing import Any
 
 from llvmlite import ir
+from numba import config as config
 from numba import types
 from numba.extending import intrinsic
 

@@ -117,7 +117,7 @@ def step_address() -> int | None:
     Two worlds alike are stepped, one through Box2D's own functions and one through memory: all that
     is read must be what these functions say, and both must come to the same bits.
     """
-    from numba import config
+    from .memory import config  # numba takes its time
 
     if config.DISABLE_JIT:
         return None
