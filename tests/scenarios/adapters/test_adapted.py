@@ -340,6 +340,8 @@ def test_what_cannot_be_adapted_is_refused_in_one_line(make: Any, message: str) 
         (BlindUnsaid, "observations of agent_1: o1 is nan at step 4, allowed: finite numbers"),
         (KeyedApart, "of agent_0 keys are place, time, of agent_1 hour, place, allowed: the same"),
         (Lacking, "observations of agent_0 at step 2: there is no 'time', which their space has"),
+        (Leaving, "cannot be played, SystemExit: 0"),
+        (Ordering, r"cannot be played, RuntimeError: \\\\x1b\\[2J"),
         (Late, "'agent_1' observes nothing at the start, allowed: environments in which all"),
         (Uninvited, "'agent_9' at step 1 is none of possible_agents"),
         (Unseeing, "'agent_1' acts, and observations at step 3 do not have it"),
