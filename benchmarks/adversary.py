@@ -6,8 +6,11 @@ Campaigns, each drawn from a seed:
   continues, and what it ends with must be equal byte by byte. Trials run in the process of the
   command and take no time, so that a hundred kills do not take an hour; `benchmarks.crashes` kills
   real workers;
-- *kills of others*: export, report and retry are killed. What they have written is whole or
-  not there; the study is as it was, or the same command goes on, with the same end;
+- *kills of others*: explain, export, report, retry and tune are killed. What they have written is
+  whole or not there; the study is as it was, or the same command goes on, with the same end;
+- *edits* and *published files*, see `benchmarks.edits`: what somebody else has made of results;
+- *environments*, see `benchmarks.environments`: refused, or perceived as they are;
+- *circumstances*, see `benchmarks.circumstances`: clocks, disks, memory and signals;
 - *flips*: one bit of one file of a finished study is flipped. Commands that read, and Python that
   loads a trained team, must give what they gave before, or name the file; a run must end with the
   rows and recordings of the sound study. `explain`, which draws, reads every tenth, and a run every
@@ -55,7 +58,7 @@ from nested_agents.studies.store.writer import LOCK
 from nested_agents.studies.trials.keeping import open_to_run
 from nested_agents.studies.workers.runner import save
 
-from . import misbehaving
+from . import circumstances, edits, environments, misbehaving
 from .victim import EXPLAIN, LINES, SPEC, Adversary, Here, mended, read
 
 SLOW, BLOCKED = 10.0, 60.0
@@ -101,11 +104,17 @@ def kills(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     return tally
 
 
+OTHERS = ("explain", "export", "report", "retry", "tune")
+"""Commands that write, beside `run`."""
+TUNED = {"tune": {"learner.discount": [0.2, 0.4, 0.6, 0.8]}}
+
+
 def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[str]:
-    """Kill commands that read, and `retry`; return what happened."""
+    """Kill commands that write beside a study, `retry` and `tune`; return what happened."""
     adversary, tally = Adversary(folder, rng), Counter[str]()
     studies_run.start_workers = lambda *_: contextlib.nullcontext(Here(adversary))
-    failed = folder / "failed"
+    failed, spec = folder / "failed", folder / "tuned.toml"
+    spec.write_text(dumps(Spec.of({"episodes": 2, "steps": 10, "evaluation": 1} | TUNED).table()))
     with open_to_run(failed, SPEC, adversary.trials, adversary.measures) as store:
         for trial in adversary.trials[:5]:
             store.fail(trial.planned, "Traceback: a fault")
@@ -114,19 +123,25 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
 
     def line(name: str, place: Path) -> list[str]:
         """Return a command on a fresh copy of the study, which it writes beside."""
-        shutil.copytree(failed if name == "retry" else adversary.sound, place / "study")
-        out = ["--out", str(place / "page.html" if name == "report" else place / "out")]
-        return [name, str(place / "study"), *([] if name == "retry" else out)]
+        study, out = str(place / "study"), place / ("page.html" if name == "report" else "out")
+        if name == "tune":
+            return [name, str(spec), "--out", study, "--trials", "4", "--seeds", "4"]
+        shutil.copytree(failed if name == "retry" else adversary.sound, study)
+        return [name, study, *([] if name in ("retry", "explain") else ["--out", str(out)])]
 
-    whole: dict[str, tuple[float, dict[str, bytes]]] = {}
-    for name in ("export", "report", "retry"):
-        command, begin = line(name, folder / "whole" / name), time.monotonic()
+    whole: dict[str, tuple[float, dict[str, bytes], object]] = {}
+    for name in OTHERS:
+        place = folder / "whole" / name
+        place.mkdir(parents=True)
+        command, begin = line(name, place), time.monotonic()
         assert _wait(_child(command)) == 0, name
-        whole[name] = time.monotonic() - begin, _written(folder / "whole" / name)
+        seconds = time.monotonic() - begin
+        whole[name] = seconds, _written(place), adversary.content(place / "study")
     while tally["kills"] < number:
         name, place = rng.choice([*whole]), folder / f"k{tally['kills']}"
+        place.mkdir()
         tally["kills"] += 1
-        seconds, expected = whole[name]
+        seconds, expected, content = whole[name]
         command = line(name, place)
         child = _child(command)
         time.sleep(rng.uniform(0.0, seconds))
@@ -134,9 +149,9 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
         _wait(child)
         halves = {path for path, data in _written(place).items() if expected.get(path) != data}
         # What is there whole before the kill is not written over: that is refused.
-        is_whole = expected and _written(place) == expected
+        is_whole = expected and _written(place) == expected and name in ("export", "report")
         status = 0 if is_whole else _wait(_child(command))
-        is_equal = adversary.content(place / "study") == adversary.expected
+        is_equal = adversary.content(place / "study") == content
         if halves or status or not is_equal or _written(place) != expected:
             print(f"{name}: {halves}, status {status}, study equal {is_equal}", file=sys.stderr)
             tally[f"{name}: torn"] += 1
@@ -147,10 +162,14 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
 
 
 def _written(place: Path) -> dict[str, bytes]:
-    """Return what a command has written beside the study, by path; hidden files are no results."""
+    """Return what a command has written, by path, but a study itself and hidden files."""
     paths = [path for path in place.rglob("*") if path.is_file() and path.name[0] != "."]
-    relative = {path: path.relative_to(place) for path in paths}
-    return {str(of): path.read_bytes() for path, of in relative.items() if of.parts[0] != "study"}
+    return {
+        str(path.relative_to(place)): path.read_bytes()
+        for path in paths
+        if not path.name.startswith((DATABASE, "running.json", "study.toml"))
+        and path.parent.name not in ("recordings", "figures", "sources")
+    }
 
 
 def _child(line: list[str]) -> int:
@@ -403,13 +422,15 @@ def _area(ring: list[list[float]]) -> float:
     return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(ring, following, strict=True)) / 2
 
 
+Campaign = Callable[[int, random.Random, Path], Counter[str]]
+"""Attacks so many times, drawn from a generator, in a folder; returns what happened."""
 ATTEMPTS = (
-    "kills", "flips", "reads", "runs", "studies", "specs", "topologies", "polygons", "functions",
-    "scenarios",
+    "kills", "edits", "published files", "environments", "commands", "flips", "reads", "runs",
+    "studies", "specs", "topologies", "polygons", "functions", "scenarios",
 )  # fmt: skip
 FINE = (
     "equal", "told", "run: equal", "studies: equal", "kills with trials kept, and others left",
-    "accepted", "refused in one line", ": told", "not reached",
+    "accepted", "refused in one line", ": told", "right", "done", "not reached",
 )  # fmt: skip
 
 
@@ -427,40 +448,42 @@ def main() -> int:
     parser.add_argument("--scenarios", type=int, default=100, metavar="N", help="0: none")
     parser.add_argument("--every-byte", action="store_true", help="takes a quarter of an hour")
     parser.add_argument("--seed", type=int, default=20)
+    parser.add_argument("--edits", type=int, default=300, metavar="N", help="by SQL; 0: none")
+    parser.add_argument("--published", type=int, default=100, metavar="N", help="0: none")
+    parser.add_argument("--environments", type=int, default=200, metavar="N", help="0: none")
+    parser.add_argument("--circumstances", action="store_true", help="takes some minutes")
     options = parser.parse_args()
     durable.os.fsync = lambda _: None  # type: ignore[attr-defined]  # no power fails here
-    campaigns: dict[str, Callable[[random.Random, Path], Counter[str]]] = {
-        "kill -9": lambda rng, folder: kills(options.kills, rng, folder),
-        "kill -9 of export, report, retry": lambda rng, folder: kills_of_others(
-            options.others, rng, folder
+    campaigns: dict[str, tuple[int, Campaign]] = {
+        "kill -9": (options.kills, kills),
+        "kill -9 of others that write": (options.others, kills_of_others),
+        "flipped bits": (options.flips, flips),
+        "files cut short, folders in their place": (
+            options.flips, lambda _, rng, folder: obstacles(rng, folder)
         ),
-        "flipped bits": lambda rng, folder: flips(options.flips, rng, folder),
-        "files cut short, folders in their place": obstacles,
-        "hostile input": lambda rng, folder: hostile(options.hostile, rng, folder),
-        "scenarios that misbehave": lambda rng, folder: misbehaving.scenarios(
-            options.scenarios, rng, folder
+        "edits by SQL": (options.edits, edits.sql),
+        "published files": (options.published, edits.published),
+        "hostile input": (options.hostile, hostile),
+        "scenarios that misbehave": (options.scenarios, misbehaving.scenarios),
+        "environments": (
+            options.environments, lambda number, rng, _: environments.attack(number, rng)
         ),
-        "a bit of every byte of the database": every_byte,
-    }
-    if not options.every_byte:
-        del campaigns["a bit of every byte of the database"]
-    if not options.kills:
-        del campaigns["kill -9"]
-    if not options.flips:
-        del campaigns["flipped bits"], campaigns["files cut short, folders in their place"]
-    if not options.others:
-        del campaigns["kill -9 of export, report, retry"]
-    if not options.scenarios:
-        del campaigns["scenarios that misbehave"]
-    if not options.hostile:
-        del campaigns["hostile input"]
+        "circumstances": (
+            options.circumstances, lambda _, rng, folder: circumstances.attack(rng, folder)
+        ),
+        "a bit of every byte of the database": (
+            options.every_byte, lambda _, rng, folder: every_byte(rng, folder)
+        ),
+    }  # fmt: skip
     begin, failed = time.process_time(), 0
     print("| attack | attempts | what became of them | failures |\n|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
-        for number, (title, campaign) in enumerate(campaigns.items()):
-            folder = Path(name) / str(number)
+        for title, (number, campaign) in campaigns.items():
+            if not number:
+                continue
+            folder = Path(name) / title.replace(" ", "-")
             folder.mkdir()
-            tally = campaign(random.Random(options.seed), folder)
+            tally = campaign(number, random.Random(options.seed), folder)
             failed += _failures(tally)
             tried = ", ".join(f"{tally[what]} {what}" for what in ATTEMPTS if tally[what])
             became = ", ".join(

@@ -110,6 +110,8 @@ class Adversary:
 
     def result(self, trial: Trial) -> TrialResult:
         """Return what a trial measures: a function of it, so that it is run once only."""
+        if trial.identity not in self.results:
+            self.results[trial.identity] = run_trial(trial)
         return self.results[trial.identity]
 
     def content(self, directory: Path) -> object:
@@ -149,13 +151,19 @@ class Here:
         self.adversary = adversary
 
     def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
+        self,
+        trials: Sequence[Trial],
+        run_trial: RunTrial,
+        started: Callable[[str], None],
+        ended: Callable[[str], None],
     ) -> Generator[Outcome]:
         """See `nested_agents.studies.workers.runner.Workers.arrivals`."""
         for trial in trials:
             started(trial.identity)
             time.sleep(0.08)
-            yield Outcome(trial, None, 1.0, self.adversary.result(trial))
+            result = self.adversary.result(trial)
+            ended(trial.identity)
+            yield Outcome(trial, None, 1.0, result)
 
 
 def read(adversary: Adversary, line: str, path: Path) -> str:
