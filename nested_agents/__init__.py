@@ -87,6 +87,7 @@ _PLACES = {
     "reevaluate": ("studies.api.reevaluation", "reevaluate"),
     "run": ("studies.api.running", "run"),
     "run_trial": ("studies.trials.session", "run_trial"),
+    "scaling_law": ("studies.api.growth", "scaling_law"),
     "seeds_for": ("studies.results.power", "seeds_for"),
     "tune": ("studies.api.tuning", "tune"),
     "state_variable": ("scenarios.state_variables", "state_variable"),

@@ -14,14 +14,7 @@ import numpy as np
 
 from ..adaptation.foresight import Foresight
 from ..adaptation.predictors import GivenPredictor, Mirror
-from ..evaluators.evaluator import (
-    NOTHING_GIVEN,
-    DecisionProblem,
-    Deliberation,
-    Evaluator,
-    ValueOf,
-    concerned,
-)
+from ..evaluators.evaluator import NOBODY, NOTHING_GIVEN, Deliberation, Evaluator
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn, all_hear_all
 from ..interface.agents import Agents, Counts, Memory, Placement, under
@@ -31,7 +24,8 @@ from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
 from ..learners.learner import LearnerSettings
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
-from .plain import as_evaluator, as_explorer, as_learner
+from .plain import as_explorer, as_learner
+from .valuing import Present, evaluator_of
 
 UNKNOWN: FloatArray = np.zeros(0)
 """The weights of agents of another part."""
@@ -127,7 +121,11 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         )
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
         self.learner = as_learner(settings.build(self.rules, rows))
-        self.evaluator = self._evaluator(placement)
+        self._placement = placement
+        self._evaluators: dict[Hierarchy, Evaluator | None] = {}
+        self._left = NOBODY
+        self._actions_of_left = NOBODY
+        self.evaluator = self._evaluator()
         self._decides_for_all = (
             self.evaluator is not None
             and type(self.evaluator).decide is not Evaluator.decide
@@ -144,44 +142,24 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         is_counted = conditional and self.evaluator is not None
         self.given: FloatArray = np.ones((n, n_actions) * 2 if is_counted else (0, 0, 0, 0))
 
-    def _evaluator(self, placement: Placement) -> Evaluator | None:
-        settings = self.settings
-        decision = settings.decision
-        if decision.rule == "random":
-            return None
-        members = set(self.members.tolist())
-        first = next(agent for agent in self.hierarchy.order if agent in members)
-        problem = DecisionProblem(
-            rules=self.rules,
-            hierarchy=self.hierarchy,
-            n_actions=len(self.action_set),
-            groups=self.scenario.groups,
-            rule=decision.rule,
-            teammates=decision.teammates,
-            discount=settings.discount,
-            value_of=decision.value_of,
-            unseen=decision.unseen,
-            plan=decision.plan,
-            handed_down=self.hierarchy.told == "ancestors" and not placement.messages_fail,
-            first=first,
-        )
-        if decision.rule != "reward" and not placement.is_whole:
-            self._check_values(decision.value_of)
-        if isinstance(self.learner, Evaluator):
-            return self.learner
-        return as_evaluator(decision.evaluator.build(problem))
+    def _evaluator(self) -> Evaluator | None:
+        """Return what values actions among those who are there."""
+        learned = self.learner if isinstance(self.learner, Evaluator) else None
+        present = Present(self.hierarchy, self._left)
+        return evaluator_of(self.settings, self.rules, learned, self._placement, present)
 
-    def _check_values(self, value_of: ValueOf) -> None:
-        """Refuse to decide by values of agents of other parts, whose weights nobody knows."""
-        own = set(self.members.tolist())
-        agents = self.hierarchy.agents
-        whose = concerned(self.hierarchy, value_of)
-        for agent in own:
-            for other in sorted(set(whose[agent].tolist()) - own):
-                raise ValueError(
-                    f"learner.decision.value_of = {value_of!r}: values of {agents[other]!r} are "
-                    f"not known to {agents[agent]!r}, who is of another part; use 'own'"
-                )
+    def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
+        """Consider from now on whom another hierarchy has below; who has left is known to all."""
+        self._evaluators.setdefault(self.hierarchy, self.evaluator)
+        self.hierarchy = hierarchy
+        self._left = left
+        self._actions_of_left = actions
+        if hierarchy not in self._evaluators:
+            self._evaluators[hierarchy] = self._evaluator()
+        new = self._evaluators[hierarchy]
+        if new is not None and self.evaluator is not None:
+            new.counts = self.evaluator.counts
+        self.evaluator = new
 
     @property
     def counts(self) -> Counts:
@@ -277,6 +255,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """Return the action of an agent that has been told those of others."""
         assert self.evaluator is not None
         known = (self._neutral if inputs.previous is None else inputs.previous).copy()
+        if len(self._left):
+            senders = np.concatenate([senders, self._left])
+            actions = np.concatenate([actions, self._actions_of_left])
         known[senders] = actions
         if self._senders:
             told = known[self._senders[agent]]

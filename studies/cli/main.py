@@ -42,6 +42,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "plan": (".commands.running", "Tell what a study will take, and what it can find."),
     "table": (".commands.reading", "Print the results of a study: conditions against estimates."),
     "compare": (".commands.reading", "Compare conditions of one study or several, seed by seed."),
+    "fit": (".commands.fitting", "Fit how results grow with the size of teams, and predict."),
     "results": (".commands.reading", "Print what every episode of a study measured."),
     "status": (".commands.reading", "Tell how far a study is, what failed, and how long is left."),
     "retry": (".commands.running", "Run the failed trials of a study again."),

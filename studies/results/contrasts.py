@@ -116,7 +116,7 @@ def contrasts(
     SpecError
         If the results have no such measure, phase, key or reference.
     """
-    shown_as, values, phase = _values(results, measure, phase or _usual_phase(results))
+    shown_as, values, phase = values_of(results, measure, phase or _usual_phase(results))
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
     pairs = {
         setting: [(name, measure, values[c], values[members[0][1]]) for name, c in members[1:]]
@@ -153,7 +153,7 @@ def power_with_first(results: Results) -> tuple[str, ...]:
 
     As `contrasts` of the same say it, whose tests take seconds where seeds are thousands.
     """
-    measure, values, phase = _values(results, SUCCESS.name, _usual_phase(results))
+    measure, values, phase = values_of(results, SUCCESS.name, _usual_phase(results))
     base, *others = (values[c] for c in results.columns if c in values)
     pairs = [select_shared([own, base]) for own in others]
     samples = [own - reference for own, reference in pairs if len(own) >= 2]
@@ -180,7 +180,7 @@ _Pairs = list[tuple[str, str]]
 """Names of the conditions of a group, and their labels; the reference first."""
 
 
-def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, BySeed], str]:
+def values_of(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, BySeed], str]:
     """Return a measure, its means of seeds by condition, and the phase that they are of."""
     measures = {m.name: m for m in (*results.measures, *EPISODES)}
     name = next((m.name for m in measures.values() if m.heading == name), name)

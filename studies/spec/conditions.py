@@ -15,6 +15,7 @@ from pydantic import AfterValidator, Field
 
 from ...core.agents.joint import Granularity, join_agents
 from ...core.agents.mixed import MixedSettings
+from ...core.hierarchy.failures import LeftAgents
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
@@ -101,6 +102,17 @@ class ConditionSettings(Settings):
             raise ValueError(f"scenario: has {len(scenario.agents)} agents: {error}") from None
         pairs = scenario.interactions
         return scenario, build(self.topology, scenario.agents, scenario.groups, pairs)
+
+    @property
+    def onsets(self) -> tuple[int, ...]:
+        """Episodes in which failures of the scenario begin, or agents leave."""
+        left = [f.episode for f in self.topology.failures if isinstance(f, LeftAgents)]
+        return (*self.scenario.onsets, *left)
+
+    @property
+    def onset(self) -> int | None:
+        """Episode in which the first of them begins; none: never."""
+        return min(self.onsets, default=None)
 
     def acts_as(self, other: ConditionSettings) -> bool:
         """Return whether topology and learner are those of `other`."""

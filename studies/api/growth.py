@@ -1,0 +1,91 @@
+"""Laws of growth of a study: a table, sentences and a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING
+
+from ..presentation.tables import SummaryTable, tabulate
+from ..results import scaling_law as laws_of_results
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .study import StudyResults
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How a measure grows with size; printed or shown by a notebook, table and sentences."""
+
+    analysis: laws_of_results.ScalingLaw
+    """The laws, group by group."""
+
+    @cached_property
+    def table(self) -> SummaryTable:
+        """Exponents, what else a law has, and predictions, in all forms."""
+        return tabulate(self.analysis.table)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Which laws were chosen, how they predicted what was left out, how exponents differ."""
+        return self.analysis.notes
+
+    def figure(self) -> Figure:
+        """Return what was measured, the laws and their 90 % predictions."""
+        from ..presentation.growth import draw_laws  # matplotlib takes its time
+
+        return draw_laws(self.analysis)
+
+    def __str__(self) -> str:
+        return "\n".join([str(self.table), "", *self.notes])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        lines = "\n".join(map(escape, self.notes))
+        return f"{self.table.html}<pre>{lines}</pre>"
+
+
+def scaling_law(
+    study: StudyResults,
+    measure: str | None = None,
+    *,
+    phase: str | None = None,
+    size: str | None = None,
+    criterion: float | None = None,
+    predict: Sequence[int] = (),
+) -> Growth:
+    """Fit how a measure of a study grows with the size of its teams.
+
+    Parameters
+    ----------
+    study
+        Loaded results, whose sizes are a swept key of numbers.
+    measure
+        Of episodes, ``steps``, ``return`` or a number of whole trials, by name; by default the
+        first, which is success.
+    phase
+        Of the episodes; by default ``evaluation``, or where there is none ``training``.
+    size
+        The swept key, or its last part, as ``robots``; by default the only one of numbers.
+    criterion
+        Fit the decisions of training until this share of five episodes in a row succeeds.
+    predict
+        Sizes to predict, beside those that were run: the mean of as many seeds, with its 90 %
+        interval.
+
+    Raises
+    ------
+    SpecError
+        If there is no such measure, phase or size.
+    """
+    results = study.results
+    name = results.measures[0].name if measure is None else measure
+    law = laws_of_results.scaling_law(
+        results, name, phase=phase, size=size, criterion=criterion, predict=predict
+    )
+    return Growth(law)

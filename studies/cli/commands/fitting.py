@@ -1,0 +1,81 @@
+"""The command that fits laws of growth to the results of a study."""
+
+from pathlib import Path
+
+import click
+
+from ...errors import refused
+from .. import options
+from ..display import Form, in_form, print_data, print_table, print_text
+from ..loading import load_results
+
+
+@click.command()
+@options.sources
+@click.option(
+    "--measure",
+    metavar="NAME",
+    help="A measure of episodes, steps, return, or a number of whole trials, as decision_median or "
+    "messages; by default success.",
+)
+@click.option("--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one.")
+@click.option(
+    "--size",
+    metavar="KEY",
+    help="The swept key that is the size, as robots; by default the only one of numbers.",
+)
+@click.option(
+    "--criterion",
+    type=float,
+    metavar="SHARE",
+    help="Fit the decisions of training until this share of five episodes in a row succeeds; runs "
+    "that never do are censored.",
+)
+@click.option(
+    "--predict",
+    type=click.IntRange(1),
+    multiple=True,
+    metavar="N...",
+    help="Sizes that were not run: the mean of as many seeds, with its 90 % interval.",
+)
+@options.plot
+@options.where
+@options.form
+@options.trust
+def fit(
+    sources: tuple[Path, ...],
+    measure: str | None,
+    phase: str | None,
+    size: str | None,
+    criterion: float | None,
+    predict: tuple[int, ...],
+    plot: Path | None,
+    where: str | None,
+    form: Form,
+    trust: bool,
+) -> int:
+    """Fit how results grow with the size of teams: exponents, floors, break points, predictions.
+
+    DIR is where a study is kept that sweeps a size, FILE.json a file of results. Conditions that
+    agree in all else have a law each: a power law, one with a floor or a break point; of rates a
+    logistic curve. The one is taken that best predicts the largest sizes from those below.
+    """
+    from ...api.growth import scaling_law
+
+    loaded = load_results(sources, where=where, trust=trust)
+    growth = scaling_law(
+        loaded, measure, phase=phase, size=size, criterion=criterion, predict=predict
+    )
+    if plot is not None:
+        from ...presentation.figures import write
+
+        with refused():
+            write(growth.figure(), plot)
+    if form != "table":
+        print_data(in_form(growth.table, form))
+        return 0
+    print_text(growth.analysis.title)
+    if growth.analysis.table:
+        print_table(growth.table, growth.analysis.legend)
+    print_text(*growth.notes)
+    return 0

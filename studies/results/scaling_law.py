@@ -1,0 +1,290 @@
+"""How the results of a study grow with the size of its teams: laws by groups of conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from textwrap import wrap
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.numerics import pd
+from ...core.plugins.words import closest
+from ..errors import WIDTH, SpecError
+from ..spec.tables import label_but
+from . import laws
+from .analysis import Summary, format_p
+from .contrasts import values_of
+from .power import seeds_for
+from .results import Results
+from .statistics import LEVEL, Array, Estimate, holm, two_figures
+
+WINDOW = 5
+"""Episodes in a row whose mean success must reach a criterion."""
+APART = 0.2
+"""Difference of exponents of which it is told how many seeds find it."""
+
+
+class Fitted(NamedTuple):
+    """The law of a group of conditions."""
+
+    group: str
+    """What they have in common; empty if there is nothing."""
+    law: laws.Law | None
+    """None if there is none, see `why`."""
+    why: str = ""
+    """Why there is no law, in one sentence."""
+    censored: int = 0
+    """How many runs did not reach the criterion."""
+
+
+class ScalingLaw(NamedTuple):
+    """How one measure grows with size."""
+
+    title: str
+    """What is measured."""
+    size: str
+    """What is counted: robots, joints, agents."""
+    fits: tuple[Fitted, ...]
+    """By group."""
+    predicted: tuple[int, ...]
+    """Sizes that are predicted, beside those that were run."""
+
+    @property
+    def table(self) -> tuple[Summary, ...]:
+        """A line for each group that has a law: what its parameters mean, and predictions."""
+        lines = []
+        for group, law, *_ in self.fits:
+            if law is not None:
+                estimates = {**law.exponents()}
+                estimates |= {f"at {n} (90 %)": law.predict(n) for n in self.predicted}
+                lines.append(Summary(group or "all", law.seeds, estimates))
+        return tuple(lines)
+
+    @property
+    def legend(self) -> tuple[str, ...]:
+        """How the table's intervals are made, in lines."""
+        return tuple(
+            _wrapped(
+                "Intervals of parameters: 95 %, seeds resampled, Student's. Predictions: of the "
+                "mean of as many seeds."
+            )
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was chosen, how it predicted sizes that were left out, how groups differ."""
+        lines: list[str] = []
+        for fitted in self.fits:
+            lines += _wrapped(_sentence(fitted, self.size))
+        lines += self._comparisons()
+        return tuple(lines)
+
+    def _comparisons(self) -> list[str]:
+        """Return how exponents differ from that of the first group, of equal seeds and sizes."""
+        known = [(f.group, f.law) for f in self.fits if f.law is not None]
+        base = known[0] if known else None
+        if base is None or not _is_line(base[1]):
+            return []
+        pairs = [(g, laws.compare(law, base[1])) for g, law in known[1:] if _alike(law, base[1])]
+        if not pairs:
+            return []
+        lines = [f"Exponents, less that of {base[0]}:"]
+        ps = holm([contrast.p for _, contrast in pairs]).tolist()
+        for (group, contrast), p in zip(pairs, ps, strict=True):
+            word = "differs" if p < LEVEL else "no significant difference"
+            shown = bracketed(contrast.difference)
+            lines += _wrapped(f"{word}: {group}, {shown}, p {format_p(p)}", "  ")
+        spread = max(contrast.deviation for _, contrast in pairs)
+        seeds = seeds_for(APART, spread, len(pairs)) if spread > 0.0 else None
+        if seeds is not None:
+            lines += _wrapped(
+                f"Power: exponents that differ by {two_figures(APART)} are told apart with "
+                f"probability .80 by about {seeds} seeds at these sizes."
+            )
+        return lines
+
+
+def bracketed(e: Estimate) -> str:
+    """Return an estimate with its interval, ``.39 [.21, .56]``."""
+    value, low, high = (two_figures(float(end)) for end in e)
+    return f"{value} [{low}, {high}]"
+
+
+def _wrapped(text: str, indent: str = "") -> list[str]:
+    return wrap(
+        text,
+        WIDTH,
+        initial_indent=indent,
+        subsequent_indent=f"{indent}  ",
+        break_on_hyphens=False,
+    )
+
+
+def _is_line(law: laws.Law) -> bool:
+    return law.curve.n_parameters == 2 and not law.sample.censored.any()
+
+
+def _alike(law: laws.Law, base: laws.Law) -> bool:
+    """Return whether exponents can be compared seed by seed."""
+    same_shape = law.sample.values.shape == base.sample.values.shape
+    return _is_line(law) and same_shape and bool((law.sample.sizes == base.sample.sizes).all())
+
+
+def _sentence(fitted: Fitted, size: str) -> str:
+    head = f"{fitted.group}: " if fitted.group else ""
+    law = fitted.law
+    if law is None:
+        return f"{head}no law: {fitted.why}"
+    sizes = law.sample.sizes
+    counted = f"{law.seeds} seeds, {len(sizes)} sizes from {sizes[0]:g} to {sizes[-1]:g} {size}"
+    unreached = f", {fitted.censored} runs censored" if fitted.censored else ""
+    text = f"{head}{law.curve.name} ({counted}{unreached})"
+    for n, measured, e in law.held_out:
+        inside = "inside" if e.low <= measured <= e.high else "outside"
+        text += f"; {n:g} left out: predicted {bracketed(e)}, measured {two_figures(measured)}, "
+        text += inside
+    return f"{text}."
+
+
+def scaling_law(
+    results: Results,
+    measure: str,
+    *,
+    phase: str | None = None,
+    size: str | None = None,
+    criterion: float | None = None,
+    predict: Sequence[int] = (),
+) -> ScalingLaw:
+    """Fit how a measure grows with the size of teams, in each group of conditions.
+
+    Parameters
+    ----------
+    results
+        Of any studies.
+    measure
+        Of episodes, ``steps``, ``return``, or a number of whole trials, by name; with a criterion a
+        rate.
+    phase
+        Of the episodes; by default ``evaluation``, or where there is none ``training``.
+    size
+        A swept key that is a number, or the last part of it; by default the only one there is.
+    criterion
+        Decisions of training are fitted that it takes until this share of `WINDOW` episodes in a
+        row has the measure.
+    predict
+        Sizes of which the mean of as many seeds is predicted.
+
+    Raises
+    ------
+    SpecError
+        If there is no such measure, phase or key, the key is no number, or the criterion no share.
+    """
+    key = _size_key(results, size)
+    if criterion is None:
+        phases = [phase] if phase else ["evaluation", "training"]
+        own = next((p for p in phases if p in results.phases), phases[0])
+        shown_as, values, own = values_of(results, measure, own)
+        samples: Mapping[str, tuple[pd.Series, pd.Series | None]] = {
+            c: (pd.Series(v), None) for c, v in values.items()
+        }
+        title = f"{shown_as.heading}, {own}" if own else shown_as.heading
+    else:
+        samples = _decisions(results, measure, criterion)
+        title = f"decisions to {two_figures(criterion)} of {measure}"
+        shown_as, own = SUCCESS, ""
+    counts = _episodes(results, shown_as, own) if shown_as.is_rate and criterion is None else {}
+    groups: dict[str, list[str]] = {}
+    for condition in samples:
+        groups.setdefault(label_but(results.columns[condition], [key]), []).append(condition)
+    fits = []
+    for group, members in groups.items():
+        members.sort(key=lambda c: float(results.columns[c][key]))
+        sizes = np.array([float(results.columns[c][key]) for c in members])
+        fits.append(_fit(group, sizes, [samples[c] for c in members], counts.get(members[0])))
+    return ScalingLaw(title, key.rpartition(".")[2], tuple(fits), tuple(predict))
+
+
+def _size_key(results: Results, size: str | None) -> str:
+    """Return the swept key that sizes are of."""
+    keys = list(dict.fromkeys(key for own in results.columns.values() for key in own))
+    numbers = [
+        key
+        for key in keys
+        if all(
+            isinstance(own.get(key), int | float) and not isinstance(own.get(key), bool)
+            for own in results.columns.values()
+        )
+        and len({own.get(key) for own in results.columns.values()}) > 1
+    ]
+    if size is not None:
+        key = next((k for k in numbers if size in (k, k.rpartition(".")[2])), None)
+        if key is None:
+            raise SpecError(f"size = {size!r}: {closest(size, numbers)}; a swept key of numbers")
+        return key
+    if len(numbers) != 1:
+        names = ", ".join(numbers) or "none"
+        raise SpecError(f"size: name the swept key that is the size; those of numbers: {names}")
+    return numbers[0]
+
+
+def _episodes(results: Results, measure: Measure, phase: str) -> dict[str, int]:
+    return {
+        c: results.values(c, measure.name, phase).shape[1]
+        for c in results.of_phase(phase)
+        if results.has(c, phase, measure.name)
+    }
+
+
+def _decisions(
+    results: Results, measure: str, criterion: float
+) -> dict[str, tuple[pd.Series, pd.Series]]:
+    """Return by condition decisions until the criterion, or all, and whether it was not reached."""
+    rates = {m.name for m in results.measures if m.is_rate}
+    if measure not in rates:
+        raise SpecError(f"measure = {measure!r}: {closest(measure, rates)}; a rate has a criterion")
+    if not 0.0 < criterion <= 1.0:
+        raise SpecError(f"criterion = {criterion!r}: must be above 0 and at most 1")
+    samples = {}
+    for condition in results.of_phase("training"):
+        if not results.has(condition, "training", measure):
+            continue
+        reached = results.values(condition, measure).astype(float)
+        spent = results.values(condition, "steps").cumsum(axis=1)
+        width = min(WINDOW, reached.shape[1])
+        sums = np.cumsum(np.pad(reached, ((0, 0), (1, 0))), axis=1)
+        means = (sums[:, width:] - sums[:, :-width]) / width
+        is_there = means >= criterion - 1e-12
+        first = np.where(is_there.any(axis=1), is_there.argmax(axis=1), means.shape[1] - 1)
+        decisions = spent[np.arange(len(spent)), first + width - 1]
+        seeds = results.seeds(condition)
+        unreached = pd.Series(~is_there.any(axis=1), seeds)
+        samples[condition] = pd.Series(decisions.astype(float), seeds), unreached
+    return samples
+
+
+def _fit(
+    group: str,
+    sizes: Array,
+    samples: Sequence[tuple[pd.Series, pd.Series | None]],
+    episodes: int | None,
+) -> Fitted:
+    """Return the law of a group, of the seeds that ran at all sizes."""
+    if any(a == b for a, b in pairwise(sizes)):
+        return Fitted(group, None, "a size stands twice; conditions differ in something else")
+    frame = pd.concat([own for own, _ in samples], axis=1).dropna()
+    values = frame.to_numpy(dtype=float)
+    censored = np.zeros(values.shape, dtype=bool)
+    for k, (_, marked) in enumerate(samples):
+        if marked is not None:
+            censored[:, k] = marked.loc[frame.index].to_numpy()
+    try:
+        if episodes is not None:
+            sample = laws.of_rates(sizes, values * episodes, episodes)
+        else:
+            sample = laws.of_numbers(sizes, values, censored)
+        return Fitted(group, laws.choose(sample), censored=int(censored.sum()))
+    except ValueError as error:
+        return Fitted(group, None, str(error))

@@ -1,0 +1,119 @@
+"""Laws of growth: against curves that are known, and their promises by simulation."""
+
+import numpy as np
+import pytest
+
+from nested_agents.studies.results import laws
+
+SIZES = np.array([2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
+LAWS = {
+    "power law": lambda n: 5.0 * n**0.6,
+    "power law with a floor": lambda n: 20.0 + 0.05 * n**2,
+}
+
+
+def drawn(of, sizes=SIZES, seeds=10, noise=0.1, seed=0):
+    """Return numbers ``(seeds, sizes)`` that deviate from a law by a factor."""
+    rng = np.random.default_rng(seed)
+    return of(sizes) * np.exp(rng.normal(0.0, noise, size=(seeds, len(sizes))))
+
+
+def test_a_power_law_without_noise_is_met_exactly() -> None:
+    law = laws.choose(laws.of_numbers(SIZES, np.tile(LAWS["power law"](SIZES), (3, 1))))
+    assert law.curve.name == "power law"
+    exponent = law.exponents()["exponent"]
+    assert [float(end) for end in exponent] == pytest.approx([0.6] * 3)
+    assert float(law.predict(128.0).value) == pytest.approx(5.0 * 128.0**0.6)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_law_that_holds_is_chosen_and_predicts(name) -> None:
+    sample = laws.of_numbers(SIZES, drawn(LAWS[name]))
+    law = laws.choose(sample)
+    assert law.curve.name == name
+    e = law.predict(128.0)
+    assert e.low < LAWS[name](np.array(128.0)) < e.high
+    assert [size for size, *_ in law.held_out] == [32.0, 64.0]
+
+
+def test_a_break_is_met_by_a_fit() -> None:
+    def broken(n):
+        return np.where(n < 8.0, n**0.2, 8.0**0.2 * (n / 8.0) ** 1.5)
+
+    values = np.tile(broken(SIZES), (3, 1)) * np.array([[0.9], [1.0], [1.1]])
+    fitted = laws.fit(laws.BREAK, laws.of_numbers(SIZES, values)).exponents()
+    assert float(fitted["exponent below"].value) == pytest.approx(0.2, abs=1e-3)
+    assert float(fitted["exponent above"].value) == pytest.approx(1.5, abs=1e-3)
+    assert float(fitted["break"].value) == pytest.approx(8.0, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_intervals_of_exponents_and_predictions_cover_what_they_promise() -> None:
+    rng = np.random.default_rng(1)
+    covered = np.zeros(2)
+    times = 300
+    for _ in range(times):
+        of_seeds = rng.normal(0.0, 0.15, size=(9, 1))
+        noise = rng.normal(0.0, 0.3, size=(9, 5)) + of_seeds
+        sizes = np.array([2.0, 4.0, 8.0, 16.0, 64.0])
+        values = 5.0 * sizes**0.4 * np.exp(noise)
+        law = laws.fit(laws.POWER, laws.of_numbers(sizes[:4], values[:, :4]), 100)
+        e = law.exponents()["exponent"]
+        p = law.predict(64.0)
+        new = 5.0 * 64.0**0.4 * np.exp(rng.normal(0.0, np.hypot(0.15, 0.3), size=9).mean())
+        covered += [e.low <= 0.4 <= e.high, p.low <= new <= p.high]
+    assert 0.91 <= covered[0] / times <= 0.99, "95 %"
+    assert 0.85 <= covered[1] / times <= 0.96, "90 %"
+
+
+def test_rates_follow_a_logistic_curve() -> None:
+    rng = np.random.default_rng(0)
+    rates = 1.0 / (1.0 + np.exp(-(3.0 - 0.9 * np.log(SIZES))))
+    law = laws.choose(laws.of_rates(SIZES, rng.binomial(50, rates, size=(12, 6)), 50))
+    assert law.curve.name == "logistic in log n"
+    e = law.exponents()["exponent"]
+    assert e.low <= -0.9 <= e.high
+    assert 0.0 < float(law.predict(1e6).low) < float(law.predict(1e6).high) < 1.0
+
+
+def test_runs_that_all_ended_alike_still_have_an_interval_of_predictions() -> None:
+    law = laws.choose(laws.of_rates(SIZES, np.full((8, 6), 10), 10))
+    e = law.predict(128.0)
+    assert float(e.low) <= float(e.value) <= float(e.high)
+
+
+def test_what_was_not_reached_is_known_to_be_larger() -> None:
+    """Taken for reached, it would flatten the law."""
+    values = drawn(lambda n: 50.0 * n**0.5, SIZES[:4], noise=0.4)
+    limit = 120.0
+    cut = np.minimum(values, limit)
+    censored = laws.choose(laws.of_numbers(SIZES[:4], cut, values > limit)).exponents()["exponent"]
+    taken = laws.fit(laws.POWER, laws.of_numbers(SIZES[:4], cut)).exponents()["exponent"]
+    assert float(taken.value) < float(censored.value) - 0.1
+    assert censored.low <= 0.5 <= censored.high
+
+
+def test_exponents_are_compared_seed_by_seed() -> None:
+    common = np.random.default_rng(0).normal(size=(8, 1)) * np.log(SIZES)
+    one = laws.fit(laws.POWER, laws.of_numbers(SIZES, np.exp(common + 0.5 * np.log(SIZES))))
+    other = laws.fit(laws.POWER, laws.of_numbers(SIZES, np.exp(common + 0.2 * np.log(SIZES))))
+    contrast = laws.compare(one, other)
+    assert float(contrast.difference.value) == pytest.approx(0.3)
+    assert contrast.p < 1e-6
+    assert laws.compare(one, one).p == 1.0
+
+
+@pytest.mark.parametrize(
+    ("sizes", "seeds", "said"),
+    [(2, 5, "2 sizes and 5 seeds: a law takes 3"), (4, 1, "4 sizes and 1 seed: a law takes 3")],
+)
+def test_too_little_is_no_law(sizes, seeds, said) -> None:
+    with pytest.raises(ValueError, match=said):
+        laws.choose(laws.of_numbers(SIZES[:sizes], np.ones((seeds, sizes))))
+
+
+def test_nothing_but_censored_runs_is_no_law() -> None:
+    with pytest.raises(ValueError, match="all are censored"):
+        laws.of_numbers(SIZES, np.ones((3, 6)), np.ones((3, 6), dtype=bool))
+    with pytest.raises(ValueError, match="of positive numbers"):
+        laws.of_numbers(SIZES, np.zeros((3, 6)))
