@@ -162,25 +162,38 @@ def tree(
     return nx.relabel_nodes(graph, dict(enumerate(agents)))
 
 
-def star(agents: Names, bodies: Bodies = (), *, leader: str | None = None) -> nx.DiGraph:
-    """Put one leader right above everyone else.
+def star(
+    agents: Names,
+    bodies: Bodies = (),
+    *,
+    leader: str | None = None,
+    leader_decides: Annotated[Literal["first", "last"], unwritten("first")] = "first",
+) -> nx.DiGraph:
+    """Put one leader right above everyone else, or right below.
 
     Parameters
     ----------
     agents, bodies
         Names, also by body.
     leader
-        Name of the leader; none: the first agent.
+        Name of the leader; none: the first agent, or the last one if it decides last.
+    leader_decides
+        Whether the leader decides first and tells everyone else, or last and is told by everyone.
 
     Examples
     --------
     >>> list(star(["a", "b", "c"], leader="b").edges)
     [('b', 'a'), ('b', 'c')]
+    >>> list(star(["a", "b", "c"], leader_decides="last").edges)
+    [('a', 'c'), ('b', 'c')]
     """
-    leader = agents[0] if leader is None else leader
+    is_first = leader_decides == "first"
+    usual = agents[0] if is_first else agents[-1]
+    leader = usual if leader is None else leader
     check_names([leader], agents, "leader", all_needed=False)
     graph = independent(agents)
-    graph.add_edges_from((leader, agent) for agent in agents if agent != leader)
+    others = [agent for agent in agents if agent != leader]
+    graph.add_edges_from((leader, other) if is_first else (other, leader) for other in others)
     return graph
 
 

@@ -18,7 +18,7 @@ from typing import Annotated, Literal, Self
 from pydantic import model_validator
 
 from ..core.coordination.graphs import orient
-from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure
+from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure, LeftAgents
 from ..core.hierarchy.hierarchy import Considers, Hierarchy, Told
 from ..core.numerics import nx
 from ..core.plugins import sources
@@ -70,9 +70,11 @@ class TopologySettings(Settings):
 
     @model_validator(mode="after")
     def _check_relations(self) -> Self:
-        if self.told == "none" and not all(isinstance(f, AbsentAgents) for f in self.failures):
+        if self.told == "none" and not all(
+            isinstance(f, AbsentAgents | LeftAgents) for f in self.failures
+        ):
             raise ValueError(
-                "told = 'none': there are no messages to fail, failures must be absent"
+                "told = 'none': there are no messages to fail, failures must be absent or left"
             )
         if self.fill_in and self.oriented is None:
             raise ValueError("fill_in = true: needs oriented, in which order agents decide")

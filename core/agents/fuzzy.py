@@ -13,14 +13,8 @@ import numpy as np
 
 from ..adaptation.foresight import Foresight
 from ..adaptation.predictors import GivenPredictor, Mirror
-from ..evaluators.evaluator import (
-    NOTHING_GIVEN,
-    DecisionProblem,
-    Deliberation,
-    Evaluator,
-    ValueOf,
-    concerned,
-)
+from ..evaluators.evaluator import NOBODY, NOTHING_GIVEN, Deliberation, Evaluator
+from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn, all_hear_all
 from ..interface.agents import Agents, Counts, Memory, Placement, under
 from ..interface.experience import Experience, Observation
@@ -29,7 +23,8 @@ from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
 from ..learners.learner import LearnerSettings
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
-from .plain import as_evaluator, as_explorer, as_learner
+from .plain import as_explorer, as_learner
+from .valuing import Present, evaluator_of, is_private
 from .views import FuzzyInputs, View, Views, agreement, senders_of, weights_by_agent
 
 SHAPED = ("learner.theta", "learner.trace", "learner.reach", "seen", "explorer", "generator")
@@ -105,9 +100,13 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         )
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
         self.learner = as_learner(settings.build(self.rules, rows))
-        self.is_private = settings.decision.errors is not None or scenario.is_private
+        self._placement = placement
+        self._evaluators: dict[Hierarchy, Evaluator | None] = {}
+        self._left = NOBODY
+        self._actions_of_left = NOBODY
+        self.is_private = is_private(settings, scenario)
         self.views: Views | None = None
-        self.evaluator = self._evaluator(placement)
+        self.evaluator = self._evaluator()
         self._decides_for_all = (
             self.evaluator is not None
             and not self.is_private
@@ -129,47 +128,24 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         is_counted = conditional and self.evaluator is not None
         self.given: FloatArray = np.ones((n, n_actions) * 2 if is_counted else (0, 0, 0, 0))
 
-    def _evaluator(self, placement: Placement) -> Evaluator | None:
-        settings = self.settings
-        decision = settings.decision
-        if decision.rule == "random":
-            return None
-        members = set(self.members.tolist())
-        first = next(agent for agent in self.hierarchy.order if agent in members)
-        problem = DecisionProblem(
-            rules=self.rules,
-            hierarchy=self.hierarchy,
-            n_actions=len(self.action_set),
-            groups=self.scenario.groups,
-            rule=decision.rule,
-            teammates=decision.teammates,
-            discount=settings.discount,
-            value_of=decision.value_of,
-            unseen=decision.unseen,
-            plan=decision.plan,
-            handed_down=self.hierarchy.told == "ancestors"
-            and not placement.messages_fail
-            and not self.is_private,
-            first=first,
-            is_private=self.is_private,
-        )
-        if decision.rule != "reward" and not placement.is_whole:
-            self._check_values(decision.value_of)
-        if isinstance(self.learner, Evaluator):
-            return self.learner
-        return as_evaluator(decision.evaluator.build(problem))
+    def _evaluator(self) -> Evaluator | None:
+        """Return what values actions among those who are there."""
+        learned = self.learner if isinstance(self.learner, Evaluator) else None
+        present = Present(self.hierarchy, self._left)
+        return evaluator_of(self.settings, self.rules, learned, self._placement, present)
 
-    def _check_values(self, value_of: ValueOf) -> None:
-        """Refuse to decide by values of agents of other parts, whose weights nobody knows."""
-        own = set(self.members.tolist())
-        agents = self.hierarchy.agents
-        whose = concerned(self.hierarchy, value_of)
-        for agent in own:
-            for other in sorted(set(whose[agent].tolist()) - own):
-                raise ValueError(
-                    f"learner.decision.value_of = {value_of!r}: values of {agents[other]!r} are "
-                    f"not known to {agents[agent]!r}, who is of another part; use 'own'"
-                )
+    def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
+        """Consider from now on whom another hierarchy has below; who has left is known to all."""
+        self._evaluators.setdefault(self.hierarchy, self.evaluator)
+        self.hierarchy = hierarchy
+        self._left = left
+        self._actions_of_left = actions
+        if hierarchy not in self._evaluators:
+            self._evaluators[hierarchy] = self._evaluator()
+        new = self._evaluators[hierarchy]
+        if new is not None and self.evaluator is not None:
+            new.counts = self.evaluator.counts
+        self.evaluator = new
 
     @property
     def counts(self) -> Counts:
@@ -266,6 +242,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """Return the action of an agent that has been told those of others."""
         assert self.evaluator is not None
         known = (self._neutral if inputs.previous is None else inputs.previous).copy()
+        if len(self._left):
+            senders = np.concatenate([senders, self._left])
+            actions = np.concatenate([actions, self._actions_of_left])
         known[senders] = actions
         if self._senders:
             told = known[self._senders[agent]]
@@ -310,7 +289,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     def spent(self, inputs: FuzzyInputs) -> Mapping[str, float]:
         """Return how far expectations were right, and what was communicated; without views {}."""
-        return {} if self.views is None else self.views.spent(inputs)
+        return {} if self.views is None else self.views.spent(inputs, self.hierarchy)
 
     def learn(self, experience: Experience, inputs: FuzzyInputs) -> None:
         """Revise predictions, and learn from the states entered; after an episode, all of it."""

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ..hierarchy.failures import MessageFailure, Messages, ReparentedAgents
+from ..hierarchy.failures import LeftAgents, MessageFailure, ReparentedAgents
 from ..hierarchy.hierarchy import Hierarchy
+from ..hierarchy.messages import Messages
 from ..hierarchy.turns import Slot, Turn, slots_of
 from ..interface.agents import Agents, Counts, Memory, Placement, under
 from ..interface.experience import Decision, Experience, Observation
@@ -19,11 +20,15 @@ from ..interface.measures import Measure
 from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
 from ..numerics import AnyArray, IntArray
+from .kept import begin_with
 
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
 
 A = TypeVar("A", bound=Agents[Any])
+MESSAGES = Measure("messages", "messages", gathering="sum", better="lower", least=0.0)
+"""What of a decision's cost is counted here, where agents say more than actions: the messages that
+have arrived, whatever agents are of."""
 
 
 class Team:
@@ -83,24 +88,32 @@ class Team:
         seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
         parts: list[Agents[Any]] = []
         self._part_of = [0] * len(hierarchy)
-        for (members, own), own_seed in zip(kinds, seeds, strict=True):
+        for (members, own, kept), own_seed in zip(kinds, seeds, strict=True):
             for agent in members.tolist():
                 self._part_of[agent] = len(parts)
             fail = bool(failures)
             placement = Placement(world, hierarchy, members, own_seed, messages_fail=fail)
             parts.append(own.agents(placement))
+            if kept is not None:
+                begin_with(parts[-1], kept, len(parts) - 1)
         self.parts = tuple(parts)
         self.costs = costs_of(parts)
         self.spent: Mapping[str, float] = {}
+        self._messages = 0
         self._has_contents = any(part.has_contents for part in parts)
         self.messages = Messages(
             hierarchy, failures, len(world.action_set), has_contents=self._has_contents
         )
+        self._present = hierarchy
+        self._actions_of_left = _actions_of_left(failures, world)
 
     @cached_property
     def _slots(self) -> tuple[Slot, ...]:
         # Who is told by another superior may not decide at once with it.
-        one_by_one = any(isinstance(f, ReparentedAgents) for f in self.messages.failures)
+        one_by_one = any(
+            isinstance(f, ReparentedAgents) or (isinstance(f, LeftAgents) and f.repair == "next")
+            for f in self.messages.failures
+        )
         at_once = [part.at_once and not one_by_one for part in self.parts]
         return slots_of(self.hierarchy, self._part_of, at_once)
 
@@ -172,6 +185,8 @@ class Team:
         Without `explore` every agent takes its greatest action and the team's memory stays as it
         is, apart from the random numbers that break ties.
         """
+        if self._present is not self.messages.hierarchy:
+            self._rearrange()
         inputs = tuple(part.perceive(seen, explore=explore) for part in self.parts)
         joint = self.parts[0].decide_all(inputs[0]) if len(inputs) == 1 else None
         if joint is None:
@@ -192,7 +207,15 @@ class Team:
         joint = np.full((*worlds, len(self.hierarchy)), self.action_set.neutral)
         decided = joint.T  # a view with the agents first, however many worlds there are
         fail = bool(self.messages.failures)
+        gone = self.messages.gone
+        some_left = fail and bool(gone.any())
+        if some_left:
+            joint[..., gone] = self._joint_of_left()[gone]
         for part, agents, receivers, senders in self._slots:
+            if some_left:
+                agents = agents[~gone[agents]]
+                if not len(agents):
+                    continue
             if self.parts[part].has_contents:
                 turn = self.messages.turn_with_contents(agents, joint, self._contents(inputs))
             elif fail:
@@ -200,9 +223,21 @@ class Team:
             else:
                 turn = Turn(agents, receivers, senders, decided[senders].T)
             decided[agents] = self.parts[part].decide(inputs[part], turn).T
+            self._messages += len(turn.senders)
             if fail:
                 joint[self.messages.absent(agents)] = self.action_set.neutral
         return joint
+
+    def _joint_of_left(self) -> IntArray:
+        """Return what agents do who have left ``(n,)``; others are neutral."""
+        return self.messages.acting_for(self._actions_of_left, self.action_set.neutral)
+
+    def _rearrange(self) -> None:
+        """Let all parts know who has left or come, and the hierarchy of those who are there."""
+        self._present = self.messages.hierarchy
+        left = np.flatnonzero(self.messages.gone)
+        for part in self.parts:
+            part.rearrange(self._present, left, self._joint_of_left()[left])
 
     def _contents(self, inputs: tuple[Any, ...]) -> Mapping[int, object]:
         """Return by agent what has been said beside actions so far."""
@@ -214,6 +249,8 @@ class Team:
     def _spent(self, inputs: tuple[Any, ...]) -> Mapping[str, float]:
         """Return what a decision has cost, by the names of `costs`."""
         total = {measure.name: 0.0 for measure in self.costs}
+        total[MESSAGES.name] = float(self._messages)
+        self._messages = 0
         for part, own in zip(self.parts, inputs, strict=True):
             for name, value in part.spent(own).items():
                 total[name] += value
@@ -296,6 +333,8 @@ def costs_of(parts: Sequence[Agents[Any]]) -> tuple[Measure, ...]:
         If two parts give the same cost in different units; one line.
     """
     by_name: dict[str, Measure] = {}
+    if any(part.has_contents for part in parts):
+        by_name[MESSAGES.name] = MESSAGES
     for part in parts:
         for measure in part.costs:
             known = by_name.setdefault(measure.name, measure)
@@ -305,3 +344,24 @@ def costs_of(parts: Sequence[Agents[Any]]) -> tuple[Measure, ...]:
                     f"gives it in {known.unit!r}"
                 )
     return tuple(by_name.values())
+
+
+def _actions_of_left(failures: Sequence[MessageFailure], world: Scenario) -> list[int]:
+    """Return what those do who have left, failure by failure; others are neutral.
+
+    Raises
+    ------
+    ValueError
+        If there is no such action; one line.
+    """
+    names = world.action_set.names
+    actions = []
+    for k, failure in enumerate(failures):
+        action = failure.action if isinstance(failure, LeftAgents) else None
+        if action is not None and action not in names:
+            raise ValueError(
+                f"topology.failures[{k}].action = {action!r}: no action, allowed: "
+                f"{', '.join(names)}"
+            )
+        actions.append(world.action_set.neutral if action is None else names.index(action))
+    return actions

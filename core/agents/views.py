@@ -111,8 +111,6 @@ class Views:
         self._rows = rows
         self._foresight = foresight
         hierarchy = placement.hierarchy
-        self._n = len(hierarchy)
-        self._told = float(sum(len(hierarchy.above(i)) for i in self._members))
         self._broadcast = float(placement.scenario.perceived[placement.members].sum())
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
@@ -137,12 +135,12 @@ class Views:
             views[agent] = View(prediction.of(agent), weights_by_agent(self._rows, own))
         return views
 
-    def spent(self, inputs: FuzzyInputs) -> Mapping[str, float]:
+    def spent(self, inputs: FuzzyInputs, hierarchy: Hierarchy) -> Mapping[str, float]:
         """Return how far expectations were right, and what was communicated in a decision."""
-        share = len(self._members) / self._n  # those of other parts add theirs
+        share = len(self._members) / len(hierarchy)  # those of other parts add theirs
         return {
             "agreement": inputs.agreement * share,
-            "told": self._told,
+            "told": float(sum(len(hierarchy.above(i)) for i in self._members)),
             "broadcast": self._broadcast,
         }
 

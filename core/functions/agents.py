@@ -20,15 +20,15 @@ from ..interface.measures import Measure
 from ..numerics import AnyArray, FloatArray, IntArray
 from .asking import Asking
 from .plain import HeardMessage, Query
+from .recorded import canonical
 from .replies import Reply
 from .settings import FunctionSettings
 
 COUNTED = (
     Measure("calls", "calls", gathering="sum", better="lower", least=0),
-    Measure("messages", "messages", gathering="sum", better="lower", least=0),
     Measure("message_bytes", "size of messages", "B", gathering="sum", better="lower", least=0),
 )
-"""What is measured of functions without being said: answers, messages that arrived, their size."""
+"""What is measured of functions without being said: answers, and the size of contents."""
 
 
 @dataclass
@@ -39,10 +39,8 @@ class FunctionInputs:
     """``(n, d)`` the states that all agents are in."""
     replies: dict[int, Reply] = field(default_factory=dict)
     """What each has answered, by agent."""
-    messages: int = 0
-    """How many messages arrived with a content, or as an action alone."""
     message_bytes: int = 0
-    """Size of their contents [B]."""
+    """Size of all contents that have arrived [B]."""
 
 
 class FunctionAgents(Agents[FunctionInputs]):
@@ -112,21 +110,21 @@ class FunctionAgents(Agents[FunctionInputs]):
     def _told(self, inputs: FunctionInputs, turn: Turn) -> dict[int, dict[str, HeardMessage]]:
         """Return the messages of each agent by sender, in agent order, and count them."""
         told: dict[int, dict[str, HeardMessage]] = {agent: {} for agent in turn.agents.tolist()}
-        hears = self.settings.hears == "contents"
-        contents = turn.contents if hears and turn.contents else (None,) * len(turn.senders)
-        messages = zip(
-            turn.receivers.tolist(),
-            turn.senders.tolist(),
-            turn.actions.tolist(),
-            contents,
-            strict=True,
-        )
-        for receiver, sender, action, content in messages:
-            # Everybody gets a content of its own: what one does with it changes nobody else's.
-            message = HeardMessage(self._actions[action], deepcopy(content))
+        hears = self.settings.hears == "contents" and bool(turn.contents)
+        contents = turn.contents if hears else (None,) * len(turn.senders)
+        # What a sender says to all is one object; it is measured once.
+        messages: dict[tuple[int, int, int], tuple[HeardMessage, int]] = {}
+        arrays = (turn.receivers.tolist(), turn.senders.tolist(), turn.actions.tolist())
+        for receiver, sender, action, content in zip(*arrays, contents, strict=True):
+            key = sender, action, id(content)
+            if key not in messages:
+                message = HeardMessage(self._actions[action], content)
+                messages[key] = message, 0 if content is None else len(canonical(content).encode())
+            message, size = messages[key]
+            if isinstance(content, list | dict):  # what one does with it changes nobody else's
+                message = message._replace(content=deepcopy(content))
             told[receiver][self._agents[sender]] = message
-            inputs.messages += 1
-            inputs.message_bytes += Reply(action, content, {}).size
+            inputs.message_bytes += size
         return told
 
     def contents(self, inputs: FunctionInputs) -> Mapping[int, object]:
@@ -137,7 +135,7 @@ class FunctionAgents(Agents[FunctionInputs]):
     def spent(self, inputs: FunctionInputs) -> Mapping[str, float]:
         """Return what all answers of a decision have cost."""
         total = {measure.name: 0.0 for measure in self.costs}
-        counts = (len(inputs.replies), inputs.messages, inputs.message_bytes)
+        counts = (len(inputs.replies), inputs.message_bytes)
         for measure, count in zip(COUNTED, counts, strict=True):
             if measure.name not in self.settings.costs:
                 total[measure.name] = float(count)

@@ -11,7 +11,7 @@ import asyncio
 import signal
 import threading
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from inspect import Parameter, iscoroutinefunction, signature
 from types import FrameType
@@ -143,10 +143,11 @@ class Caller:
         elif self.is_async:
             yield from self._concurrent(queries, timeout, at_once)
         else:
-            for query in queries:
-                with self._naming(query.agent, timeout), alarm(timeout):
-                    answer = self._call(query)
-                yield query, answer
+            with alarm() as within:
+                for query in queries:
+                    with self._naming(query.agent, timeout), within(timeout):
+                        answer = self._call(query)
+                    yield query, answer
 
     def question(self, query: Query) -> dict[str, Any]:
         """Return all that an answer may depend on, but for the function itself."""
@@ -203,7 +204,7 @@ class Caller:
                 each = [vars(query)[one] for query in queries]
                 given[many] = each[0] if many in SHARED else each
         names = ", ".join(query.agent for query in queries)
-        with self._naming(names, timeout), alarm(timeout):
+        with alarm() as within, self._naming(names, timeout), within(timeout):
             answers = self._thing(**given, **self._named)
             if self.is_async:
                 answers = self._loop().run(limited(answers, timeout))
@@ -243,7 +244,8 @@ class Caller:
         left = loop.run(begin())
         while left:
             # A call that blocks is not stopped by its loop.
-            with self._naming(queries[0].agent, timeout), alarm(2 * timeout):
+            name = queries[0].agent
+            with alarm() as within, self._naming(name, timeout), within(2 * timeout):
                 done, left = loop.run(wait(left))
             yield from filter(None, (task.result() for task in done))
         for query in queries:
@@ -295,25 +297,29 @@ async def limited(answer: Awaitable[Any], seconds: float) -> Any:
 
 
 @contextmanager
-def alarm(seconds: float) -> Iterator[None]:
-    """Interrupt what takes longer, by a signal; outside of the main thread there is none.
+def alarm() -> Iterator[Callable[[float], AbstractContextManager[None]]]:
+    """Give what interrupts calls that take longer than some seconds, by a signal.
 
-    Raises
-    ------
-    OutOfTimeError
-        When the time is over.
+    It raises `OutOfTimeError`; outside of the main thread there is no such signal.
     """
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield lambda seconds: nullcontext()
         return
 
     def ring(number: int, frame: FrameType | None) -> None:
         raise OutOfTimeError
 
     usual = signal.signal(signal.SIGALRM, ring)
+    try:
+        yield _within
+    finally:
+        signal.signal(signal.SIGALRM, usual)
+
+
+@contextmanager
+def _within(seconds: float) -> Iterator[None]:
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, usual)

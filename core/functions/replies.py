@@ -27,11 +27,6 @@ class Reply(NamedTuple):
     costs: Mapping[str, float]
     """What the answer has cost, by name."""
 
-    @property
-    def size(self) -> int:
-        """Bytes of what it says."""
-        return 0 if self.message is None else len(canonical(self.message).encode())
-
 
 def read_reply(answer: Any, actions: Sequence[str], costs: Mapping[str, str]) -> Reply:
     """Return what a function's answer means.

@@ -115,6 +115,19 @@ class Agents(ABC, Generic[I]):
     def begin_world(self, episode: int) -> None:
         """Begin an episode, of learning or not."""
 
+    def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
+        """Decide from now on in another hierarchy of the same agents: some have left, or come back.
+
+        Parameters
+        ----------
+        hierarchy
+            Who decides before whom of those who are there; the others are in no relation.
+        left
+            ``(k,)`` who has left.
+        actions
+            ``(k,)`` what these do meanwhile, which all know.
+        """
+
     def begin_episode(self) -> None:
         """Begin an episode of learning."""
 

@@ -24,8 +24,9 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import AgentSelector
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
-from ...core.hierarchy.failures import MessageFailure, Messages
+from ...core.hierarchy.failures import MessageFailure
 from ...core.hierarchy.hierarchy import Hierarchy
+from ...core.hierarchy.messages import Messages
 from ...core.numerics import FloatArray, IntArray
 
 

@@ -7,8 +7,8 @@ itself to be where it is not, and predicts from there: with x the state and f wh
     x_i(t) = x(t - k_i) + r_i(t) * (high - low),    f_i(u) = f(u) + x_i(t) - x(t)
 
 r_i being normal noise that is drawn anew for every decision. So its sensors are wrong, and its
-model of what an action changes is right. The agents of a body that it does not perceive are taken to do
-nothing: they maintain. Learning is from what is perceived, too.
+model of what an action changes is right. The agents of a body that it does not perceive are taken
+to do nothing: they maintain. Learning is from what is perceived, too.
 """
 
 from __future__ import annotations
@@ -92,8 +92,8 @@ class PerceivedScenario(Scenario):
             self._delays[mask] = np.maximum(self._delays[mask], one.delay)
             if one.lost:
                 named = mask_of(one.lost, self.agents, f"{key}.lost")
-                bodies = [bool(named[list(group)].any()) for group in scenario.groups]
-                lost[np.ix_(mask, bodies)] = True
+                bodies = np.array([named[list(group)].any() for group in scenario.groups])
+                lost |= np.outer(mask, bodies)
             if one.reach is not None:
                 lost[mask] |= distances[mask] > one.reach
         own = ~scenario.perceived

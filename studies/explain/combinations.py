@@ -114,6 +114,7 @@ AXES: dict[str, dict[str, Table]] = {
         "noisy": failing("noisy", "*1"),
         "absent": failing("absent", "*2"),
         "reparented": failing("reparented", "*3", superior="FIRST"),
+        "left": failing("left", "*2"),
     },
     "one agent for": {
         "an actuator": {"scenario": "BODIES", "agents": "actuator"},

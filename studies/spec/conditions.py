@@ -15,6 +15,7 @@ from pydantic import AfterValidator, Field
 
 from ...core.agents.joint import Granularity, join_agents
 from ...core.agents.mixed import MixedSettings
+from ...core.hierarchy.failures import LeftAgents
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
@@ -103,6 +104,17 @@ class ConditionSettings(Settings):
         pairs = scenario.interactions
         return scenario, build(self.topology, scenario.agents, scenario.groups, pairs)
 
+    @property
+    def onsets(self) -> tuple[int, ...]:
+        """Episodes in which failures of the scenario begin, or agents leave."""
+        left = [f.episode for f in self.topology.failures if isinstance(f, LeftAgents)]
+        return (*self.scenario.onsets, *left)
+
+    @property
+    def onset(self) -> int | None:
+        """Episode in which the first of them begins; none: never."""
+        return min(self.onsets, default=None)
+
     def acts_as(self, other: ConditionSettings) -> bool:
         """Return whether topology, learner and perception are those of `other`."""
         own = self.topology, self.learner, self.scenario.perception
@@ -119,6 +131,18 @@ class ConditionSettings(Settings):
             return (f"topology: left out, {learner} passes no actions down",) if ignored else ()
         ignored = topology.considers != "descendants"
         return (f"topology.considers: left out, {learner} considers nobody",) if ignored else ()
+
+    def remarks(self) -> tuple[str, ...]:
+        """Return whose plans do not know whose weights, a line for each part of a mixed team."""
+        learner = self.learner
+        if not isinstance(learner, MixedSettings) or self.topology.considers == "none":
+            return ()
+        return tuple(
+            f"learner.parts[{k}]: plans for agents of other parts by its own values alone: nobody "
+            "knows the weights of another part"
+            for k, part in enumerate(learner.parts)
+            if len(learner.parts) > 1 and _considers(part.learner)
+        )
 
     def canonical(self) -> str:
         """Return the JSON text that equal settings share, whatever wrote them."""

@@ -135,7 +135,7 @@ class Trial:
         The first and the last; if something is scheduled to fail, also that one and the one before.
         """
         names = {}
-        onset = self.settings.scenario.onset
+        onset = self.settings.onset
         if onset is not None:
             names = {onset - 1: "before", onset: "after"}
         names |= {0: "first", self.episodes - 1: "last"}

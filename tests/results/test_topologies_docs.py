@@ -11,6 +11,8 @@ from published_tables import print_table
 import nested_agents as na
 from nested_agents.results import ROWS
 from nested_agents.studies.catalogue.chain_order import equivalence
+from nested_agents.studies.catalogue.edges import TRAINED, analyse
+from nested_agents.studies.catalogue.hierarchies.pooled import effects
 from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.results import Results
@@ -88,6 +90,22 @@ def times(logarithms: np.ndarray) -> str:
 def p_of(of_seeds: np.ndarray) -> str:
     p = paired_permutation(of_seeds, np.zeros_like(of_seeds))
     return "< .001" if p < 0.001 else f"{p:.1g}".removeprefix("0") if p < 0.1 else f"{p:.2f}"[1:]
+
+
+EQUAL_TREATMENT = ("edges",)
+"""Rows whose evaluations are compared with the chain over all settings."""
+
+
+@pytest.mark.parametrize("name", EQUAL_TREATMENT)
+def test_what_is_equal_to_the_chain(name: str) -> None:
+    results = na.load(ROWS / f"{name}.json").results
+    page = PAGE.read_text(encoding="utf-8")
+    for other, (success, decisions) in effects(results, analyse(results).cases, TRAINED).items():
+        gained = Cell.of(success.estimate).bracketed(" ")
+        value, low, high = map(float, decisions.estimate)
+        longer = f"{value:.2f} [{low:.2f}, {high:.2f}] times"
+        line = f"| {other} | {gained} | {success.verdict} | {longer} | {decisions.verdict} |"
+        assert line in page, f"docs/topologies.md: put in\n{line}"
 
 
 EVALUATED_AS = (

@@ -1,5 +1,7 @@
 """The wheel-failure study: what a failing wheel costs, and how a team comes back.
 
+Agents that leave, ``kind = "left"`` of ``topology.failures``, are a failure of their own.
+
 Training goes on through the failure. At its onset the team is also copied: the copy meets the same
 worlds under the same exploration with its weights kept as they are. Conditions that are swept over
 ``learner.self_model.enabled`` give all four cases, by what adapts: nothing, the weights, the
@@ -58,14 +60,14 @@ SMOOTHED = 3
 
 def measure(trial: Trial) -> TrialResult:
     """Train a team through a failure, and a copy that keeps its weights from there on."""
-    onset = trial.settings.scenario.onset
+    onset = trial.settings.onset
     assert onset is not None, "see check"
     session = Session(trial)
     session.train(onset)
     kept = _keeping_weights(session)
     session.train(trial.episodes - onset, onset)
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
-    begun = sorted(set(trial.settings.scenario.onsets) - {onset})
+    begun = sorted(set(trial.settings.onsets) - {onset})
     later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
     return session.finish({"onset": float(onset), **later})
 
@@ -74,10 +76,11 @@ def check(spec: Spec) -> None:
     """Raise `SpecError` unless a wheel fails in every condition, after and before some training."""
     check_rule_bases(spec, "of which a copy keeps its weights")
     for condition in spec.conditions():
-        onset = condition.settings.scenario.onset
+        onset = condition.settings.onset
         if onset is None:
             raise SpecError(
-                f"scenario.failures = []: wheel-failure needs one (condition {condition.label!r})"
+                "scenario.failures = []: wheel-failure needs one, or agents that have left in "
+                f"topology.failures (condition {condition.label!r})"
             )
         if spec.episodes < 2 * BLOCK:
             raise SpecError(

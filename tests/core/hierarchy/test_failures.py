@@ -10,11 +10,11 @@ from nested_agents.core.hierarchy.failures import (
     DelayedMessages,
     LostMessages,
     MessageFailure,
-    Messages,
     NoisyMessages,
     ReparentedAgents,
 )
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.messages import Messages
 
 CHAIN = Hierarchy("abcd", list(pairwise("abcd")))
 DECIDED = np.array([3, 1, 0, 2])

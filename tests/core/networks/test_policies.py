@@ -9,8 +9,8 @@ import pytest
 from acting import look
 
 from nested_agents.core.agents.team import Team
-from nested_agents.core.hierarchy.failures import Messages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.hierarchy.messages import Messages
 from nested_agents.core.hierarchy.turns import slots_of
 from nested_agents.core.interface.experience import Experience
 from nested_agents.core.interface.scenario import Transition

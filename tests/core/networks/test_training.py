@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from acting import look
 
+from nested_agents.core.interface.experience import Experience
+from nested_agents.core.interface.scenario import Transition
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import arrange, check_conditions
@@ -214,3 +216,52 @@ def test_who_acts_for_all_meets_no_other_agents(name: str, problem: str) -> None
     with pytest.raises(SpecError, match=f"evaluations.more: .*{problem}") as raised:
         check_conditions(spec)
     assert "\n" not in str(raised.value)
+
+
+def ended(name: str, *, terminated: bool) -> Any:
+    """Return the agents of a team after a single decision that ended its episode."""
+    (trial,) = trials_of(spec_of(name))
+    session = Session(trial)
+    team = session.team
+    seen = look(session.scenario, session.scenario.reset(0))
+    team.begin_episode()
+    decision = team.act(seen)
+    states = session.scenario.step(decision.joint_action).states
+    over = Transition(states, 1.0, terminated, not terminated, {})
+    team.learn(Experience(seen, decision, over, last=True))
+    return team.parts[0], states
+
+
+@pytest.mark.parametrize("name", ["ppo", "ippo", "mappo", "hierarchy-ppo"])
+def test_only_an_episode_that_was_cut_off_is_worth_what_would_have_come(name: str) -> None:
+    rewards, ahead = [], np.zeros(0)
+    for terminated in (True, False):
+        agents, states = ended(name, terminated=terminated)
+        (policy,) = agents.policies.values()
+        rewards.append(policy.model.rollout_buffer.rewards[0])
+        entered = agents.with_critics(agents.of_actors(states), states)
+        ahead = policy._values(entered[policy.agents])
+    assert ahead.any()
+    assert rewards[1] - rewards[0] == pytest.approx(agents.settings.discount * ahead, rel=1e-5)
+
+
+def test_a_value_beyond_a_terminal_state_is_none() -> None:
+    for terminated in (True, False):
+        agents, _ = ended("dqn", terminated=terminated)
+        assert agents._model.replay_buffer.dones[0].item() == terminated
+
+
+def test_exploration_falls_from_begin_to_end() -> None:
+    agents, _ = ended("dqn", terminated=True)
+    settings = agents._settings
+    rates = []
+    for decisions in (
+        0,
+        settings.exploration_decisions // 2,
+        settings.exploration_decisions,
+        10**9,
+    ):
+        agents._decisions = decisions
+        rates.append(agents.exploration_rate)
+    begin, end = settings.exploration_begin, settings.exploration_end
+    assert rates == pytest.approx([begin, (begin + end) / 2, end, end], abs=1e-3)

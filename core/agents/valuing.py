@@ -1,0 +1,94 @@
+"""What values the actions of fuzzy agents: an evaluator of their place in a team."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..evaluators.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
+from ..hierarchy.hierarchy import Hierarchy
+from ..interface.agents import Placement
+from ..interface.scenario import Scenario
+from ..learners.learner import LearnerSettings
+from ..numerics import IntArray
+from ..rules.rule_base import RuleBase
+from .plain import as_evaluator
+
+
+class Present(NamedTuple):
+    """Who takes part in decisions."""
+
+    hierarchy: Hierarchy
+    """Who decides before whom; those who have left are in no relation."""
+    left: IntArray
+    """``(k,)`` who has left."""
+
+
+def is_private(settings: LearnerSettings, scenario: Scenario) -> bool:
+    """Return whether each agent decides by a view of its own, see `views`."""
+    return settings.decision.errors is not None or scenario.is_private
+
+
+def evaluator_of(
+    settings: LearnerSettings,
+    rules: RuleBase,
+    learned: Evaluator | None,
+    placement: Placement,
+    present: Present,
+) -> Evaluator | None:
+    """Return the evaluator of some agents; None: their actions are drawn at random.
+
+    Parameters
+    ----------
+    settings, rules
+        Of the agents.
+    learned
+        Their learner, if it values actions itself.
+    placement
+        Where they act.
+    present
+        Who takes part.
+
+    Raises
+    ------
+    ValueError
+        If they decide by values that they do not know; one line.
+    """
+    decision = settings.decision
+    if decision.rule == "random":
+        return None
+    hierarchy = present.hierarchy
+    members = placement.members.tolist()
+    own = set(members) - set(present.left.tolist())
+    if decision.rule != "reward" and not placement.is_whole:
+        _check_values(hierarchy, set(members), decision.value_of)
+    if learned is not None:
+        return learned
+    private = is_private(settings, placement.scenario)
+    problem = DecisionProblem(
+        rules=rules,
+        hierarchy=hierarchy,
+        n_actions=len(placement.scenario.action_set),
+        groups=placement.scenario.groups,
+        rule=decision.rule,
+        teammates=decision.teammates,
+        discount=settings.discount,
+        value_of=decision.value_of,
+        unseen=decision.unseen,
+        plan=decision.plan,
+        handed_down=hierarchy.told == "ancestors" and not placement.messages_fail and not private,
+        first=next((i for i in hierarchy.order if i in own), members[0]),
+        is_private=private,
+    )
+    return as_evaluator(decision.evaluator.build(problem))
+
+
+def _check_values(hierarchy: Hierarchy, own: set[int], value_of: ValueOf) -> None:
+    """Refuse to decide by values of agents of other parts, whose weights nobody knows."""
+    agents = hierarchy.agents
+    whose = concerned(hierarchy, value_of)
+    for agent in own:
+        for other in sorted(set(whose[agent].tolist()) - own):
+            raise ValueError(
+                f"learner.decision.value_of = {value_of!r}: values of {agents[other]!r} are "
+                f"not known to {agents[agent]!r}, who is of another part; use 'own'"
+            )

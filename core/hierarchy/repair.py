@@ -1,0 +1,54 @@
+"""What becomes of a hierarchy when agents leave it."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from ..numerics import nx
+from .hierarchy import Hierarchy
+
+Repair = Literal["grandparents", "next", "none"]
+"""By which rule a hierarchy is repaired, see `without`."""
+
+
+def without(hierarchy: Hierarchy, gone: Sequence[int], repair: Repair) -> Hierarchy:
+    """Return a hierarchy in which agents are in no relation any more, one after the other.
+
+    Parameters
+    ----------
+    hierarchy
+        As it was; not modified.
+    gone
+        Who leaves.
+    repair
+        Who stands above the subordinates of each: its superiors (``grandparents``); the ``next`` of
+        the subordinates in the order of decision, who takes its place below these superiors; or
+        nobody in its place (``none``). Neighbours of an agent that leaves are joined by no rule.
+
+    Examples
+    --------
+    >>> tree = Hierarchy("abcd", [("a", "b"), ("b", "c"), ("b", "d")])
+    >>> [without(tree, [1], rule).edges for rule in ("grandparents", "next", "none")]
+    [((0, 2), (0, 3)), ((0, 2), (2, 3)), ()]
+    """
+    graph = nx.empty_graph(len(hierarchy), create_using=nx.DiGraph)
+    graph.add_edges_from(hierarchy.edges)
+    rank = {agent: place for place, agent in enumerate(hierarchy.order)}
+    for agent in sorted(gone, key=rank.__getitem__):
+        above = list(graph.predecessors(agent))
+        below = sorted(graph.successors(agent), key=rank.__getitem__)
+        graph.remove_edges_from([*graph.in_edges(agent), *graph.out_edges(agent)])
+        heirs = below[:1] if repair == "next" else below
+        if repair != "none":
+            graph.add_edges_from((superior, heir) for superior in above for heir in heirs)
+        if repair == "next":
+            graph.add_edges_from((below[0], other) for other in below[1:])
+    names = hierarchy.agents
+    left = set(gone)
+    return Hierarchy(
+        names,
+        [(names[a], names[b]) for a, b in graph.edges],
+        [(names[a], names[b]) for a, b in hierarchy.neighbours if not {a, b} & left],
+        told=hierarchy.told,
+        considers=hierarchy.considers,
+        bodies=hierarchy.bodies,
+    )
