@@ -25,7 +25,7 @@ from ..learners.learner import LearnerSettings
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
 from .plain import as_explorer, as_learner
 from .valuing import Present, evaluator_of, is_private
-from .views import FuzzyInputs, View, Views, agreement, senders_of, weights_by_agent
+from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
 
 SHAPED = ("learner.theta", "learner.trace", "learner.reach", "seen", "explorer", "generator")
 """What of a memory has a shape that the settings fix."""
@@ -252,7 +252,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         given = NOTHING_GIVEN
         if self.given.size:
             given = self.given[agent] / self.given[agent].sum(axis=2, keepdims=True)
-        view = inputs.views.get(agent) or View(inputs.prediction, inputs.weights)
+        view = inputs.views.get(agent) or OwnView(inputs.prediction, inputs.weights)
         values = self.evaluator.values(
             Deliberation(
                 agent=agent,

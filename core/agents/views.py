@@ -38,7 +38,7 @@ others an agent was right about what they then did (those that told it are among
 communicated in a decision, the actions told and the states of other bodies sent to an agent."""
 
 
-class View(NamedTuple):
+class OwnView(NamedTuple):
     """What one agent decides by."""
 
     prediction: Prediction
@@ -64,7 +64,7 @@ class FuzzyInputs:
     """``(n, A)`` how often each agent was seen to take each action, rows summing to one."""
     explore: bool
     """Whether they explore."""
-    views: dict[int, View] = field(default_factory=dict)
+    views: dict[int, OwnView] = field(default_factory=dict)
     """By agent, what it decides by in place of prediction and weights; empty: all by these."""
     expected: dict[int, IntArray] = field(default_factory=dict)
     """By agent with a view and a plan, the joint action that it expected when it decided."""
@@ -121,9 +121,11 @@ class Views:
                 settings.decision.errors, whose, rows, n_rules, n_constants, placement.seed
             )
 
-    def by_agent(self, seen: Observation, shared: Prediction, theta: FloatArray) -> dict[int, View]:
+    def by_agent(
+        self, seen: Observation, shared: Prediction, theta: FloatArray
+    ) -> dict[int, OwnView]:
         """Return by agent what it takes for true, of a prediction and of weights."""
-        views: dict[int, View] = {}
+        views: dict[int, OwnView] = {}
         for agent in self._members:
             prediction = shared
             own = theta
@@ -132,7 +134,7 @@ class Views:
                 constants = self._errors.constants(agent)
                 if constants is not None:
                     prediction = self._foresight.predict(seen, constants) or shared
-            views[agent] = View(prediction.of(agent), weights_by_agent(self._rows, own))
+            views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
         return views
 
     def spent(self, inputs: FuzzyInputs, hierarchy: Hierarchy) -> Mapping[str, float]:

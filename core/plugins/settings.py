@@ -195,7 +195,7 @@ class PartSettings(Settings):
         return resolve_name(self.factory)(self, *given)
 
 
-class Perception(Settings):
+class PerceptionSettings(Settings):
     """How some agents perceive a scenario: one of the ``[[scenario.perception]]`` of a spec.
 
     See `nested_agents.scenarios.faults.perception`.
@@ -218,7 +218,7 @@ class Perception(Settings):
 class ScenarioSettings(PartSettings):
     """What the settings of all scenarios inherit; a scenario is built of nothing else."""
 
-    perception: Annotated[tuple[Perception, ...], unwritten(())] = ()
+    perception: Annotated[tuple[PerceptionSettings, ...], unwritten(())] = ()
     """How agents perceive it, each for itself; empty: all know all states, and predict alike."""
 
     def warnings(self) -> tuple[str, ...]:

@@ -1,8 +1,9 @@
 """Agents that perceive a scenario each for itself, so that what they predict differs.
 
 What is perceived is described by the ``[[scenario.perception]]`` of a spec, of every scenario, see
-`nested_agents.core.plugins.settings.Perception`. An agent i that perceives late or with noise takes
-itself to be where it is not, and predicts from there: with x the state and f what is predicted,
+`nested_agents.core.plugins.settings.PerceptionSettings`. An agent i that perceives late or with
+noise takes itself to be where it is not, and predicts from there: with x the state and f what is
+predicted,
 
     x_i(t) = x(t - k_i) + r_i(t) * (high - low),    f_i(u) = f(u) + x_i(t) - x(t)
 
@@ -27,13 +28,13 @@ from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import StateSpace
 from ...core.numerics import BoolArray, FloatArray, IntArray, stream_of
-from ...core.plugins.settings import Perception, mask_of
+from ...core.plugins.settings import PerceptionSettings, mask_of
 
 STREAM = 2**32 - 6
 """Key of the stream from which noise of perception is drawn, under the seed of an episode."""
 
 
-def perceived(scenario: Scenario, settings: Sequence[Perception]) -> Scenario:
+def perceived(scenario: Scenario, settings: Sequence[PerceptionSettings]) -> Scenario:
     """Return a scenario as its agents perceive it; as it is, if nothing is said of that.
 
     Raises
@@ -61,7 +62,7 @@ class PerceivedScenario(Scenario):
 
     >>> from nested_agents.scenarios.line_up import LineUpSettings
     >>> carts = LineUpSettings(carts=3).build()
-    >>> late = PerceivedScenario(carts, [Perception(agents=carts.agents[1], delay=1)])
+    >>> late = PerceivedScenario(carts, [PerceptionSettings(agents=carts.agents[1], delay=1)])
     >>> first = late.reset(0)
     >>> second = late.step(np.zeros(3, dtype=int)).states
     >>> bool((second[1] == first[1]).all()), bool((second[0] == first[0]).all())
@@ -70,7 +71,7 @@ class PerceivedScenario(Scenario):
 
     is_private = True
 
-    def __init__(self, scenario: Scenario, settings: Sequence[Perception]) -> None:
+    def __init__(self, scenario: Scenario, settings: Sequence[PerceptionSettings]) -> None:
         self.scenario = scenario
         self.agents = tuple(scenario.agents)
         self.state_space: StateSpace = scenario.state_space

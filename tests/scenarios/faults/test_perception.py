@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.plugins.settings import Perception
+from nested_agents.core.plugins.settings import PerceptionSettings
 from nested_agents.scenarios.faults.perception import distances_of, perceived
 from nested_agents.scenarios.line_up import LineUpSettings
 
 NOTHING = np.zeros(3, dtype=int)
 
 
-def carts(*settings: Perception):
+def carts(*settings: PerceptionSettings):
     return perceived(LineUpSettings(carts=3).build(), settings)
 
 
@@ -19,7 +19,7 @@ def every(scenario) -> np.ndarray:
 
 
 def test_who_perceives_all_as_it_is_predicts_what_is_predicted() -> None:
-    plain, scenario = carts(), carts(Perception(agents="*"))
+    plain, scenario = carts(), carts(PerceptionSettings(agents="*"))
     assert not plain.is_private
     assert scenario.is_private
     np.testing.assert_array_equal(scenario.reset(4), plain.reset(4))
@@ -33,8 +33,8 @@ def test_who_perceives_all_as_it_is_predicts_what_is_predicted() -> None:
 
 def test_noise_is_that_of_the_agents_named_and_stays_paired() -> None:
     plain = carts()
-    one = carts(Perception(agents=plain.agents[1], noise=0.1))
-    all_ = carts(Perception(agents="*", noise=0.1))
+    one = carts(PerceptionSettings(agents=plain.agents[1], noise=0.1))
+    all_ = carts(PerceptionSettings(agents="*", noise=0.1))
     truth, own, every_one = (scenario.reset(4) for scenario in (plain, one, all_))
     np.testing.assert_array_equal(own[[0, 2]], truth[[0, 2]])
     assert (own[1] != truth[1]).all()
@@ -47,14 +47,14 @@ def test_noise_is_that_of_the_agents_named_and_stays_paired() -> None:
 
 
 def test_the_noise_has_the_deviation_that_is_said() -> None:
-    plain, noisy = carts(), carts(Perception(agents="*", noise=0.1))
+    plain, noisy = carts(), carts(PerceptionSettings(agents="*", noise=0.1))
     width = plain.state_space.ranges[1]
     off = np.array([(noisy.reset(i) - plain.reset(i)) / width for i in range(400)])
     assert np.std(off) == pytest.approx(0.1, rel=0.06)
 
 
 def test_who_is_late_predicts_from_where_it_was() -> None:
-    plain, late = carts(), carts(Perception(agents="*", delay=2))
+    plain, late = carts(), carts(PerceptionSettings(agents="*", delay=2))
     states = [plain.reset(1)]
     seen = [late.reset(1)]
     for _ in range(4):
@@ -68,11 +68,11 @@ def test_who_is_late_predicts_from_where_it_was() -> None:
 
 
 def test_bodies_out_of_reach_or_lost_are_taken_to_do_nothing() -> None:
-    near = carts(Perception(agents="*", reach=1))
+    near = carts(PerceptionSettings(agents="*", reach=1))
     np.testing.assert_array_equal(near.perceived, [[0, 1, 0], [1, 0, 1], [0, 1, 0]])
     assert [near.idle(agent).tolist() for agent in range(3)] == [[2], [], [0]]
     names = near.agents
-    lost = carts(Perception(agents=names[0], lost=(names[1], names[2])))
+    lost = carts(PerceptionSettings(agents=names[0], lost=(names[1], names[2])))
     assert lost.idle(0).tolist() == [1, 2]
     plain = carts()
     plain.reset(0)
@@ -92,6 +92,6 @@ def test_distances_follow_interactions() -> None:
 
 @pytest.mark.parametrize("key", ["agents", "lost"])
 def test_who_is_not_there_is_named(key: str) -> None:
-    settings = Perception(**{"agents": "*", key: "nobody"})
+    settings = PerceptionSettings(**{"agents": "*", key: "nobody"})
     with pytest.raises(ValueError, match=rf"scenario\.perception\[0\]\.{key} = 'nobody': no such"):
         carts(settings)
