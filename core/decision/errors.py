@@ -53,7 +53,7 @@ class Errors:
     >>> theta = np.array([[1.0, 3.0]])
     >>> drawn = np.random.default_rng(np.random.SeedSequence(1, spawn_key=(STREAM, 0)))
     >>> expected = theta + 0.5 * 1.0 * drawn.standard_normal((1, 2))
-    >>> bool(np.array_equal(errors.weights(0, theta)[0], expected))
+    >>> bool(np.array_equal(errors.weights(0, theta), expected))
     True
     """
 
