@@ -20,6 +20,7 @@ from ..interface.measures import Measure
 from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
 from ..numerics import AnyArray, IntArray
+from .kept import begin_with
 
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
@@ -86,12 +87,14 @@ class Team:
         seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
         parts: list[Agents[Any]] = []
         self._part_of = [0] * len(hierarchy)
-        for (members, own), own_seed in zip(kinds, seeds, strict=True):
+        for (members, own, kept), own_seed in zip(kinds, seeds, strict=True):
             for agent in members.tolist():
                 self._part_of[agent] = len(parts)
             fail = bool(failures)
             placement = Placement(world, hierarchy, members, own_seed, messages_fail=fail)
             parts.append(own.agents(placement))
+            if kept is not None:
+                begin_with(parts[-1], kept, len(parts) - 1)
         self.parts = tuple(parts)
         self.costs = costs_of(parts)
         self.spent: Mapping[str, float] = {}

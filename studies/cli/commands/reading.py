@@ -9,7 +9,8 @@ from typing import Literal, TypedDict, Unpack
 
 import click
 
-from ...errors import SpecError, printable, refused
+from ....core.plugins.printing import printable
+from ...errors import SpecError, refused
 from ...presentation.progress import say
 from ...spec.outline import StudyOutline, sources_of
 from ...store import durable
