@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from textwrap import wrap
 from typing import NamedTuple
@@ -37,6 +37,8 @@ SEED = 10_000
 """Of the trials that are tried out."""
 TRIED = 1.0
 """Processor time [s] for which episodes of training are tried of every condition."""
+TRIED_ACTIONS = "joint actions"
+"""What is counted beside the costs of decisions."""
 EPISODES = 2
 """That are tried at least, of training and of every evaluation."""
 WHOLE = 10_000
@@ -70,6 +72,10 @@ class ConditionCost(NamedTuple):
     """Processor time [s] to import, load and compile what the first step needs, once a process."""
     memory: float
     """What the team holds in the end [bytes]."""
+    decision: Mapping[str, float]
+    """What a decision costs of what functions count, by name; without functions nothing."""
+    decisions: int
+    """How many the trials of all seeds take at most."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +101,8 @@ class Plan:
     """The smallest difference of success rates that is of interest."""
     warnings: tuple[str, ...] = ()
     """What looks wrong and is not refused, a line each."""
+    costs: Mapping[str, ConditionCost] = field(default_factory=dict)
+    """By label, what conditions take that were tried."""
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -115,6 +123,8 @@ class Plan:
             yield "         by how early episodes end, and by what else this machine does"
         if self.memory is not None:
             yield f"memory   about {self.memory / 1e9:.1f} GB with {processes}"
+        if any(cost.decision for cost in self.costs.values()):
+            yield from self._decisions()
         if self.comparisons:
             yield ""
             yield from power_text(n_seeds, self.comparisons, self.deviation, self.smallest)
@@ -125,6 +135,23 @@ class Plan:
             yield from wrap(text, WIDTH)
         for warning in self.warnings:
             yield from wrap(warning, WIDTH)
+
+    def _decisions(self) -> Iterator[str]:
+        """Yield what a decision costs under every condition, and the study at most."""
+        costs = self.costs.values()
+        names = list(dict.fromkeys(name for cost in costs for name in cost.decision))
+        width = max(map(len, self.costs))
+        yield ""
+        yield " ".join([" " * width, *(f"{name:>{len(name)}}" for name in names)])
+        for label, cost in self.costs.items():
+            values = (f"{cost.decision.get(name, 0.0):>{len(name)}.4g}" for name in names)
+            yield " ".join([f"{label:<{width}}", *values])
+        most = (
+            f"{sum(cost.decision.get(n, 0.0) * cost.decisions for cost in costs):,.0f} {n}"
+            for n in names
+            if n != TRIED_ACTIONS
+        )
+        yield from wrap(f"Means of a decision, as tried. The study: at most {', '.join(most)}.")
 
 
 def plan(
@@ -164,7 +191,7 @@ def plan(
     examine(spec)
     trials = trials_of(spec)
     processes = max(1, min(jobs or cores(), len(trials)))
-    seconds, memory = _estimate(spec, trials, processes) if timed else (None, None)
+    seconds, memory, costs = _estimate(spec, trials, processes) if timed else (None, None, {})
     return Plan(
         outline=StudyOutline.of(spec),
         trials=len(trials),
@@ -175,18 +202,25 @@ def plan(
         deviation=deviation,
         smallest=smallest,
         warnings=spec.warnings(),
+        costs=costs,
     )
 
 
-def _estimate(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Range, float]:
-    """Return the time of a study [s], from and to, and its memory [bytes]."""
+def _estimate(
+    spec: Spec, trials: Sequence[Trial], processes: int
+) -> tuple[Range, float, dict[str, ConditionCost]]:
+    """Return the time of a study [s], from and to, its memory [bytes], and what conditions take."""
     begin = time.perf_counter()
     used = _used()
     # Ctrl-C is for this process, which then kills that one: it would print a traceback.
     subprocess.run([sys.executable, "-c", START], check=True, process_group=0)
     starting = STARTS * (_used() - used)
     with spec.sources.active():
-        tried = [try_out(trial) for trial in trials[: len(spec.conditions())]]
+        by_label = {
+            trial.condition: try_out(trial, len(spec.seeds))
+            for trial in trials[: len(spec.conditions())]
+        }
+    tried = list(by_label.values())
     loading = sum(each.loading for each in tried)  # less, if what was compiled here is kept
     each_seed = np.sum([one.seconds / processes + KEEPING for one in tried], axis=0)
     quick, slow = len(spec.seeds) * each_seed
@@ -198,7 +232,7 @@ def _estimate(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Rang
     memory = _peak() + max(each.memory for each in tried)
     shortest = least * (starting + quick)
     longest = most * (starting + loading + slow)
-    return (float(shortest), float(longest)), processes * memory
+    return (float(shortest), float(longest)), processes * memory, by_label
 
 
 def _peak() -> float:
@@ -211,8 +245,8 @@ def _peak() -> float:
     return peak * (1 if sys.platform == "darwin" else 1024)
 
 
-def try_out(trial: Trial) -> ConditionCost:
-    """Return what the trials of a condition take."""
+def try_out(trial: Trial, seeds: int = 1) -> ConditionCost:
+    """Return what the trials of a condition take, all of its seeds where it says so."""
     alone = replace(trial, seed=SEED, curriculum=(), evaluation=min(trial.evaluation, EPISODES))
     brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
     loading = _seconds(partial(run_trial, brief))
@@ -226,7 +260,8 @@ def try_out(trial: Trial) -> ConditionCost:
     training = _seconds_of_episodes(session, trial.episodes)
     in_own = _seconds(session.evaluate)
     in_others = _seconds(session.run_other_evaluations)
-    by_phase = pd.DataFrame(session.result().rows).groupby("phase")["steps"]
+    rows = session.result().rows
+    by_phase = pd.DataFrame(rows).groupby("phase")["steps"]
     lengths = {phase: steps.to_numpy(float) for phase, steps in by_phase}
     steps = lengths.pop("training")
 
@@ -249,7 +284,21 @@ def try_out(trial: Trial) -> ConditionCost:
     seconds = building + acting * mean * episodes.sum() + learning
     growth = mean[1] * episodes.sum() / steps.sum()
     memory = held + growth * max(_bytes(session) - held, 0.0)
-    return ConditionCost(seconds + trial.evaluation * evaluating, loading, memory)
+    rounds = trial.evaluation * (1 + len(trial.evaluations))
+    decisions = int(episodes.sum()) * trial.steps + rounds * longest
+    whole_trial = seconds + trial.evaluation * evaluating
+    return ConditionCost(whole_trial, loading, memory, _decision(session), seeds * decisions)
+
+
+def _decision(session: Session) -> dict[str, float]:
+    """Return what a decision has cost, and how many joint actions were tried, where it is told."""
+    names = [measure.name for measure in session.team.costs]
+    rows = [row for row in session.result().rows if row.measures.keys() >= set(names)]
+    steps = sum(row.steps for row in rows)
+    if not names or not steps:
+        return {}
+    costs = {name: sum(row.measures[name] for row in rows) / steps for name in names}
+    return {**costs, TRIED_ACTIONS: session.team.counts.joint_actions / steps}
 
 
 def _seconds_of_episodes(session: Session, episodes: int) -> list[float]:

@@ -130,6 +130,18 @@ class ConditionSettings(Settings):
         ignored = topology.considers != "descendants"
         return (f"topology.considers: left out, {learner} considers nobody",) if ignored else ()
 
+    def remarks(self) -> tuple[str, ...]:
+        """Return whose plans do not know whose weights, a line for each part of a mixed team."""
+        learner = self.learner
+        if not isinstance(learner, MixedSettings) or self.topology.considers == "none":
+            return ()
+        return tuple(
+            f"learner.parts[{k}]: plans for agents of other parts by its own values alone: nobody "
+            "knows the weights of another part"
+            for k, part in enumerate(learner.parts)
+            if len(learner.parts) > 1 and _considers(part.learner)
+        )
+
     def canonical(self) -> str:
         """Return the JSON text that equal settings share, whatever wrote them."""
         return json.dumps(

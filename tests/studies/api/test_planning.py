@@ -97,3 +97,23 @@ def test_doubtful_sizes_are_told_before_anything_is_spent(tmp_path, capsys) -> N
     path.write_text("seeds = 2\n[scenario.infrared]\nreach = 60.0\n")
     assert main(["plan", str(path), "--no-timed"]) == 0
     assert "scenario.infrared.reach = 60 m: perhaps meant in mm" in capsys.readouterr().out
+
+
+def test_what_functions_cost_is_told_by_condition(tmp_path) -> None:
+    program = "def decide(observation, told):\n    return {'action': 0, 'costs': {'tokens': 2}}\n"
+    (tmp_path / "f.py").write_text(program)
+    spec = {
+        "seeds": 2, "episodes": 1, "steps": 5, "evaluation": 1,
+        "scenario": {"kind": "line-up", "carts": 3},
+        "learner": {"kind": str(tmp_path / "f.py:decide"), "costs": {"tokens": "1"}},
+        "sweep": {"topology": ["chain", "independent"]},
+    }  # fmt: skip
+    plan = planning.plan(spec, jobs=1)
+    lines = [line.split() for line in str(plan).splitlines()]
+    assert ["messages", "calls", "message_bytes", "tokens", "joint", "actions"] in lines
+    assert ["chain", "3", "3", "0", "6", "0"] in lines
+    assert ["independent", "0", "3", "0", "6", "0"] in lines
+    # two seeds, ten decisions a trial, three calls each
+    assert "at most 60 messages, 120 calls, 0 message_bytes, 240 tokens." in " ".join(
+        str(plan).split()
+    )
