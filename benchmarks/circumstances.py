@@ -38,7 +38,7 @@ time.time_ns = lambda: int(time.time() * 1e9)
 """
 """A clock that goes back by an hour whenever it is read."""
 NO_LOCKS = Path(__file__).parents[1] / "tests" / "studies" / "store" / "no_locks.c"
-LONGEST = 180.0
+LONGEST = 600.0
 """Seconds after which a command counts as one that hangs."""
 LINES = ("status", "table", "compare", "results --format csv", "report", "export", "explain")
 
