@@ -16,8 +16,9 @@ from pathlib import Path
 
 import click
 
+from ...core.plugins.printing import printable
 from ...core.plugins.words import closest
-from ..errors import SpecError, printable
+from ..errors import SpecError
 from .options import complete
 
 PROGRAM = "nested-agents"
