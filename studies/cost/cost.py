@@ -117,6 +117,8 @@ class CostRow:
     measured: StepCost | None = None
     network: tuple[int, int] | None = None
     """If asked for, messages of a decision, and how many of them follow one another."""
+    free: int = 0
+    """Most agents for which one decides, itself included; of hierarchies alone, else 0."""
 
     @property
     def by_formula(self) -> dict[str, int | Fraction | None]:
