@@ -24,6 +24,8 @@ from .spaces import ActionSet, StateSpace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from .worlds import Worlds
+
 
 @dataclass(frozen=True)
 class Transition:
@@ -153,6 +155,10 @@ class Scenario(ABC):
     @abstractmethod
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out a joint action ``(n,)`` for one decision period."""
+
+    def worlds(self, count: int) -> Worlds | None:
+        """Return many worlds of the same settings, stepped in one call; None: it has no such."""
+        return None
 
     @property
     def predicts(self) -> bool:

@@ -26,6 +26,7 @@ from ..faults.settings import Failures
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
 from .responses import Options, respond
 from .variables import ChainStates, ChainView, ends_of, postures_of
+from .worlds import ChainWorlds
 
 MEASURES = (
     SUCCESS,
@@ -130,6 +131,11 @@ class KinematicChain(Scenario, Embodiment):
         received = float(self._reward(away, before - away)[0])
         measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
         return Transition(states, received, terminated, truncated, measured, twists)
+
+    def worlds(self, count: int) -> ChainWorlds | None:
+        """Return many such arms, stepped in one call; None: some fail, or have other variables."""
+        is_plain = self._states.is_compiled and not self.settings.failures
+        return ChainWorlds(self, count) if is_plain else None
 
     def embodiment(self) -> Embodiment:
         """Return itself: its joints are open to self-models."""
