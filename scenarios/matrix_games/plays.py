@@ -267,7 +267,7 @@ def whole_episode(
     (agents,) = team.parts
     if not isinstance(scenario, MatrixGame) or not isinstance(agents, FuzzyAgents):
         return None
-    if team.messages.failures:
+    if team.messages.failures or agents.views is not None:
         return None
     parts = parts_of(scenario, agents, learn=learn)
     if parts is None:

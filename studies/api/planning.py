@@ -51,8 +51,9 @@ FASTER = 0.7
 """By what another process, and other seeds, may take less time than what was tried."""
 SLOWER = 2.2
 """By what they may take more."""
-KEEPING = np.array([0.02, 0.15])
-"""Seconds to hand out a trial and to keep it, from and to: a disk takes longer than a processor."""
+KEEPING = np.array([0.02, 0.05, 0.15])
+"""Seconds to hand out a trial and to keep it, from, likely and to: a disk takes longer than a
+processor."""
 STARTS = 5
 """Starts of a process that a run takes: the command's own, its workers', which start together, and
 as much as three more for the store, the tables and the figures."""
@@ -67,7 +68,7 @@ class ConditionCost(NamedTuple):
     """What a condition takes, by one of its trials."""
 
     seconds: FloatArray
-    """Processor time [s] of a trial, from and to."""
+    """Processor time [s] of a trial, from, likely and to ``(3,)``."""
     loading: float
     """Processor time [s] to import, load and compile what the first step needs, once a process."""
     memory: float
@@ -91,6 +92,9 @@ class Plan:
     seconds: Range | None
     """Time of the whole study [s], from and to: by how early episodes end that were not tried, and
     by what else this machine does."""
+    likely: float | None
+    """The same if episodes take as long as those that were tried last, and this machine stays as
+    busy as it is."""
     memory: float | None
     """Of all processes together [bytes], about."""
     comparisons: int
@@ -117,10 +121,11 @@ class Plan:
         processes = count(self.processes, "process", "es")
         yield f"study    {outline.study}: {conditions} x {count(n_seeds, 'seed')}"
         yield f"trials   {self.trials}, each {outline.lengths} of up to {steps}"
-        if self.seconds is not None:
+        if self.seconds is not None and self.likely is not None:
             quick, slow = map(duration, self.seconds)
-            yield f"time     {quick} to {slow} with {processes}, the start of workers included:"
-            yield "         by how early episodes end, and by what else this machine does"
+            usual = duration(self.likely)
+            yield f"time     about {usual} with {processes}, as episodes take that were tried;"
+            yield f"         {quick} to {slow}, by how early they end and what else runs here"
         if self.memory is not None:
             yield f"memory   about {self.memory / 1e9:.1f} GB with {processes}"
         if any(cost.decision for cost in self.costs.values()):
@@ -191,12 +196,14 @@ def plan(
     examine(spec)
     trials = trials_of(spec)
     processes = max(1, min(jobs or cores(), len(trials)))
-    seconds, memory, costs = _estimate(spec, trials, processes) if timed else (None, None, {})
+    estimate = _estimate(spec, trials, processes) if timed else (None, None, None, {})
+    seconds, likely, memory, costs = estimate
     return Plan(
         outline=StudyOutline.of(spec),
         trials=len(trials),
         processes=processes,
         seconds=seconds,
+        likely=likely,
         memory=memory,
         comparisons=len(spec.conditions()) - 1,
         deviation=deviation,
@@ -208,8 +215,11 @@ def plan(
 
 def _estimate(
     spec: Spec, trials: Sequence[Trial], processes: int
-) -> tuple[Range, float, dict[str, ConditionCost]]:
-    """Return the time of a study [s], from and to, its memory [bytes], and what conditions take."""
+) -> tuple[Range, float, float, dict[str, ConditionCost]]:
+    """Return the time of a study [s], from and to, the likely one, its memory [bytes], and costs.
+
+    These are what conditions take, by label.
+    """
     begin = time.perf_counter()
     used = _used()
     # Ctrl-C is for this process, which then kills that one: it would print a traceback.
@@ -223,16 +233,17 @@ def _estimate(
     tried = list(by_label.values())
     loading = sum(each.loading for each in tried)  # less, if what was compiled here is kept
     each_seed = np.sum([one.seconds / processes + KEEPING for one in tried], axis=0)
-    quick, slow = len(spec.seeds) * each_seed
+    quick, usual, slow = len(spec.seeds) * each_seed
     # Processes that have no trial left wait for the last one.
-    slow += (1 - 1 / processes) * max(each.seconds[1] for each in tried)
+    slow += (1 - 1 / processes) * max(each.seconds[-1] for each in tried)
     busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
     least = FASTER * busy**0.5  # other programs may stop
     most = SLOWER * busy  # or go on
     memory = _peak() + max(each.memory for each in tried)
     shortest = least * (starting + quick)
     longest = most * (starting + loading + slow)
-    return (float(shortest), float(longest)), processes * memory, by_label
+    likely = busy * (starting + loading + usual)
+    return (float(shortest), float(longest)), float(likely), processes * memory, by_label
 
 
 def _peak() -> float:
@@ -282,7 +293,7 @@ def try_out(trial: Trial, seeds: int = 1) -> ConditionCost:
     else:  # beginnings do not tell how learning grows
         learning = mean * episodes.sum() * max(beside.sum(), 0.0) / steps.sum()
     seconds = building + acting * mean * episodes.sum() + learning
-    growth = mean[1] * episodes.sum() / steps.sum()
+    growth = mean[-1] * episodes.sum() / steps.sum()
     memory = held + growth * max(_bytes(session) - held, 0.0)
     rounds = trial.evaluation * (1 + len(trial.evaluations))
     decisions = int(episodes.sum()) * trial.steps + rounds * longest
@@ -333,11 +344,12 @@ def learning_time(
 
 
 def _mean_length(tried: Sequence[float] | FloatArray, most: int, cut: int) -> FloatArray:
-    """Return the mean steps of episodes that were not tried to their ends, from and to."""
+    """Return the mean steps of episodes that were not tried to their ends: from, likely and to."""
     longest = max(tried)
+    mean = float(np.mean(tried))
     if longest >= cut:
-        return np.array([np.mean(tried), most])
-    return np.array([QUICK * np.mean(tried), min(most, LONG * longest)])
+        return np.array([mean, (mean + most) / 2.0, most])
+    return np.array([QUICK * mean, mean, min(most, LONG * longest)])
 
 
 def _used() -> float:
