@@ -214,8 +214,10 @@ class Team:
         for part, agents, receivers, senders in self._slots:
             if some_left:
                 agents = agents[~gone[agents]]
-                if not len(agents):
-                    continue
+            if fail and self.parts[part].has_contents:  # whoever is absent is not asked
+                agents = agents[~np.isin(agents, self.messages.absent(agents))]
+            if not len(agents):
+                continue
             if self.parts[part].has_contents:
                 turn = self.messages.turn_with_contents(agents, joint, self._contents(inputs))
             elif fail:
