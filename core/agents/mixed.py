@@ -15,14 +15,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ..hierarchy.failures import Names
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import levels_of
 from ..interface.scenario import Scenario
 from ..learners import LEARNERS
 from ..learners.learner import MembersOf, TeamSettings
 from ..plugins.registry import Plugged
-from ..plugins.settings import Settings, unwritten
+from ..plugins.settings import Names, Settings, unwritten
 from .joint import body_of
 
 

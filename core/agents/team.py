@@ -54,7 +54,8 @@ class Team:
     messages
         Who is told what.
     costs
-        What is measured of an episode of what its decisions cost; without functions nothing.
+        What is measured of an episode of what its decisions cost: of functions, and of agents with
+        views of their own.
     spent
         What its last decision cost, by their names.
 
@@ -192,11 +193,12 @@ class Team:
             joint = self._walk(seen, inputs)
         if self._has_contents:
             self.messages.advance(joint, self._contents(inputs))
-            self.spent = self._spent(inputs)
         else:
             self.messages.advance(joint)
         for part, own in zip(self.parts, inputs, strict=True):
             part.conclude(own, joint)
+        if self.costs:
+            self.spent = self._spent(inputs)
         return Decision(joint, inputs)
 
     def _walk(self, seen: Observation, inputs: tuple[Any, ...]) -> IntArray:
@@ -212,8 +214,10 @@ class Team:
         for part, agents, receivers, senders in self._slots:
             if some_left:
                 agents = agents[~gone[agents]]
-                if not len(agents):
-                    continue
+            if fail and self.parts[part].has_contents:  # whoever is absent is not asked
+                agents = agents[~np.isin(agents, self.messages.absent(agents))]
+            if not len(agents):
+                continue
             if self.parts[part].has_contents:
                 turn = self.messages.turn_with_contents(agents, joint, self._contents(inputs))
             elif fail:

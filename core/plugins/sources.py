@@ -26,6 +26,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from .printing import printable
 from .trust import LIBRARIES, is_trusted, module_text, sha256, trust
 
 ZIPPED = b"PK"
@@ -424,5 +425,5 @@ def place(error: BaseException) -> str:
 def message(error: BaseException) -> str:
     """Return the words of an exception in one line; none if it cannot even say them."""
     with contextlib.suppress(Exception):
-        return " ".join(str(error).split())
+        return printable(" ".join(str(error).split()))
     return ""

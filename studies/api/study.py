@@ -42,12 +42,14 @@ from ..store import durable
 from ..store.store import Store
 from .comparison import Comparison
 from .replay import Replay, draw_episode
+from .status import Status
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ...core.agents.team import Team
     from ...core.interface.scenario import Scenario
+    from .explaining import TeamExplanation
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -153,7 +155,7 @@ class StudyResults:
     def power(self) -> tuple[str, ...]:
         """What comparisons with the first condition can find, as `compare` says it."""
         is_measured = SUCCESS.name in (measure.name for measure in self.results.measures)
-        return power_with_first(self.results) if is_measured else ()
+        return power_with_first(self.results) if is_measured and self.results.phases else ()
 
     @cached_property
     def analysis(self) -> Any:
@@ -283,6 +285,30 @@ class StudyResults:
             with trial.sources.active():
                 session = Session.restored(trial, store.recording(trial.identity, durable.TEAM))
         return session.scenario, session.team
+
+    def explain(self, condition: str | None = None, seed: int | None = None) -> TeamExplanation:
+        """Explain a trained team: its rules in words, its policy, its self-model.
+
+        Unless the study keeps its teams, training is run again, and must give the episodes kept.
+
+        Parameters
+        ----------
+        condition, seed
+            Which trial; by default the first.
+
+        Raises
+        ------
+        SpecError
+            If there is no such trial, it has not finished, or its team has no rules.
+        """
+        from .explaining import explain_team  # its drawings take their time
+
+        return explain_team(self.directory, condition, seed)
+
+    @property
+    def status(self) -> Status:
+        """How far the study is now: what is done, running, failed and left, and for how long."""
+        return Status.of(self.directory)
 
     def report(self, path: Place | None = None) -> Path:
         """Write the whole study as one self-contained HTML file and return its path.

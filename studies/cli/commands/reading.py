@@ -9,14 +9,16 @@ from typing import Literal, TypedDict, Unpack
 
 import click
 
-from ...errors import SpecError, printable, refused
+from ....core.plugins.printing import printable
+from ...api.status import describe, progress
+from ...errors import SpecError, refused
 from ...presentation.progress import say
 from ...spec.outline import StudyOutline, sources_of
 from ...store import durable
 from ...store.store import Store
 from .. import options
 from ..display import Form, in_form, print_data, print_study, print_table, print_text
-from ..loading import describe, load_results, open_study, progress, trust_files, untrusted
+from ..loading import load_results, open_study, trust_files, untrusted
 
 PERIOD = 2.0
 """How often a study that is watched is looked at [s]."""
@@ -323,22 +325,17 @@ def explain(directory: Path, condition: str | None, seed: int | None, trust: boo
     keeps its teams (keep_teams = true in its spec), training is run again, which takes seconds, and
     must give the episodes that are kept.
     """
-    from ...explain import team
-    from ...explain.text import MOST_AGENTS, draw, text
+    from ...api.explaining import explain_team
     from ...presentation.figures import save
-    from ...trials.keeping import finished_trial
 
     if trust:
         trust_files(directory)
-    with open_study(directory) as store:
-        trial = finished_trial(store, condition, seed)
-        conditions = list(store.columns())
-        explanation = team.explain(store, trial)
-    folder = team.folder_of(directory, trial, conditions)
-    folder.mkdir(parents=True, exist_ok=True)
-    written = folder / "explanation.txt"
-    durable.write(written, text(explanation).encode())
-    figures = save(draw(explanation), folder)
-    print_text(text(explanation, MOST_AGENTS))
+    with open_study(directory):
+        explained = explain_team(directory, condition, seed)
+    explained.folder.mkdir(parents=True, exist_ok=True)
+    written = explained.folder / "explanation.txt"
+    durable.write(written, explained.text.encode())
+    figures = save(explained.figures, explained.folder)
+    print_text(str(explained))
     print_text(written, *figures)
     return 0
