@@ -6,8 +6,11 @@ Campaigns, each drawn from a seed:
   continues, and what it ends with must be equal byte by byte. Trials run in the process of the
   command and take no time, so that a hundred kills do not take an hour; `benchmarks.crashes` kills
   real workers;
-- *kills of others*: export, report and retry are killed. What they have written is whole or
-  not there; the study is as it was, or the same command goes on, with the same end;
+- *kills of others*: explain, export, report, retry and tune are killed. What they have written is
+  whole or not there; the study is as it was, or the same command goes on, with the same end;
+- *edits* and *published files*, see `benchmarks.edits`: what somebody else has made of results;
+- *environments*, see `benchmarks.environments`: refused, or perceived as they are;
+- *circumstances*, see `benchmarks.circumstances`: clocks, disks, memory and signals;
 - *flips*: one bit of one file of a finished study is flipped. Commands that read, and Python that
   loads a trained team, must give what they gave before, or name the file; a run must end with the
   rows and recordings of the sound study. `explain`, which draws, reads every tenth, and a run every
@@ -38,14 +41,11 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Sequence
-from functools import cache
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.studies.api import running as studies_run
-from nested_agents.studies.api.study import load
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
@@ -55,147 +55,14 @@ from nested_agents.studies.store import durable
 from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.store.writer import LOCK
-from nested_agents.studies.trials.arrangement import check_conditions
-from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
-from nested_agents.studies.trials.session import run_trial
-from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
-from nested_agents.studies.workers.runner import Outcome, RunTrial, save
+from nested_agents.studies.trials.keeping import open_to_run
+from nested_agents.studies.workers.runner import save
 
-from . import misbehaving
+from . import circumstances, edits, environments, misbehaving
+from .victim import EXPLAIN, LINES, SPEC, Adversary, Here, mended, read
 
-SPEC = Spec.of(
-    {"seeds": 5, "episodes": 2, "steps": 10, "evaluation": 1, "keep_teams": True,
-     "sweep": {"preset": ["default", "frozen"]}}
-)  # fmt: skip
-EXPLAIN = "explain"
-TEAM = "na.load(...).team()"
-"""No command: what a user reads in Python."""
-LINES = (
-    "results --format csv", "status", "table --format csv", "compare", "compare --statistics",
-    "report", "export", TEAM,
-)  # fmt: skip
-"""The commands that read."""
 SLOW, BLOCKED = 10.0, 60.0
 """Seconds, of the processor and by the clock, after which an input counts as one that stalls."""
-
-Answer = tuple[int, str, str]
-"""Exit status, output and errors of a command."""
-
-
-@cache
-def _run_once() -> tuple[tuple[Measure, ...], tuple[Trial, ...], dict[str, TrialResult]]:
-    """Return what the study measures, its trials, and by identity what they measured."""
-    measures, trials = check_conditions(SPEC), trials_of(SPEC)
-    return measures, trials, {trial.identity: run_trial(trial) for trial in trials}
-
-
-class Adversary:
-    """A finished study, which is damaged and mended again and again.
-
-    Parameters
-    ----------
-    folder
-        Where to work.
-    rng
-        Draws the damage.
-    lines
-        The commands whose answers of the sound study are needed.
-    """
-
-    def __init__(self, folder: Path, rng: random.Random, lines: Sequence[str] = LINES) -> None:
-        self.sound, self.study, self.rng = folder / "sound", folder / "study", rng
-        self.measures, self.trials, self.results = _run_once()
-        self.finish(self.sound)
-        self.expected = self.content(self.sound)
-        shutil.copytree(self.sound, self.study)
-        self.answers = {line: self.command(line) for line in lines}
-        self.files = [p for p in sorted(self.sound.rglob("*")) if p.is_file() and p.stat().st_size]
-
-    def command(self, line: str) -> Answer:
-        """Run a command on the study in this process."""
-        if line == TEAM:
-            return self.team()
-        name, *options = line.split()
-        out, error = io.StringIO(), io.StringIO()
-        if name in ("report", "export"):
-            shutil.rmtree(self.study.parent / "written", ignore_errors=True)
-            written = self.study.parent / "written"
-            written.mkdir()
-            options += ["--out", str(written / "page.html" if name == "report" else written)]
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
-            status = command_line([name, str(self.study), *options])
-        text = out.getvalue()
-        if name in ("report", "export") and status == 0:
-            text += "".join(p.read_text() for p in sorted(written.iterdir()))
-        if name == EXPLAIN and status == 0:
-            text += next(self.study.glob("explain/*/explanation.txt")).read_text()
-        return status, text, error.getvalue()
-
-    def team(self) -> Answer:
-        """Load the team that was trained first, as a user's script does."""
-        try:
-            with contextlib.redirect_stderr(error := io.StringIO()):
-                _, team = load(self.study).team()
-        except SpecError as refusal:
-            return 2, "", str(refusal)
-        arrays = {name: array.tolist() for name, array in team.arrays().items()}
-        return 0, str(arrays), error.getvalue()
-
-    def finish(self, directory: Path) -> list[str]:
-        """Run what is left of a study; return what had to be said."""
-        with open_to_run(directory, SPEC, self.trials, self.measures) as store:
-            for trial in pending(store, self.trials):
-                save(store, trial, self.result(trial), 1.0)
-            return store.notes
-
-    def result(self, trial: Trial) -> TrialResult:
-        """Return what a trial measures: a function of it, so that it is run once only."""
-        return self.results[trial.identity]
-
-    def content(self, directory: Path) -> object:
-        """Return all that a study has found."""
-        with Store.open(directory) as store:
-            store.verify()
-            names, episodes = store.episodes()
-            kept = names, list(episodes)
-            rows = kept, store.planned(), store.columns(), spec_of(store) == SPEC
-        paths = sorted((directory / "recordings").glob("[!.]*.npz"))
-        return rows, [(path.name, path.read_bytes()) for path in paths]
-
-    def damage(self) -> Path:
-        """Flip a bit of a file, mostly where it is not empty; return the file."""
-        weights = [p.stat().st_size ** 0.5 for p in self.files]
-        source = self.rng.choices(self.files, weights)[0]
-        data = bytearray(source.read_bytes())
-        places = [i for i, byte in enumerate(data) if byte] if self.rng.random() < 0.7 else data
-        at = self.rng.choice(places) if places is not data else self.rng.randrange(len(data))
-        data[at] ^= 1 << self.rng.randrange(8)
-        path = self.study / source.relative_to(self.sound)
-        path.write_bytes(data)
-        return path
-
-    def restore(self) -> None:
-        """Make the study sound again."""
-        shutil.rmtree(self.study)
-        shutil.copytree(self.sound, self.study)
-
-
-class Here:
-    """Workers that are this process; trials are those that an adversary has run before."""
-
-    processes = 1
-
-    def __init__(self, adversary: Adversary) -> None:
-        self.adversary = adversary
-
-    def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
-    ) -> Generator[Outcome]:
-        """See `nested_agents.studies.workers.runner.Workers.arrivals`."""
-        for trial in trials:
-            started(trial.identity)
-            time.sleep(0.08)
-            yield Outcome(trial, None, 1.0, self.adversary.result(trial))
 
 
 def kills(number: int, rng: random.Random, folder: Path) -> Counter[str]:
@@ -237,11 +104,17 @@ def kills(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     return tally
 
 
+OTHERS = ("explain", "export", "report", "retry", "tune")
+"""Commands that write, beside `run`."""
+TUNED = {"tune": {"learner.discount": [0.2, 0.4, 0.6, 0.8]}}
+
+
 def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[str]:
-    """Kill commands that read, and `retry`; return what happened."""
+    """Kill commands that write beside a study, `retry` and `tune`; return what happened."""
     adversary, tally = Adversary(folder, rng), Counter[str]()
     studies_run.start_workers = lambda *_: contextlib.nullcontext(Here(adversary))
-    failed = folder / "failed"
+    failed, spec = folder / "failed", folder / "tuned.toml"
+    spec.write_text(dumps(Spec.of({"episodes": 2, "steps": 10, "evaluation": 1} | TUNED).table()))
     with open_to_run(failed, SPEC, adversary.trials, adversary.measures) as store:
         for trial in adversary.trials[:5]:
             store.fail(trial.planned, "Traceback: a fault")
@@ -250,19 +123,25 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
 
     def line(name: str, place: Path) -> list[str]:
         """Return a command on a fresh copy of the study, which it writes beside."""
-        shutil.copytree(failed if name == "retry" else adversary.sound, place / "study")
-        out = ["--out", str(place / "page.html" if name == "report" else place / "out")]
-        return [name, str(place / "study"), *([] if name == "retry" else out)]
+        study, out = str(place / "study"), place / ("page.html" if name == "report" else "out")
+        if name == "tune":
+            return [name, str(spec), "--out", study, "--trials", "4", "--seeds", "4"]
+        shutil.copytree(failed if name == "retry" else adversary.sound, study)
+        return [name, study, *([] if name in ("retry", "explain") else ["--out", str(out)])]
 
-    whole: dict[str, tuple[float, dict[str, bytes]]] = {}
-    for name in ("export", "report", "retry"):
-        command, begin = line(name, folder / "whole" / name), time.monotonic()
+    whole: dict[str, tuple[float, dict[str, bytes], object]] = {}
+    for name in OTHERS:
+        place = folder / "whole" / name
+        place.mkdir(parents=True)
+        command, begin = line(name, place), time.monotonic()
         assert _wait(_child(command)) == 0, name
-        whole[name] = time.monotonic() - begin, _written(folder / "whole" / name)
+        seconds = time.monotonic() - begin
+        whole[name] = seconds, _written(place), adversary.content(place / "study")
     while tally["kills"] < number:
         name, place = rng.choice([*whole]), folder / f"k{tally['kills']}"
+        place.mkdir()
         tally["kills"] += 1
-        seconds, expected = whole[name]
+        seconds, expected, content = whole[name]
         command = line(name, place)
         child = _child(command)
         time.sleep(rng.uniform(0.0, seconds))
@@ -270,9 +149,9 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
         _wait(child)
         halves = {path for path, data in _written(place).items() if expected.get(path) != data}
         # What is there whole before the kill is not written over: that is refused.
-        is_whole = expected and _written(place) == expected
+        is_whole = expected and _written(place) == expected and name in ("export", "report")
         status = 0 if is_whole else _wait(_child(command))
-        is_equal = adversary.content(place / "study") == adversary.expected
+        is_equal = adversary.content(place / "study") == content
         if halves or status or not is_equal or _written(place) != expected:
             print(f"{name}: {halves}, status {status}, study equal {is_equal}", file=sys.stderr)
             tally[f"{name}: torn"] += 1
@@ -283,10 +162,14 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
 
 
 def _written(place: Path) -> dict[str, bytes]:
-    """Return what a command has written beside the study, by path; hidden files are no results."""
+    """Return what a command has written, by path, but a study itself and hidden files."""
     paths = [path for path in place.rglob("*") if path.is_file() and path.name[0] != "."]
-    relative = {path: path.relative_to(place) for path in paths}
-    return {str(of): path.read_bytes() for path, of in relative.items() if of.parts[0] != "study"}
+    return {
+        str(path.relative_to(place)): path.read_bytes()
+        for path in paths
+        if not path.name.startswith((DATABASE, "running.json", "study.toml"))
+        and path.parent.name not in ("recordings", "figures", "sources")
+    }
 
 
 def _child(line: list[str]) -> int:
@@ -327,10 +210,10 @@ def flips(number: int, rng: random.Random, folder: Path) -> Counter[str]:
         lines = [*LINES, *([EXPLAIN] if attempt % 10 == 0 else [])]
         for line in lines:
             tally["reads"] += 1
-            tally[_read(adversary, line, path)] += 1
+            tally[read(adversary, line, path)] += 1
         if attempt % 4 == 0:
             tally["runs"] += 1
-            tally[_mended(adversary, path)] += 1
+            tally[mended(adversary, path)] += 1
         adversary.restore()
     return tally
 
@@ -347,35 +230,8 @@ def every_byte(rng: random.Random, folder: Path) -> Counter[str]:
         path.write_bytes(data)
         for line in LINES[:2]:
             tally["reads"] += 1
-            tally[_read(adversary, line, path)] += 1
+            tally[read(adversary, line, path)] += 1
     return tally
-
-
-def _read(adversary: Adversary, line: str, path: Path) -> str:
-    try:
-        answer = adversary.command(line)
-    except BaseException:
-        print(f"{line}, {path.name}:\n{traceback.format_exc()}", file=sys.stderr)
-        return "traceback"
-    if answer == adversary.answers[line]:
-        return "equal"
-    is_reported = (
-        path.name in answer[1] + answer[2] or "recording is missing or damaged" in answer[1]
-    )
-    if is_reported:
-        return "told"
-    print(f"{line}, {path.name}: silence: {answer[2]}", file=sys.stderr)
-    return "silence"
-
-
-def _mended(adversary: Adversary, path: Path) -> str:
-    try:
-        adversary.finish(adversary.study)
-        is_equal = adversary.content(adversary.study) == adversary.expected
-    except BaseException:
-        print(f"run, {path.name}:\n{traceback.format_exc()}", file=sys.stderr)
-        return "run: traceback"
-    return "run: equal" if is_equal else "run: unequal"
 
 
 def obstacles(rng: random.Random, folder: Path) -> Counter[str]:
@@ -386,7 +242,7 @@ def obstacles(rng: random.Random, folder: Path) -> Counter[str]:
         how()
         for line in LINES:
             tally["reads"] += 1
-            tally[_read(adversary, line, path)] += 1
+            tally[read(adversary, line, path)] += 1
         adversary.restore()
 
     for name in (LOCK, DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm"):
@@ -566,13 +422,15 @@ def _area(ring: list[list[float]]) -> float:
     return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(ring, following, strict=True)) / 2
 
 
+Campaign = Callable[[int, random.Random, Path], Counter[str]]
+"""Attacks so many times, drawn from a generator, in a folder; returns what happened."""
 ATTEMPTS = (
-    "kills", "flips", "reads", "runs", "studies", "specs", "topologies", "polygons", "functions",
-    "scenarios",
+    "kills", "edits", "published files", "environments", "commands", "flips", "reads", "runs",
+    "studies", "specs", "topologies", "polygons", "functions", "scenarios",
 )  # fmt: skip
 FINE = (
     "equal", "told", "run: equal", "studies: equal", "kills with trials kept, and others left",
-    "accepted", "refused in one line", ": told", "not reached",
+    "accepted", "refused in one line", ": told", "right", "done", "not reached",
 )  # fmt: skip
 
 
@@ -590,40 +448,42 @@ def main() -> int:
     parser.add_argument("--scenarios", type=int, default=100, metavar="N", help="0: none")
     parser.add_argument("--every-byte", action="store_true", help="takes a quarter of an hour")
     parser.add_argument("--seed", type=int, default=20)
+    parser.add_argument("--edits", type=int, default=300, metavar="N", help="by SQL; 0: none")
+    parser.add_argument("--published", type=int, default=100, metavar="N", help="0: none")
+    parser.add_argument("--environments", type=int, default=200, metavar="N", help="0: none")
+    parser.add_argument("--circumstances", action="store_true", help="takes some minutes")
     options = parser.parse_args()
     durable.os.fsync = lambda _: None  # type: ignore[attr-defined]  # no power fails here
-    campaigns: dict[str, Callable[[random.Random, Path], Counter[str]]] = {
-        "kill -9": lambda rng, folder: kills(options.kills, rng, folder),
-        "kill -9 of export, report, retry": lambda rng, folder: kills_of_others(
-            options.others, rng, folder
+    campaigns: dict[str, tuple[int, Campaign]] = {
+        "kill -9": (options.kills, kills),
+        "kill -9 of others that write": (options.others, kills_of_others),
+        "flipped bits": (options.flips, flips),
+        "files cut short, folders in their place": (
+            options.flips, lambda _, rng, folder: obstacles(rng, folder)
         ),
-        "flipped bits": lambda rng, folder: flips(options.flips, rng, folder),
-        "files cut short, folders in their place": obstacles,
-        "hostile input": lambda rng, folder: hostile(options.hostile, rng, folder),
-        "scenarios that misbehave": lambda rng, folder: misbehaving.scenarios(
-            options.scenarios, rng, folder
+        "edits by SQL": (options.edits, edits.sql),
+        "published files": (options.published, edits.published),
+        "hostile input": (options.hostile, hostile),
+        "scenarios that misbehave": (options.scenarios, misbehaving.scenarios),
+        "environments": (
+            options.environments, lambda number, rng, _: environments.attack(number, rng)
         ),
-        "a bit of every byte of the database": every_byte,
-    }
-    if not options.every_byte:
-        del campaigns["a bit of every byte of the database"]
-    if not options.kills:
-        del campaigns["kill -9"]
-    if not options.flips:
-        del campaigns["flipped bits"], campaigns["files cut short, folders in their place"]
-    if not options.others:
-        del campaigns["kill -9 of export, report, retry"]
-    if not options.scenarios:
-        del campaigns["scenarios that misbehave"]
-    if not options.hostile:
-        del campaigns["hostile input"]
+        "circumstances": (
+            options.circumstances, lambda _, rng, folder: circumstances.attack(rng, folder)
+        ),
+        "a bit of every byte of the database": (
+            options.every_byte, lambda _, rng, folder: every_byte(rng, folder)
+        ),
+    }  # fmt: skip
     begin, failed = time.process_time(), 0
     print("| attack | attempts | what became of them | failures |\n|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
-        for number, (title, campaign) in enumerate(campaigns.items()):
-            folder = Path(name) / str(number)
+        for title, (number, campaign) in campaigns.items():
+            if not number:
+                continue
+            folder = Path(name) / title.replace(" ", "-")
             folder.mkdir()
-            tally = campaign(random.Random(options.seed), folder)
+            tally = campaign(number, random.Random(options.seed), folder)
             failed += _failures(tally)
             tried = ", ".join(f"{tally[what]} {what}" for what in ATTEMPTS if tally[what])
             became = ", ".join(

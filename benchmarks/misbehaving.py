@@ -112,12 +112,18 @@ class Inline:
     processes = 1
 
     def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
+        self,
+        trials: Sequence[Trial],
+        run_trial: RunTrial,
+        started: Callable[[str], None],
+        ended: Callable[[str], None],
     ) -> Generator[Outcome]:
         """See `nested_agents.studies.workers.runner.Workers.arrivals`."""
         for trial in trials:
             started(trial.identity)
-            yield attempt(run_trial, trial)
+            outcome = attempt(run_trial, trial)
+            ended(trial.identity)
+            yield outcome
 
 
 def scenarios(number: int, rng: random.Random, folder: Path) -> Counter[str]:

@@ -1,67 +1,36 @@
 """
-Trials in TensorBoard or MLflow
-===============================
+A tracker of your own
+=====================
 
-Observers that write every finished trial to a tool of yours, and show the progress on the terminal
-as usual. Neither package is needed by anything else::
+``nested-agents run --track tensorboard`` (or mlflow, wandb) writes every finished trial to a tool
+of others. One for yours takes a method: here each trial becomes a line of a file. It is an
+observer, which shows the progress on the terminal as usual::
 
     import nested_agents as na
-    from trial_loggers import TensorBoard
+    from trial_loggers import Lines
 
-    na.run("spec.toml", "out", observer=TensorBoard("out"))
+    na.run("spec.toml", "out", observer=Lines("out/trials.jsonl"))
 """
 
 # sphinx_gallery_thumbnail_path = "learning-curves.png"
 
+import json
 from pathlib import Path
 
 from nested_agents.studies.presentation.progress import Terminal
 
 
-class TrialLogger(Terminal):
-    """Writes every trial that has finished, once its result is in the study."""
+class Lines(Terminal):
+    """Writes a line for each trial that has finished, once its result is in the study."""
 
-    def follow(self, outcomes, total, done):
-        """Run the trials by asking for their outcomes, and write each."""
-        super().follow(map(self._written, outcomes), total, done)
+    def __init__(self, path):
+        super().__init__(self.write)
+        self.path = Path(path)
 
-    def _written(self, outcome):
+    def write(self, outcome):
+        """Write what became of a trial."""
+        line = {"condition": outcome.trial.condition, "seed": outcome.trial.seed}
         if outcome.result is not None:  # it has not failed
-            self.write(outcome.trial, outcome.result)
-        return outcome
-
-
-class TensorBoard(TrialLogger):
-    """Curves of every measure, a run for each trial, below ``tensorboard`` in the study."""
-
-    def __init__(self, directory):
-        self.directory = Path(directory) / "tensorboard"
-
-    def write(self, trial, result):
-        """Write what a trial has measured."""
-        from tensorboard.summary import Writer
-
-        writer = Writer(str(self.directory / trial.condition / f"seed {trial.seed}"))
-        for row in result.rows:
-            for name, value in {**row.measures, "return": row.return_}.items():
-                writer.add_scalar(f"{row.phase}/{name}", float(value), row.episode)
-        writer.close()
-
-
-class MLflow(TrialLogger):
-    """A run for each trial: its settings, its curves, what it took."""
-
-    def __init__(self, directory):
-        import mlflow
-
-        self.mlflow = mlflow
-        mlflow.set_experiment(Path(directory).name)
-
-    def write(self, trial, result):
-        """Write what a trial has measured."""
-        with self.mlflow.start_run(run_name=f"{trial.condition}, seed {trial.seed}"):
-            self.mlflow.log_params({"condition": trial.condition, "seed": trial.seed})
-            for row in result.rows:
-                values = {f"{row.phase}.{name}": float(v) for name, v in row.measures.items()}
-                self.mlflow.log_metrics(values, step=row.episode)
-            self.mlflow.log_metrics({f"seconds.{k}": v for k, v in result.seconds.items()})
+            line |= {"return": [row.return_ for row in outcome.result.rows]}
+        with self.path.open("a") as file:
+            print(json.dumps(line), file=file)

@@ -14,6 +14,7 @@ from ..studies.cli.display import (
     Form,
     in_form,
     print_data,
+    print_lines,
     print_table,
     print_text,
     print_wrapped,
@@ -83,6 +84,58 @@ def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, publ
             )
         results[study] = published.loads(published.dumps(ran.outline, ran.results))
     return results
+
+
+@click.command()
+@options.out("Run the tasks of the atlas below this directory, or what is left of them.")
+@click.option(
+    "--task",
+    "tasks",
+    multiple=True,
+    metavar="NAME...",
+    help="Those of the tasks that are run; published: rows that have been published already.",
+)
+@click.option("--rows", type=options.PATH, metavar="DIR", help="Rows; by default the committed.")
+@click.option("--figures", type=options.PATH, metavar="DIR", help="Draw the figures into it.")
+@options.jobs
+def atlas(
+    out: Path | None,
+    tasks: tuple[str, ...],
+    rows: Path | None,
+    figures: Path | None,
+    jobs: int | None,
+) -> int:
+    """Print what teams of few agents tell of larger ones, over tasks and hierarchies.
+
+    Laws are fitted to teams of at most 16 agents, and of at most 8, and larger ones of the same
+    rows are predicted. Without --out the rows are the committed ones.
+    """
+    from .atlas import COMMITTED, SMALL, checks, choices, coverage, losses, read_rows, run_tasks
+
+    if out is None and (tasks or jobs is not None):
+        raise SpecError(f"{'--task' if tasks else '--jobs'}: needs --out, where to run the tasks")
+    folder = run_tasks(out, jobs, tasks) if out is not None else rows or COMMITTED
+    frame = read_rows(folder)
+    print_text(f"{len(frame):,} trials of {frame.groupby(TEAM_AND_SIZE).ngroups} conditions")
+    for small in (SMALL, SMALL // 2):
+        print_text("", f"From at most {small} agents: larger teams in 90 % intervals")
+        print_lines(coverage(checks(frame, small)))
+        print_lines(map(str, choices(frame, small)))
+    costs = losses(frame)
+    if costs:
+        print_text("", "What losing messages costs")
+        print_lines(map(str, costs))
+    if figures is not None:
+        from ..studies.presentation.figures import write
+        from .atlas_figures import FIGURES
+
+        figures.mkdir(parents=True, exist_ok=True)
+        for name, draw in FIGURES.items():
+            write(draw(frame), figures / f"{name}.png")
+    return 0
+
+
+TEAM_AND_SIZE = ["task", "hierarchy", "learner", "fault", "size"]
 
 
 entries = click.argument("entries", type=options.PATH, metavar="ENTRY.json...", nargs=-1)

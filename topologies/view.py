@@ -43,7 +43,7 @@ class HierarchyView:
 
     @property
     def tries(self) -> tuple[int, ...]:
-        """Joint actions that each agent tries per step, in agent order."""
+        """Joint actions that each agent tries per step in agent order, if it tries all."""
         return tuple(self.actions ** (1 + count) for count in below_counts(self.hierarchy))
 
     @property
@@ -189,8 +189,8 @@ def format_view(view: HierarchyView, form: Form) -> str:
         tried = format_count(view.tries[i])
         rows.append((str(rank + 1), names[i], str(len(below[i])), tried, subordinates))
     legend = [
-        "In order of decision. below: agents whose actions it tries; tries: joint",
-        "actions tried a step.",
+        "In order of decision. below: agents whose actions it tries; tries: joint actions",
+        "a step, if all are tried (exact evaluation; of large teams others try a few).",
     ]
     return "\n".join([view.title, *view.remarks, "", *align(rows, "><>><"), "", *legend])
 

@@ -8,6 +8,7 @@ from ..interface.experience import Experience, Observation
 from ..interface.plain import as_prediction
 from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
+from ..numerics import FloatArray
 from ..plugins.settings import PartSettings
 from .adaptive import Adaptive, DynamicsModel
 from .calibration import Calibration, CalibrationSettings
@@ -70,19 +71,31 @@ class Foresight:
             name: part for name, part in parts.items() if isinstance(part, Adaptive)
         }
 
-    def predict(self, seen: Observation) -> Prediction | None:
-        """Return the prediction from where agents are; None where nothing is predicted."""
+    def predict(self, seen: Observation, errors: FloatArray | None = None) -> Prediction | None:
+        """Return the prediction from where agents are; None where nothing is predicted.
+
+        Parameters
+        ----------
+        seen
+            Where they are.
+        errors
+            ``(c,)`` added to the logarithms of the predictor's constants; none: it has no errors.
+        """
         if seen.imagined is not None:
             return seen.imagined
         if self.predictor is not None:
             return self.predictor.predict(seen.present)
-        if self.self_model is None and self.calibration is None:
+        if self.self_model is None and self.calibration is None and errors is None:
             return as_prediction(seen.scenario.predict())
         bodies = seen.scenario.embodiment()
         if bodies is None:
-            raise ValueError("learner.self_model, calibration: the scenario has no bodies")
+            raise ValueError(
+                "learner.self_model, calibration, decision.errors: the scenario has no bodies"
+            )
         effects = bodies.nominal_effects if self.self_model is None else self.self_model.effects
         constants = None if self.calibration is None else self.calibration.constants
+        if errors is not None:
+            constants = errors if constants is None else constants + errors
         return bodies.predict_with(effects, constants)
 
     def learn(self, experience: Experience, prediction: Prediction | None) -> None:

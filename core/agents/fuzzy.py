@@ -7,7 +7,6 @@ prediction, in the state that it is in. Consequent weights are an agent's own or
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -19,37 +18,17 @@ from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn, all_hear_all
 from ..interface.agents import Agents, Counts, Memory, Placement, under
 from ..interface.experience import Experience, Observation
-from ..interface.prediction import NOT_EXPLORING, UNPREDICTED, Prediction
+from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
 from ..learners.learner import LearnerSettings
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
 from .plain import as_explorer, as_learner
-from .valuing import Present, evaluator_of
+from .valuing import Present, evaluator_of, is_private
+from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
 
-UNKNOWN: FloatArray = np.zeros(0)
-"""The weights of agents of another part."""
 SHAPED = ("learner.theta", "learner.trace", "learner.reach", "seen", "explorer", "generator")
 """What of a memory has a shape that the settings fix."""
-
-
-@dataclass
-class FuzzyInputs:
-    """What fuzzy agents decide by."""
-
-    left: FloatArray
-    """``(n, d)`` the states that they are in; where they value actions, with a column for each
-    action that they are told, filled in turn by turn."""
-    previous: IntArray | None
-    """``(n,)`` what all did in the decision before; none: there was none, or nobody asks."""
-    prediction: Prediction
-    """What joint actions would lead to."""
-    weights: list[FloatArray]
-    """The consequent weights of every agent."""
-    frequencies: FloatArray
-    """``(n, A)`` how often each agent was seen to take each action, rows summing to one."""
-    explore: bool
-    """Whether they explore."""
 
 
 class FuzzyAgents(Agents[FuzzyInputs]):
@@ -114,7 +93,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             raise ValueError("learner.mirrored = true: the mirror image is that of a whole team")
         self.mirror = Mirror.of(scenario) if settings.is_mirrored else None
         self.rows = rows_of(scenario, self.members, shared=settings.weights == "role")
-        self._senders = _senders(settings, hierarchy)
+        self._senders = senders_of(settings, hierarchy)
         self._n_told = max(map(len, self._senders), default=0)
         self.space, self.rules = settings.rules_over(
             scenario.state_space, scenario.action_set, self._n_told
@@ -125,9 +104,12 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self._evaluators: dict[Hierarchy, Evaluator | None] = {}
         self._left = NOBODY
         self._actions_of_left = NOBODY
+        self.is_private = is_private(settings, scenario)
+        self.views: Views | None = None
         self.evaluator = self._evaluator()
         self._decides_for_all = (
             self.evaluator is not None
+            and not self.is_private
             and type(self.evaluator).decide is not Evaluator.decide
             and not placement.messages_fail
             and all_hear_all(hierarchy)
@@ -135,6 +117,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self._neutral = np.full(n, self.action_set.neutral)
         own_rows = dict(zip(self.members.tolist(), self.rows.tolist(), strict=True))
         self._row_of = [own_rows.get(agent) for agent in range(n)]
+        if self.is_private:
+            n_rules = self.learner.theta.shape[1]
+            self.views = Views(settings, placement, self._row_of, n_rules, self.foresight)
+            self.costs = self.views.costs
         self.explorer = as_explorer(settings.exploration.build(n))
         self.rng = np.random.Generator(np.random.PCG64(placement.seed))
         self.seen: FloatArray = np.ones((n, n_actions))
@@ -208,14 +194,15 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             left = np.hstack([left, nobody])
         prediction = None if self.settings.values_actions else self.foresight.predict(seen)
         theta = self.learner.theta
-        weights = [UNKNOWN if row is None else theta[row] for row in self._row_of]
+        shared = UNPREDICTED if prediction is None else prediction
         return FuzzyInputs(
             left=left,
             previous=seen.previous if self.settings.decision.unseen == "last" else None,
-            prediction=UNPREDICTED if prediction is None else prediction,
-            weights=weights,
+            prediction=shared,
+            weights=weights_by_agent(self._row_of, theta),
             frequencies=self.seen / self.seen.sum(axis=1, keepdims=True),
             explore=explore,
+            views={} if self.views is None else self.views.by_agent(seen, shared, theta),
         )
 
     def decide_all(self, inputs: FuzzyInputs) -> IntArray | None:
@@ -265,12 +252,13 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         given = NOTHING_GIVEN
         if self.given.size:
             given = self.given[agent] / self.given[agent].sum(axis=2, keepdims=True)
+        view = inputs.views.get(agent) or OwnView(inputs.prediction, inputs.weights)
         values = self.evaluator.values(
             Deliberation(
                 agent=agent,
                 joint_action=known,
-                prediction=inputs.prediction,
-                weights=inputs.weights,
+                prediction=view.prediction,
+                weights=view.weights,
                 frequencies=inputs.frequencies,
                 rng=self.rng,
                 given=given,
@@ -282,12 +270,15 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             raise ValueError(
                 f"the evaluator gave {len(values)} values of {len(self.action_set)} actions"
             )
+        if self.is_private and self.evaluator.expected is not None:
+            inputs.expected[agent] = self.evaluator.expected.copy()
         if inputs.explore:
             return self.explorer.choose(agent, values, self.rng)
         return greatest(values, self.rng)
 
     def conclude(self, inputs: FuzzyInputs, joint_action: IntArray) -> None:
         """Count what all have done, if they explore: the clock of exploration, the frequencies."""
+        inputs.agreement = agreement(inputs.expected, joint_action)
         if not inputs.explore or self.evaluator is None:
             return
         self.explorer.advance()
@@ -295,6 +286,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.seen[every, joint_action] += 1.0
         if self.given.size:
             self.given[every[:, None], joint_action[:, None], every, joint_action] += 1.0
+
+    def spent(self, inputs: FuzzyInputs) -> Mapping[str, float]:
+        """Return how far expectations were right, and what was communicated; without views {}."""
+        return {} if self.views is None else self.views.spent(inputs, self.hierarchy)
 
     def learn(self, experience: Experience, inputs: FuzzyInputs) -> None:
         """Revise predictions, and learn from the states entered; after an episode, all of it."""
@@ -410,16 +405,3 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.learner.restore(under("learner.", memory))
         for name, part in self.foresight.adaptive.items():
             part.restore(under(f"{name}.", memory))
-
-
-def _senders(settings: LearnerSettings, hierarchy: Hierarchy) -> list[list[int]]:
-    """Return, by agent, whose actions are part of its state, in the order of decision."""
-    if not settings.values_actions:
-        return []
-    if hierarchy.neighbours:
-        raise ValueError(
-            f"learner.kind = {settings.kind!r}: agents use what they are told, and neighbours tell "
-            "nothing; set topology.oriented, in which order they decide"
-        )
-    every = range(len(hierarchy))
-    return [sorted(hierarchy.above(i), key=hierarchy.order.index) for i in every]

@@ -15,14 +15,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ..hierarchy.failures import Names
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import levels_of
 from ..interface.scenario import Scenario
 from ..learners import LEARNERS
 from ..learners.learner import MembersOf, TeamSettings
 from ..plugins.registry import Plugged
-from ..plugins.settings import Settings
+from ..plugins.settings import Names, Settings, unwritten
 from .joint import body_of
 
 
@@ -33,6 +32,9 @@ class PartOfTeam(Settings):
     """Their names or patterns of these, roles, bodies, or levels (``level1``); one or a list."""
     learner: Annotated[TeamSettings, Plugged(LEARNERS)]
     """How they decide and learn: a table as that of a whole team."""
+    team: Annotated[str | None, unwritten(None)] = None
+    """A file ``.npz`` that `Team.save` wrote, whose weights they begin with; of a team of several
+    kinds, those of the part in the same place. None: they have learned nothing."""
 
 
 class MixedSettings(TeamSettings):
@@ -76,7 +78,7 @@ class MixedSettings(TeamSettings):
                     f"learner.parts[{k}].agents = {list(part.agents)}: nobody is called so who is "
                     f"not of a part before, known: {known}"
                 )
-            kinds.append(MembersOf(own, part.learner))
+            kinds.append(MembersOf(own, part.learner, part.team))
         return kinds
 
     def _part_named(self, agent: str, names: Sequence[str]) -> int | None:

@@ -21,6 +21,7 @@ from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
 from ..interface.worlds import Transitions
 from ..numerics import AnyArray, BoolArray, IntArray
+from .kept import begin_with
 
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
@@ -54,7 +55,8 @@ class Team:
     messages
         Who is told what.
     costs
-        What is measured of an episode of what its decisions cost; without functions nothing.
+        What is measured of an episode of what its decisions cost: of functions, and of agents with
+        views of their own.
     spent
         What its last decision cost, by their names.
 
@@ -87,12 +89,14 @@ class Team:
         seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
         parts: list[Agents[Any]] = []
         self._part_of = [0] * len(hierarchy)
-        for (members, own), own_seed in zip(kinds, seeds, strict=True):
+        for (members, own, kept), own_seed in zip(kinds, seeds, strict=True):
             for agent in members.tolist():
                 self._part_of[agent] = len(parts)
             fail = bool(failures)
             placement = Placement(world, hierarchy, members, own_seed, messages_fail=fail)
             parts.append(own.agents(placement))
+            if kept is not None:
+                begin_with(parts[-1], kept, len(parts) - 1)
         self.parts = tuple(parts)
         self.costs = costs_of(parts)
         self.spent: Mapping[str, float] = {}
@@ -190,11 +194,12 @@ class Team:
             joint = self._walk(seen, inputs)
         if self._has_contents:
             self.messages.advance(joint, self._contents(inputs))
-            self.spent = self._spent(inputs)
         else:
             self.messages.advance(joint)
         for part, own in zip(self.parts, inputs, strict=True):
             part.conclude(own, joint)
+        if self.costs:
+            self.spent = self._spent(inputs)
         return Decision(joint, inputs)
 
     def _walk(self, seen: Observation, inputs: tuple[Any, ...]) -> IntArray:
@@ -210,8 +215,10 @@ class Team:
         for part, agents, receivers, senders in self._slots:
             if some_left:
                 agents = agents[~gone[agents]]
-                if not len(agents):
-                    continue
+            if fail and self.parts[part].has_contents:  # whoever is absent is not asked
+                agents = agents[~np.isin(agents, self.messages.absent(agents))]
+            if not len(agents):
+                continue
             if self.parts[part].has_contents:
                 turn = self.messages.turn_with_contents(agents, joint, self._contents(inputs))
             elif fail:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from ..evaluators.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
 from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import Placement
+from ..interface.scenario import Scenario
 from ..learners.learner import LearnerSettings
 from ..numerics import IntArray
 from ..rules.rule_base import RuleBase
@@ -20,6 +21,11 @@ class Present(NamedTuple):
     """Who decides before whom; those who have left are in no relation."""
     left: IntArray
     """``(k,)`` who has left."""
+
+
+def is_private(settings: LearnerSettings, scenario: Scenario) -> bool:
+    """Return whether each agent decides by a view of its own, see `views`."""
+    return settings.decision.errors is not None or scenario.is_private
 
 
 def evaluator_of(
@@ -57,6 +63,7 @@ def evaluator_of(
         _check_values(hierarchy, set(members), decision.value_of)
     if learned is not None:
         return learned
+    private = is_private(settings, placement.scenario)
     problem = DecisionProblem(
         rules=rules,
         hierarchy=hierarchy,
@@ -68,8 +75,9 @@ def evaluator_of(
         value_of=decision.value_of,
         unseen=decision.unseen,
         plan=decision.plan,
-        handed_down=hierarchy.told == "ancestors" and not placement.messages_fail,
+        handed_down=hierarchy.told == "ancestors" and not placement.messages_fail and not private,
         first=next((i for i in hierarchy.order if i in own), members[0]),
+        is_private=private,
     )
     return as_evaluator(decision.evaluator.build(problem))
 

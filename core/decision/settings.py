@@ -7,6 +7,7 @@ from ..evaluators.enumeration import AutoSettings
 from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
 from ..plugins.registry import Plugged
 from ..plugins.settings import Settings, unwritten
+from .errors import ErrorSettings
 
 
 class DecisionSettings(Settings):
@@ -32,3 +33,5 @@ class DecisionSettings(Settings):
     with what it tells; or one that all work out alike, which is common knowledge and no message."""
     evaluator: Annotated[EvaluatorSettings, Plugged(EVALUATORS, EVALUATORS.parsed)] = AutoSettings()
     """Which joint actions of the agents below are tried: the name of an evaluator, or its table."""
+    errors: Annotated[ErrorSettings | None, unwritten(None)] = None
+    """Errors that each agent has of its own; with this table it also plans for itself alone."""

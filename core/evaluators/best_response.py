@@ -129,6 +129,11 @@ class BestResponse(Aggregation):
                 "learner.decision.plan = 'common': nobody considers another, so that there is "
                 "nothing to plan, use private, or unseen = 'plan'"
             )
+        if problem.plan == "common" and problem.is_private:
+            raise ValueError(
+                "learner.decision.plan = 'common': agents with errors or perception of their own "
+                "have no plan in common, use private"
+            )
         self._planner = _planners(problem)
         self._kept_up = _kept_up(problem, self._planner)
         self._place = np.concatenate([np.arange(len(group)) for group in groups])
@@ -158,6 +163,7 @@ class BestResponse(Aggregation):
         """Return the value ``(A,)`` of each action of the deciding agent."""
         agent = deliberation.agent
         if self.indifferent(deliberation):
+            self.expected = deliberation.joint_action
             return np.zeros(self.n_actions)
         if self.begins(deliberation):
             self._plans = {}
@@ -176,6 +182,7 @@ class BestResponse(Aggregation):
         self._known = _Known(concerned, plan.copy(), free, worths)
         # What its body does is kept in the plan; what it takes in the end may be told.
         plan[list(free)] = self._actions[len(free)][greatest(worths.ravel(), deliberation.rng)]
+        self.expected = plan
         return worths.max(axis=tuple(k for k, i in enumerate(free) if i != agent))
 
     def decide(self, first: Deliberation, exploring: Exploring) -> IntArray | None:

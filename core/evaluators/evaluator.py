@@ -82,6 +82,8 @@ class Evaluator(ABC):
     """Whether it needs a prediction that goes on from where it leads, see `Prediction.after`."""
     counts: Counts
     """What has been evaluated so far; the agents add what they learn."""
+    expected: IntArray | None = None
+    """``(n,)`` the joint action that the last agent to decide expected; none: it had no plan."""
 
     @abstractmethod
     def values(self, deliberation: Deliberation) -> FloatArray:
@@ -128,6 +130,8 @@ class DecisionProblem:
     """Whether all that is told arrives, so that a plan may be told, too."""
     first: int | None = None
     """Who of those agents decides first; none: the first of the hierarchy."""
+    is_private: bool = False
+    """Whether agents have views of their own, so that nothing worked out for one is another's."""
 
 
 class EvaluatorSettings(PartSettings):
@@ -202,10 +206,14 @@ class Aggregation(Evaluator):
             raise ValueError(f"learner.decision.{key} = {value!r}: {why}")
 
     def begins(self, deliberation: Deliberation) -> bool:
-        """Return whether a decision of the team begins with this one's; it is asked of each."""
+        """Return whether a decision of the team begins with this one's; it is asked of each.
+
+        Of agents with views of their own each begins anew.
+        """
         before, self._prediction = self._prediction, deliberation.prediction
         first = self.hierarchy.order[0] if self.problem.first is None else self.problem.first
-        return deliberation.agent == first or before is not deliberation.prediction
+        is_first = deliberation.agent == first or before is not deliberation.prediction
+        return is_first or self.problem.is_private
 
     def count(self, agent: int, joint_actions: int) -> None:
         """Note that joint actions have been tried: valued by each agent concerned, or rewarded."""

@@ -141,6 +141,7 @@ class RecordedAnswers:
     def _db(self) -> sqlite3.Connection:
         if self._connection is None:
             self._connection = sqlite3.connect(self.path, timeout=PATIENCE)
+            self._connection.execute("PRAGMA journal_mode = TRUNCATE")
             self._connection.execute("PRAGMA synchronous = FULL")
             with self._connection as db:
                 db.execute(TABLE)

@@ -8,25 +8,15 @@ and policies stay paired. How an agent reads what it was not told is the team's 
 """
 
 from collections.abc import Sequence
-from fnmatch import fnmatchcase
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.random import Generator
-from pydantic import BeforeValidator, Field, NonNegativeInt, model_validator
+from pydantic import Field, NonNegativeInt, model_validator
 
 from ..numerics import BoolArray, IntArray
-from ..plugins.settings import Fraction, Settings
+from ..plugins.settings import Fraction, Names, Settings, mask_of
 from .repair import Repair
-
-
-def _names(value: object) -> object:
-    several = value if isinstance(value, list | tuple) else (value,)
-    return tuple(str(one) if isinstance(one, int | np.integer) else one for one in several)
-
-
-Names = Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(_names)]
-"""What fails by name, pattern or number, one or a list."""
 
 
 class Scheduled(Settings):
@@ -68,18 +58,7 @@ class Scheduled(Settings):
         ValueError
             If it names one that there is not; the line begins with the key `where` it stands.
         """
-        mask = np.zeros(len(agents), dtype=bool)
-        for name in self.named:
-            hit = np.array([fnmatchcase(agent, name) for agent in agents])
-            if not hit.any():
-                shown = ", ".join(agents[:8]) + (", ..." if len(agents) > 8 else "")
-                head, dot, _ = agents[0].rpartition(".")
-                raise ValueError(
-                    f"{where}.{self.part} = {name!r}: no such {self.part.removesuffix('s')}, "
-                    f"allowed {shown} or a pattern such as {head}{dot}*"
-                )
-            mask |= hit
-        return mask
+        return mask_of(self.named, agents, f"{where}.{self.part}")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:

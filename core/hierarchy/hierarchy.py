@@ -30,6 +30,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator
 
 from ..numerics import nx
+from .picture import svg
 
 ARROW, LINE = "{} -> {}", "{} - {}"
 """How a superior and its subordinate are written, and two neighbours."""
@@ -150,6 +151,13 @@ class Hierarchy:
         pairs = [ARROW.format(self.agents[a], self.agents[b]) for a, b in self.edges]
         pairs += [LINE.format(self.agents[a], self.agents[b]) for a, b in self.neighbours]
         return f"Hierarchy({len(self)} agents: {', '.join(pairs) or 'no edges'})"
+
+    def _repr_svg_(self) -> str:
+        levels = [0] * len(self)
+        for agent in self.order:
+            above = [levels[a] + 1 for a, b in self.edges if b == agent]
+            levels[agent] = max(above, default=0)
+        return svg(self.agents, levels, self.edges, self.neighbours)
 
     def below(self, agent: int) -> tuple[int, ...]:
         """Return all agents whose actions `agent` considers, in agent order."""

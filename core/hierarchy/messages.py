@@ -59,6 +59,7 @@ class Messages:
 
     Examples
     --------
+    >>> from nested_agents.core.hierarchy.failures import LostMessages
     >>> chain = Hierarchy("abc", [("a", "b"), ("b", "c")])
     >>> messages = Messages(chain, [LostMessages(agents="a")], n_actions=4)
     >>> messages.begin(0, episode=0)

@@ -111,6 +111,10 @@ class Prediction(ABC):
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``: to decide by rewards."""
         return None
 
+    def of(self, agent: int) -> Prediction:
+        """Return what an agent predicts itself: the same, unless agents perceive for themselves."""
+        return self
+
     def after(self, joint_action: IntArray) -> Prediction | None:
         """Return the prediction from where a joint action ``(n,)`` leads in one decision.
 

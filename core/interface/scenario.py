@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..numerics import FloatArray, IntArray
+from ..numerics import BoolArray, FloatArray, IntArray
 from .measures import Measure
 from .prediction import EmbodiedPrediction, Prediction
 from .spaces import ActionSet, StateSpace
@@ -134,6 +134,19 @@ class Scenario(ABC):
     def roles(self) -> tuple[str, ...]:
         """The role of every agent; agents of one role may share weights. By default its name."""
         return tuple(self.agents)
+
+    @cached_property
+    def perceived(self) -> BoolArray:
+        """Of which other bodies each agent perceives the state, ``(n, G)``: by default of all."""
+        own = np.zeros((len(self.agents), len(self.groups)), dtype=bool)
+        for body, group in enumerate(self.groups):
+            own[list(group), body] = True
+        return ~own
+
+    @property
+    def is_private(self) -> bool:
+        """Whether agents perceive it each for itself, see `Prediction.of`."""
+        return False
 
     @cached_property
     def bounds(self) -> FloatArray:

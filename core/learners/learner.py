@@ -120,6 +120,8 @@ class MembersOf(NamedTuple):
     """``(k,)`` who they are, in agent order."""
     settings: TeamSettings
     """How they decide and learn."""
+    team: str | None = None
+    """File of a team whose weights they begin with; none: they have learned nothing."""
 
 
 class TeamSettings(PartSettings):

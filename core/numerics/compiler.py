@@ -60,10 +60,16 @@ class Kernel:
         What to compile.
     options
         Of `numba.njit`.
+    names_of
+        A module beside the function's own whose names it uses, too. It is imported when the
+        function is compiled: what it is for numba to generate needs numba.
     """
 
-    def __init__(self, function: Callable[..., object], options: Mapping[str, object]) -> None:
+    def __init__(
+        self, function: Callable[..., object], options: Mapping[str, object], names_of: str = ""
+    ) -> None:
         update_wrapper(self, function)
+        self._names_of = names_of
         # Division by zero gives what it gives in NumPy: that compiles sooner than an exception.
         self.py_func = function
         self._options = {"error_model": "numpy", **options}
@@ -102,9 +108,13 @@ class Kernel:
             for name in set(_names(function.__code__))
             if isinstance(thing := function.__globals__.get(name), Kernel)
         }
+        generated: Mapping[str, object] = {}
+        if self._names_of:
+            package = function.__module__.rpartition(".")[0]
+            generated = vars(importlib.import_module(f"{package}.{self._names_of}"))
         copy = FunctionType(
             function.__code__,
-            function.__globals__ | kernels,
+            {**generated, **function.__globals__, **kernels},
             function.__name__,
             function.__defaults__,
             function.__closure__,
@@ -131,6 +141,16 @@ class Kernel:
                 result = compiled(*args)
             self._ready = compiled
         return result
+
+    def prepare(self, *args: object) -> None:
+        """Compile the function for arguments of these types, and do not call it."""
+        with _threads:
+            compiled = self.compiled
+            file = _cache_file(compiled)
+            with _alone(file):
+                if file is not None:
+                    self._compile_apart(compiled, args)
+                    compiled.compile(tuple(map(compiled.typeof_pyval, args)))
 
     def _compile_apart(self, compiled: Any, args: tuple[object, ...]) -> None:
         """See to it that the cache has the function for arguments of these types, if it can be."""
@@ -185,11 +205,11 @@ def serve() -> None:
         sys.stdout.buffer.flush()
 
 
-def njit(**options: object) -> Callable[[F], F]:
+def njit(*, names_of: str = "", **options: object) -> Callable[[F], F]:
     """Return a decorator like `numba.njit` that compiles at the first call, see `Kernel`."""
 
     def decorate(function: F) -> F:
-        return cast(F, Kernel(function, options))
+        return cast(F, Kernel(function, options, names_of))
 
     return decorate
 

@@ -7,18 +7,61 @@ in the words of the command line rather than pydantic's, see `problems`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
+from fnmatch import fnmatchcase
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+)
 
+from ..numerics import BoolArray
 from .problems import explain
 
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+
+
+def names(value: object) -> object:
+    """Return what is named as a tuple of texts, one name or several, of numbers, too."""
+    several = value if isinstance(value, list | tuple) else (value,)
+    return tuple(str(one) if isinstance(one, int | np.integer) else one for one in several)
+
+
+Names = Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(names)]
+"""Names, patterns or numbers of something, one or a list."""
+
+
+def mask_of(named: Sequence[str], agents: Sequence[str], key: str) -> BoolArray:
+    """Return which of the agents ``(n,)`` are named, by name or pattern.
+
+    Raises
+    ------
+    ValueError
+        If one is named that there is not; the line begins with the key and calls them by it.
+    """
+    mask = np.zeros(len(agents), dtype=bool)
+    for name in named:
+        hit = np.array([fnmatchcase(agent, name) for agent in agents])
+        if not hit.any():
+            shown = ", ".join(agents[:8]) + (", ..." if len(agents) > 8 else "")
+            head, dot, _ = agents[0].rpartition(".")
+            part = key.rpartition(".")[2].removesuffix("s") if key.endswith("s") else "agent"
+            raise ValueError(
+                f"{key} = {name!r}: no such {part}, allowed {shown} or a pattern such as "
+                f"{head}{dot}*"
+            )
+        mask |= hit
+    return mask
 
 
 MOST_BYTES = 10**9
@@ -152,8 +195,31 @@ class PartSettings(Settings):
         return resolve_name(self.factory)(self, *given)
 
 
+class PerceptionSettings(Settings):
+    """How some agents perceive a scenario: one of the ``[[scenario.perception]]`` of a spec.
+
+    See `nested_agents.scenarios.faults.perception`.
+    """
+
+    agents: Names
+    """Agents by name, pattern or number, one or a list."""
+    noise: Fraction = 0.0
+    """Standard deviation of what they perceive, of every state variable, as a fraction of its
+    range; drawn anew for every decision."""
+    delay: Annotated[int, Field(ge=0, le=1000)] = 0
+    """Decisions by which they perceive states late; in the first ones they perceive the first."""
+    reach: Annotated[int, Field(ge=0)] | None = None
+    """How many links away bodies are perceived at most, see
+    `nested_agents.scenarios.faults.perception.distances_of`; none: however far."""
+    lost: Annotated[tuple[str, ...], BeforeValidator(names)] = ()
+    """Agents by name, pattern or number whose bodies they do not perceive."""
+
+
 class ScenarioSettings(PartSettings):
     """What the settings of all scenarios inherit; a scenario is built of nothing else."""
+
+    perception: Annotated[tuple[PerceptionSettings, ...], unwritten(())] = ()
+    """How agents perceive it, each for itself; empty: all know all states, and predict alike."""
 
     def warnings(self) -> tuple[str, ...]:
         """Return what looks wrong and is not refused, a line each: a size in another unit."""

@@ -17,6 +17,8 @@ import linecache
 import re
 import sys
 import traceback
+from base64 import b64decode, b64encode
+from binascii import Error as BinasciiError
 from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
 from functools import cache
@@ -24,14 +26,19 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from .printing import printable
 from .trust import LIBRARIES, is_trusted, module_text, sha256, trust
 
+ZIPPED = b"PK"
+"""With what such a file begins."""
 FOLDER = "sources"
 """Where a study keeps copies, below its own directory."""
 MOST_BYTES = 1_000_000
 """Of a file; a larger one is no program."""
 ANSWERS = "answers.db"
 """Where a study keeps what functions have answered, see `core.functions.recorded`."""
+TEAMS = ".npz"
+"""Suffix of files that hold what a team remembers; as text they are kept in base 64."""
 GRAPHS = (".graphml", ".json", ".toml")
 """Suffixes of files that hold a hierarchy."""
 
@@ -157,6 +164,21 @@ class Sources:
             raise ValueError(f"{path} has no {name!r}, it has: {', '.join(own) or 'nothing'}")
         return thing
 
+    def content(self, name: str) -> bytes:
+        """Return what is in a file that is no text.
+
+        Raises
+        ------
+        ValueError
+            If there is no such file, or it is something else.
+        """
+        content = b""
+        with contextlib.suppress(BinasciiError):
+            content = b64decode(self.text(name), validate=True)
+        if not content.startswith(ZIPPED):
+            raise ValueError(f"{name}: is no file of a team")
+        return content
+
     def permit(self, module: str) -> None:
         """Refuse a module that only somebody else's study names, unless it is trusted.
 
@@ -201,7 +223,10 @@ class Sources:
         try:
             if path.stat().st_size > MOST_BYTES:
                 raise ValueError(f"{name}: is larger than allowed, {MOST_BYTES} bytes")
-            text = path.read_text(encoding="utf-8-sig")
+            content = path.read_bytes()
+            if name.endswith(TEAMS) and content.startswith(ZIPPED):
+                return b64encode(content).decode("ascii")
+            text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
         except OSError as error:
             raise ValueError(f"{name}: {error.strerror or error}") from None
         except UnicodeDecodeError:
@@ -297,7 +322,7 @@ def mentions(value: object, key: str = "") -> Iterator[tuple[str, str]]:
             yield from mentions(inner, key)
     elif isinstance(value, str) and is_reference(value):
         yield split(value)[0], key
-    elif isinstance(value, str) and is_file(value):
+    elif isinstance(value, str) and (is_file(value) or value.endswith(TEAMS)):
         yield value, key
 
 
@@ -400,5 +425,5 @@ def place(error: BaseException) -> str:
 def message(error: BaseException) -> str:
     """Return the words of an exception in one line; none if it cannot even say them."""
     with contextlib.suppress(Exception):
-        return " ".join(str(error).split())
+        return printable(" ".join(str(error).split()))
     return ""

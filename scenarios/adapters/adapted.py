@@ -253,7 +253,7 @@ def _survey_in_words(settings: AdaptedSettings, make: Make) -> tuple[Actuators, 
     """Return what is found of an environment, or refuse it in one line that names it."""
     try:
         return surveyed(settings, make)
-    except Exception as error:  # an environment may be anybody's
+    except (Exception, SystemExit) as error:  # an environment may be anybody's
         is_said = isinstance(error, ValueError)  # what does not fit
         fault = message(error) if is_said else f"cannot be played, {format_error(error)}"
         if fault.startswith("scenario.") or (is_said and not settings.id):

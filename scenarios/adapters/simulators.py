@@ -23,6 +23,8 @@ import numpy as np
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import aec_to_parallel_wrapper
 
+from ...core.plugins.printing import printable
+
 Player = Hashable
 """Who acts and observes: `ONLY`, or the id of an agent of PettingZoo."""
 Space = gymnasium.Space[Any]
@@ -54,7 +56,7 @@ def of_player(what: str, player: Player) -> str:
     >>> of_player("observations", ONLY), of_player("reward", 0), of_player("reward", "")
     ('observations', 'reward of 0', "reward of ''")
     """
-    return what if player == ONLY else f"{what} of {str(player) or repr(player)}"
+    return what if player == ONLY else f"{what} of {printable(str(player)) or repr(player)}"
 
 
 def at(step: int) -> str:

@@ -37,8 +37,8 @@ from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from numpy.typing import ArrayLike
 from pettingzoo.utils import BaseParallelWrapper
 
-from ...core.hierarchy.failures import Names
 from ...core.numerics import BoolArray, FloatArray
+from ...core.plugins.settings import Names
 from . import settings
 from .settings import Failures, FailureSettings, build_kinds
 

@@ -5,8 +5,14 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Union
 
 from pydantic import Field
 
-from ...core.hierarchy.failures import Names
-from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings, team_size
+from ...core.plugins.settings import (
+    Names,
+    NonNegative,
+    Positive,
+    ScenarioSettings,
+    Settings,
+    team_size,
+)
 from ..faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
 from ..state_variables import names_of
 from .variables import CHAIN_VARIABLES

@@ -267,7 +267,7 @@ def whole_episode(
     (agents,) = team.parts
     if not isinstance(scenario, MatrixGame) or not isinstance(agents, FuzzyAgents):
         return None
-    if team.messages.failures:
+    if team.messages.failures or agents.views is not None:
         return None
     parts = parts_of(scenario, agents, learn=learn)
     if parts is None:
@@ -360,7 +360,7 @@ def _learning(learner: Learner) -> Learning | None:
     if not isinstance(learner, Online) or learner.discount > 0.0:
         return None
     s = learner.settings
-    if type(learner) is TDLambda and s.averaging == 1:
+    if type(learner) is TDLambda and s.averaging == 1 and s.reward_of == "left":
         return known._replace(step_size=s.step_size)
     if type(learner) is OptimisticTD:
         return known._replace(step_size=s.step_size, falling=s.falling)

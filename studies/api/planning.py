@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from textwrap import wrap
 from typing import NamedTuple
@@ -37,6 +37,8 @@ SEED = 10_000
 """Of the trials that are tried out."""
 TRIED = 1.0
 """Processor time [s] for which episodes of training are tried of every condition."""
+TRIED_ACTIONS = "joint actions"
+"""What is counted beside the costs of decisions."""
 EPISODES = 2
 """That are tried at least, of training and of every evaluation."""
 WHOLE = 10_000
@@ -49,8 +51,9 @@ FASTER = 0.7
 """By what another process, and other seeds, may take less time than what was tried."""
 SLOWER = 2.2
 """By what they may take more."""
-KEEPING = np.array([0.02, 0.15])
-"""Seconds to hand out a trial and to keep it, from and to: a disk takes longer than a processor."""
+KEEPING = np.array([0.02, 0.05, 0.15])
+"""Seconds to hand out a trial and to keep it, from, likely and to: a disk takes longer than a
+processor."""
 STARTS = 5
 """Starts of a process that a run takes: the command's own, its workers', which start together, and
 as much as three more for the store, the tables and the figures."""
@@ -65,11 +68,15 @@ class ConditionCost(NamedTuple):
     """What a condition takes, by one of its trials."""
 
     seconds: FloatArray
-    """Processor time [s] of a trial, from and to."""
+    """Processor time [s] of a trial, from, likely and to ``(3,)``."""
     loading: float
     """Processor time [s] to import, load and compile what the first step needs, once a process."""
     memory: float
     """What the team holds in the end [bytes]."""
+    decision: Mapping[str, float]
+    """What a decision costs of what functions count, by name; without functions nothing."""
+    decisions: int
+    """How many the trials of all seeds take at most."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,9 @@ class Plan:
     seconds: Range | None
     """Time of the whole study [s], from and to: by how early episodes end that were not tried, and
     by what else this machine does."""
+    likely: float | None
+    """The same if episodes take as long as those that were tried last, and this machine stays as
+    busy as it is."""
     memory: float | None
     """Of all processes together [bytes], about."""
     comparisons: int
@@ -95,6 +105,8 @@ class Plan:
     """The smallest difference of success rates that is of interest."""
     warnings: tuple[str, ...] = ()
     """What looks wrong and is not refused, a line each."""
+    costs: Mapping[str, ConditionCost] = field(default_factory=dict)
+    """By label, what conditions take that were tried."""
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -109,12 +121,15 @@ class Plan:
         processes = count(self.processes, "process", "es")
         yield f"study    {outline.study}: {conditions} x {count(n_seeds, 'seed')}"
         yield f"trials   {self.trials}, each {outline.lengths} of up to {steps}"
-        if self.seconds is not None:
+        if self.seconds is not None and self.likely is not None:
             quick, slow = map(duration, self.seconds)
-            yield f"time     {quick} to {slow} with {processes}, the start of workers included:"
-            yield "         by how early episodes end, and by what else this machine does"
+            usual = duration(self.likely)
+            yield f"time     about {usual} with {processes}, as episodes take that were tried;"
+            yield f"         {quick} to {slow}, by how early they end and what else runs here"
         if self.memory is not None:
             yield f"memory   about {self.memory / 1e9:.1f} GB with {processes}"
+        if any(cost.decision for cost in self.costs.values()):
+            yield from self._decisions()
         if self.comparisons:
             yield ""
             yield from power_text(n_seeds, self.comparisons, self.deviation, self.smallest)
@@ -125,6 +140,23 @@ class Plan:
             yield from wrap(text, WIDTH)
         for warning in self.warnings:
             yield from wrap(warning, WIDTH)
+
+    def _decisions(self) -> Iterator[str]:
+        """Yield what a decision costs under every condition, and the study at most."""
+        costs = self.costs.values()
+        names = list(dict.fromkeys(name for cost in costs for name in cost.decision))
+        width = max(map(len, self.costs))
+        yield ""
+        yield " ".join([" " * width, *(f"{name:>{len(name)}}" for name in names)])
+        for label, cost in self.costs.items():
+            values = (f"{cost.decision.get(name, 0.0):>{len(name)}.4g}" for name in names)
+            yield " ".join([f"{label:<{width}}", *values])
+        most = (
+            f"{sum(cost.decision.get(n, 0.0) * cost.decisions for cost in costs):,.0f} {n}"
+            for n in names
+            if n != TRIED_ACTIONS
+        )
+        yield from wrap(f"Means of a decision, as tried. The study: at most {', '.join(most)}.")
 
 
 def plan(
@@ -164,41 +196,54 @@ def plan(
     examine(spec)
     trials = trials_of(spec)
     processes = max(1, min(jobs or cores(), len(trials)))
-    seconds, memory = _estimate(spec, trials, processes) if timed else (None, None)
+    estimate = _estimate(spec, trials, processes) if timed else (None, None, None, {})
+    seconds, likely, memory, costs = estimate
     return Plan(
         outline=StudyOutline.of(spec),
         trials=len(trials),
         processes=processes,
         seconds=seconds,
+        likely=likely,
         memory=memory,
         comparisons=len(spec.conditions()) - 1,
         deviation=deviation,
         smallest=smallest,
         warnings=spec.warnings(),
+        costs=costs,
     )
 
 
-def _estimate(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Range, float]:
-    """Return the time of a study [s], from and to, and its memory [bytes]."""
+def _estimate(
+    spec: Spec, trials: Sequence[Trial], processes: int
+) -> tuple[Range, float, float, dict[str, ConditionCost]]:
+    """Return the time of a study [s], from and to, the likely one, its memory [bytes], and costs.
+
+    These are what conditions take, by label.
+    """
     begin = time.perf_counter()
     used = _used()
     # Ctrl-C is for this process, which then kills that one: it would print a traceback.
     subprocess.run([sys.executable, "-c", START], check=True, process_group=0)
     starting = STARTS * (_used() - used)
     with spec.sources.active():
-        tried = [try_out(trial) for trial in trials[: len(spec.conditions())]]
+        by_label = {
+            trial.condition: try_out(trial, len(spec.seeds))
+            for trial in trials[: len(spec.conditions())]
+        }
+    tried = list(by_label.values())
     loading = sum(each.loading for each in tried)  # less, if what was compiled here is kept
     each_seed = np.sum([one.seconds / processes + KEEPING for one in tried], axis=0)
-    quick, slow = len(spec.seeds) * each_seed
+    quick, usual, slow = len(spec.seeds) * each_seed
     # Processes that have no trial left wait for the last one.
-    slow += (1 - 1 / processes) * max(each.seconds[1] for each in tried)
+    slow += (1 - 1 / processes) * max(each.seconds[-1] for each in tried)
     busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
     least = FASTER * busy**0.5  # other programs may stop
     most = SLOWER * busy  # or go on
     memory = _peak() + max(each.memory for each in tried)
     shortest = least * (starting + quick)
     longest = most * (starting + loading + slow)
-    return (float(shortest), float(longest)), processes * memory
+    likely = busy * (starting + loading + usual)
+    return (float(shortest), float(longest)), float(likely), processes * memory, by_label
 
 
 def _peak() -> float:
@@ -211,8 +256,8 @@ def _peak() -> float:
     return peak * (1 if sys.platform == "darwin" else 1024)
 
 
-def try_out(trial: Trial) -> ConditionCost:
-    """Return what the trials of a condition take."""
+def try_out(trial: Trial, seeds: int = 1) -> ConditionCost:
+    """Return what the trials of a condition take, all of its seeds where it says so."""
     alone = replace(trial, seed=SEED, curriculum=(), evaluation=min(trial.evaluation, EPISODES))
     brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
     loading = _seconds(partial(run_trial, brief))
@@ -226,7 +271,8 @@ def try_out(trial: Trial) -> ConditionCost:
     training = _seconds_of_episodes(session, trial.episodes)
     in_own = _seconds(session.evaluate)
     in_others = _seconds(session.run_other_evaluations)
-    by_phase = pd.DataFrame(session.result().rows).groupby("phase")["steps"]
+    rows = session.result().rows
+    by_phase = pd.DataFrame(rows).groupby("phase")["steps"]
     lengths = {phase: steps.to_numpy(float) for phase, steps in by_phase}
     steps = lengths.pop("training")
 
@@ -247,9 +293,23 @@ def try_out(trial: Trial) -> ConditionCost:
     else:  # beginnings do not tell how learning grows
         learning = mean * episodes.sum() * max(beside.sum(), 0.0) / steps.sum()
     seconds = building + acting * mean * episodes.sum() + learning
-    growth = mean[1] * episodes.sum() / steps.sum()
+    growth = mean[-1] * episodes.sum() / steps.sum()
     memory = held + growth * max(_bytes(session) - held, 0.0)
-    return ConditionCost(seconds + trial.evaluation * evaluating, loading, memory)
+    rounds = trial.evaluation * (1 + len(trial.evaluations))
+    decisions = int(episodes.sum()) * trial.steps + rounds * longest
+    whole_trial = seconds + trial.evaluation * evaluating
+    return ConditionCost(whole_trial, loading, memory, _decision(session), seeds * decisions)
+
+
+def _decision(session: Session) -> dict[str, float]:
+    """Return what a decision has cost, and how many joint actions were tried, where it is told."""
+    names = [measure.name for measure in session.team.costs]
+    rows = [row for row in session.result().rows if row.measures.keys() >= set(names)]
+    steps = sum(row.steps for row in rows)
+    if not names or not steps:
+        return {}
+    costs = {name: sum(row.measures[name] for row in rows) / steps for name in names}
+    return {**costs, TRIED_ACTIONS: session.team.counts.joint_actions / steps}
 
 
 def _seconds_of_episodes(session: Session, episodes: int) -> list[float]:
@@ -284,11 +344,12 @@ def learning_time(
 
 
 def _mean_length(tried: Sequence[float] | FloatArray, most: int, cut: int) -> FloatArray:
-    """Return the mean steps of episodes that were not tried to their ends, from and to."""
+    """Return the mean steps of episodes that were not tried to their ends: from, likely and to."""
     longest = max(tried)
+    mean = float(np.mean(tried))
     if longest >= cut:
-        return np.array([np.mean(tried), most])
-    return np.array([QUICK * np.mean(tried), min(most, LONG * longest)])
+        return np.array([mean, (mean + most) / 2.0, most])
+    return np.array([QUICK * mean, mean, min(most, LONG * longest)])
 
 
 def _used() -> float:

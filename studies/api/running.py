@@ -159,6 +159,7 @@ def run(
     accept_code: bool = False,
     progress: bool = True,
     observer: Observer | None = None,
+    track: Sequence[str] = (),
     answers: Place | None = None,
     calls: bool = True,
 ) -> StudyResults:
@@ -177,6 +178,9 @@ def run(
         Whether to show how it goes.
     observer
         Who is notified of progress instead, see `nested_agents.studies.workers.runner.Observer`.
+    track
+        Trackers that are told of every trial which finishes: ``tensorboard``, ``mlflow``,
+        ``wandb``; see `nested_agents.studies.api.tracking`.
 
     Warns
     -----
@@ -191,6 +195,10 @@ def run(
     out = Path(out)
     spec = Spec.read(spec, study=out)
     listener = observer or (Terminal() if progress else Observer())
+    if track:
+        from .tracking import Tracking
+
+        listener = Tracking(track, out, listener)
     with run_study(
         spec,
         out,

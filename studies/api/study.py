@@ -33,6 +33,7 @@ from ..presentation.headlines import headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import foreign, published
 from ..results.contrasts import contrasts, power_with_first
+from ..results.parts import join_parts
 from ..results.results import Results, choose_trials, combine, read
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, other_spec, sources_of
@@ -41,12 +42,14 @@ from ..store import durable
 from ..store.store import Store
 from .comparison import Comparison
 from .replay import Replay, draw_episode
+from .status import Status
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ...core.agents.team import Team
     from ...core.interface.scenario import Scenario
+    from .explaining import TeamExplanation
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -152,7 +155,7 @@ class StudyResults:
     def power(self) -> tuple[str, ...]:
         """What comparisons with the first condition can find, as `compare` says it."""
         is_measured = SUCCESS.name in (measure.name for measure in self.results.measures)
-        return power_with_first(self.results) if is_measured else ()
+        return power_with_first(self.results) if is_measured and self.results.phases else ()
 
     @cached_property
     def analysis(self) -> Any:
@@ -283,6 +286,30 @@ class StudyResults:
                 session = Session.restored(trial, store.recording(trial.identity, durable.TEAM))
         return session.scenario, session.team
 
+    def explain(self, condition: str | None = None, seed: int | None = None) -> TeamExplanation:
+        """Explain a trained team: its rules in words, its policy, its self-model.
+
+        Unless the study keeps its teams, training is run again, and must give the episodes kept.
+
+        Parameters
+        ----------
+        condition, seed
+            Which trial; by default the first.
+
+        Raises
+        ------
+        SpecError
+            If there is no such trial, it has not finished, or its team has no rules.
+        """
+        from .explaining import explain_team  # its drawings take their time
+
+        return explain_team(self.directory, condition, seed)
+
+    @property
+    def status(self) -> Status:
+        """How far the study is now: what is done, running, failed and left, and for how long."""
+        return Status.of(self.directory)
+
     def report(self, path: Place | None = None) -> Path:
         """Write the whole study as one self-contained HTML file and return its path.
 
@@ -338,8 +365,9 @@ def load(
         Directories of studies; or single files that ``export --format json`` has written, or of the
         form of marl-eval, as those of BenchMARL are; or tables of scores of others: CSV, JSON lines
         or Parquet, see `nested_agents.studies.results.foreign`.
-        Conditions of several studies whose labels are equal get the name of their directory; the
-        first study says how all of them are analysed.
+        Parts of one study, whose specs differ in their seeds alone, are put together. Conditions
+        of several studies whose labels are equal get the name of their directory; the first study
+        says how all of them are analysed.
     columns
         Of tables of scores, which column is what: ``"condition=model,seed=run,score=accuracy"``; as
         `compare_table` has them.
@@ -458,21 +486,27 @@ def _load_one(path: Path) -> StudyResults:
 
 
 def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResults:
-    """Return the results of several studies as those of one."""
-    names = [path.name for path in paths]
-    if len(set(names)) < len(names):
-        names = list(map(str, paths))
-    results, labels = combine(
-        [(name, study.results) for name, study in zip(names, studies, strict=True)],
-        [study._settings for study in studies],
-    )
+    """Return the results of several studies, or of parts of one, as those of one."""
+    whole = join_parts([(study.outline, study.results) for study in studies])
+    if whole is not None:
+        outline, results = whole
+        labels = [{c: c for c in results.columns}] * len(studies)
+    else:
+        names = [path.name for path in paths]
+        if len(set(names)) < len(names):
+            names = list(map(str, paths))
+        results, labels = combine(
+            [(name, study.results) for name, study in zip(names, studies, strict=True)],
+            [study._settings for study in studies],
+        )
+        outline = studies[0].outline._replace(columns=results.columns)
     settings = dict[str, TomlTable]()
     failed = list[tuple[str, int, str]]()
     for study, new in zip(studies, labels, strict=True):
         settings |= {new[condition]: own for condition, own in study._settings.items()}
         failed += [(new[condition], seed, error) for condition, seed, error in study.failed]
     return StudyResults(
-        outline=studies[0].outline._replace(columns=results.columns),
+        outline=outline,
         results=results,
         failed=tuple(failed),
         remarks=tuple(remark for study in studies for remark in study.remarks),

@@ -13,7 +13,7 @@ from shutil import get_terminal_size
 from textwrap import fill
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from ..errors import printable
+from ...core.plugins.printing import printable
 
 if TYPE_CHECKING:
     from ..api.study import StudyResults

@@ -131,8 +131,9 @@ def running(command: Callable[..., int]) -> Callable[..., int]:
 
 
 class AnswerOptions(TypedDict):
-    """The options of recorded answers of functions."""
+    """The options of recorded answers of functions, and of who is told of trials."""
 
+    track: tuple[str, ...]
     answers: Path | None
     calls: bool
 
@@ -151,7 +152,14 @@ def recorded(command: Callable[..., int]) -> Callable[..., int]:
         help="Whether functions may be called for answers that are not recorded; if not, a trial "
         "that lacks one fails.",
     )
-    return answers(calls(command))
+    track = click.option(
+        "--track",
+        multiple=True,
+        metavar="NAME",
+        help="Also write every trial that finishes to tensorboard (below DIR/tensorboard), mlflow "
+        "or wandb, which must be installed.",
+    )
+    return track(answers(calls(command)))
 
 
 trust = flag(

@@ -41,10 +41,11 @@ from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import PolicyMap, Scenario
 from ...core.interface.spaces import Variable
 from ...core.numerics import FloatArray, IntArray
+from ...core.plugins.printing import printable
 from ...core.rules.kernels.fuzzy import Partition
 from ...core.rules.rule_base import RuleBase
 from ...scenarios.checking.predictions import apart
-from ..errors import WIDTH, SpecError, printable, refused
+from ..errors import WIDTH, SpecError, refused
 from ..store.database import STAGE, columns
 from ..store.durable import TEAM
 from ..store.store import Store

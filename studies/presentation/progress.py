@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import printable
+from ...core.plugins.printing import printable
 from ..spec.outline import StudyOutline
 from ..workers.runner import Observer, Outcome
 

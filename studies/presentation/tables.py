@@ -23,8 +23,9 @@ from rich.table import Table
 
 from ...core.interface.measures import Measure
 from ...core.numerics import pd
+from ...core.plugins.printing import printable
 from ...core.plugins.words import near
-from ..errors import SpecError, printable
+from ..errors import SpecError
 from ..results.analysis import Summary
 from ..results.statistics import FEW, Estimate, between, exactly, stack_estimates, two_figures
 from .progress import count

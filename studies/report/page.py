@@ -289,6 +289,15 @@ def comparison_page(
     )
 
 
+def player_page(packed: Replays) -> str:
+    """Return a page of packed episodes alone, which a notebook shows in a frame; empty of none."""
+    if not packed.episodes:
+        return ""
+    script = Markup(packed.script)
+    css = _read_own("page.css")
+    return _template("alone").render(replays=packed, css=css, replay_js=script)
+
+
 def check_path(file: Path) -> None:
     """Refuse to write a page to where no HTML file can be.
 

@@ -4,6 +4,7 @@ Values are fitted on a scale on which noise is about equal: logarithms of positi
 empirical logits of rates. There a law is a curve in ``x = log n``:
 
 - ``power law``, of rates ``logistic in log n``: ``a + b x``; numbers, and odds, grow as ``n^b``;
+- ``linear to quadratic``: ``log(a n (n + c))``, with c greater than -2, as pairs are for c = -1;
 - ``power law with a floor``: ``log(exp(c) + exp(a + b x))``;
 - ``break point``: ``a + b x + d max(0, x - k)``; the exponent is b, beyond ``n = exp(k)`` b + d.
 
@@ -12,9 +13,10 @@ decided by sizes that are left out: each of the largest third is predicted from 
 simpler law stands unless another one predicts them better by more than `MARGIN`.
 
 A prediction of the mean of new seeds has the variance of the fit, of so many seeds, and of sizes
-about the law: what is left where sizes deviate by more than seeds explain. Its degrees of
-freedom are Satterthwaite's (1946). Values that a run did not live to see (*censored*) are only
-known to be larger than the last seen, and enter the likelihood so (Tobin 1958).
+about the law: what is left where sizes deviate by more than seeds explain. Seeds do not show what
+these deviations do to the law itself: that is their leverage on the size which is predicted. Its
+degrees of freedom are Satterthwaite's (1946). Values that a run did not live to see (*censored*)
+are only known to be larger than the last seen, and enter the likelihood so (Tobin 1958).
 """
 
 from __future__ import annotations
@@ -36,6 +38,8 @@ MARGIN = 1.0
 """By how much the log density of held-out sizes must be greater for a law of more parameters."""
 FEWEST = 3
 """Sizes, below which no law is told from another."""
+LEAST = 2.0
+"""The smallest size of a law that is linear to quadratic, as pairs of agents are: n (n - 1)."""
 FLAT = 1e-9
 """Where so little is left of the variance of seeds, it is taken for rounding."""
 
@@ -62,6 +66,10 @@ def _line_begins(x: Array, y: Array) -> list[Array]:
     return [np.array([a, b])]
 
 
+def _quadratic(p: Array, x: Array) -> Array:
+    return p[0] + x + np.log(np.exp(x) + np.exp(p[1]) - LEAST)
+
+
 def _with_floor(p: Array, x: Array) -> Array:
     return np.logaddexp(p[2], p[0] + p[1] * x)
 
@@ -86,6 +94,13 @@ def _broken_begins(x: Array, y: Array) -> list[Array]:
 
 POWER = Curve("power law", 2, _line, _line_begins, lambda p: {"exponent": float(p[1])})
 LOGISTIC = POWER._replace(name="logistic in log n")
+QUADRATIC = Curve(
+    "linear to quadratic",
+    2,
+    _quadratic,
+    lambda x, y: [np.array([float((y - 2.0 * x).mean()), start]) for start in (0.0, 3.0)],
+    lambda p: {"c of n (n + c)": float(np.exp(p[1]) - LEAST)},
+)
 FLOOR = Curve(
     "power law with a floor",
     3,
@@ -115,7 +130,7 @@ class Scale(NamedTuple):
     """Returns values of fitted ones."""
 
 
-LOG = Scale((POWER, FLOOR, BREAK), np.exp)
+LOG = Scale((POWER, QUADRATIC, FLOOR, BREAK), np.exp)
 LOGIT = Scale((LOGISTIC, BREAK), special.expit)
 
 
@@ -213,13 +228,26 @@ class Law(NamedTuple):
         parts = [
             (self._spread(fits) ** 2, self.seeds - 1.0),
             (self.noise / (seeds or self.seeds), (self.seeds - 1.0) * m),
-            (self.misfit, max(1.0, float(m - self.curve.n_parameters))),
+            (self.misfit * (1.0 + self._leverage(x)), max(1.0, float(m - self.curve.n_parameters))),
         ]
         variance = sum(part for part, _ in parts)
         if variance <= 0.0:
             return value, FLAT**2, self.seeds - 1.0
         freedom = variance**2 / sum(part**2 / own for part, own in parts)
         return value, variance, freedom
+
+    def _leverage(self, x: Array) -> float:
+        """Return how far deviations of the fitted sizes carry to one ``(1,)``: j (J'J)^-1 j'."""
+        if self.misfit == 0.0:
+            return 0.0
+        fitted = self._slopes(np.log(self.sample.sizes))
+        there = self._slopes(x)
+        return float((there @ np.linalg.pinv(fitted.T @ fitted) @ there.T)[0, 0])
+
+    def _slopes(self, x: Array) -> Array:
+        """Return the derivatives ``(m, k)`` of the law at ``x`` by its parameters."""
+        slopes = optimize.approx_fprime(self.parameters, lambda p: self.curve.of(p, x))
+        return np.atleast_2d(slopes)
 
     def curve_at(self, sizes: Array) -> Array:
         """Return the law's values ``(k,)`` at sizes."""

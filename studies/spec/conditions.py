@@ -23,6 +23,7 @@ from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.registry import Plugged
 from ...core.plugins.settings import ScenarioSettings, Settings, check_team, unwritten
 from ...scenarios import DEFAULT, SCENARIOS
+from ...scenarios.faults.perception import perceived
 from ...topologies import build
 from ...topologies.config import Topology, parse
 
@@ -95,7 +96,7 @@ class ConditionSettings(Settings):
             If agents or topology do not fit the world, or agents are too many by an estimate; one
             line that names the culprit.
         """
-        scenario = join_agents(world, self.agents)
+        scenario = perceived(join_agents(world, self.agents), self.scenario.perception)
         try:
             check_team(len(scenario.agents), SECONDS_PER_PAIR)
         except ValueError as error:
@@ -115,8 +116,9 @@ class ConditionSettings(Settings):
         return min(self.onsets, default=None)
 
     def acts_as(self, other: ConditionSettings) -> bool:
-        """Return whether topology and learner are those of `other`."""
-        return (self.topology, self.learner) == (other.topology, other.learner)
+        """Return whether topology, learner and perception are those of `other`."""
+        own = self.topology, self.learner, self.scenario.perception
+        return own == (other.topology, other.learner, other.scenario.perception)
 
     def warnings(self) -> tuple[str, ...]:
         """Return what of its topology says nothing to its learner, a line each."""
@@ -129,6 +131,18 @@ class ConditionSettings(Settings):
             return (f"topology: left out, {learner} passes no actions down",) if ignored else ()
         ignored = topology.considers != "descendants"
         return (f"topology.considers: left out, {learner} considers nobody",) if ignored else ()
+
+    def remarks(self) -> tuple[str, ...]:
+        """Return whose plans do not know whose weights, a line for each part of a mixed team."""
+        learner = self.learner
+        if not isinstance(learner, MixedSettings) or self.topology.considers == "none":
+            return ()
+        return tuple(
+            f"learner.parts[{k}]: plans for agents of other parts by its own values alone: nobody "
+            "knows the weights of another part"
+            for k, part in enumerate(learner.parts)
+            if len(learner.parts) > 1 and _considers(part.learner)
+        )
 
     def canonical(self) -> str:
         """Return the JSON text that equal settings share, whatever wrote them."""

@@ -20,6 +20,7 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
+from ...core.functions.settings import FunctionSettings
 from ...core.plugins.models import kinds_at, models_of
 from ...core.plugins.registry import Plugged, SettingsRegistry
 from ...core.plugins.settings import Settings
@@ -31,6 +32,8 @@ from .spec import Spec
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 """How the text beside a field names its unit."""
 TYPES = {bool: "true or false", int: "whole number", float: "number", str: "text", Any: "any"}
+OWN_FUNCTION = "file.py:decide"
+"""What stands for functions of users, whose own keys are their keyword-only parameters."""
 GREATEST_BOUND = 10**9
 """A bound beyond it is that of a machine's integers, and no help to anybody."""
 
@@ -103,6 +106,11 @@ def tables() -> tuple[Table, ...]:
     return (*heads, *_below(ConditionSettings, "", "", set(), ()))
 
 
+def of_functions() -> Table:
+    """Return the table of a learner that is a function of a user's: what all such have."""
+    return _table("learner", (OWN_FUNCTION, ""), FunctionSettings, {})
+
+
 def keys_below(prefix: str) -> tuple[Table, ...]:
     """Return the tables whose name begins with a dotted prefix, with the keys that fit it.
 
@@ -112,7 +120,7 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
     ['"listed"']
     """
     below = []
-    for table in tables():
+    for table in (*tables(), of_functions()):
         kept = tuple(
             key
             for key, name in zip(table.keys, table.full_names, strict=True)

@@ -73,8 +73,9 @@ class SchemaWriter:
         checked = {f for v in validators if v.info.mode != "after" for f in v.info.fields}
         if held or name in checked or any(isinstance(m, OPEN) for m in info.metadata):
             return {}
+        annotation: Any = info.annotation
         try:
-            own = TypeAdapter(info.annotation).json_schema()
+            own = TypeAdapter(annotation).json_schema()
         except Exception:  # of what pydantic knows no schema
             return {}
         return {} if "$defs" in own else own | _bounds(info)

@@ -393,6 +393,7 @@ class Spec(Settings):
         lines += self._of_controls()
         for condition in self.conditions():
             lines += condition.settings.warnings()
+            lines += condition.settings.remarks()
             others: list[Any] = [*dict(condition.evaluations).values(), *condition.curriculum]
             for there in (condition.settings, *others):
                 lines += there.scenario.warnings()

@@ -15,7 +15,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 
 from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, get_worker
+from distributed.comm.addressing import parse_address
 from distributed.comm.core import CommClosedError
+from distributed.comm.registry import get_backend
 
 from ..errors import SpecError
 from ..trials.trial import Trial
@@ -107,8 +109,9 @@ class DaskWorkers(Workers[Future]):
         """
         with _quiet():
             try:
+                get_backend(parse_address(address)[0])  # a client may fail on others by assertion
                 client = Client(address, timeout=CONNECT)
-            except (OSError, ValueError) as error:
+            except (OSError, ValueError, AssertionError) as error:
                 why = " ".join(str(error).split()) or "no scheduler answers"
                 raise SpecError(f"--address {address}: {why}") from None
             with client:

@@ -41,6 +41,12 @@ def test_an_adversary_finds_neither_silence_nor_tracebacks() -> None:
         "2",
         "--scenarios",
         "4",
+        "--edits",
+        "8",
+        "--published",
+        "8",
+        "--environments",
+        "20",
     )
     assert said.rstrip().endswith(", 0 failures")
 

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 PAGE = (ROOT / "docs" / "not_learned.md").read_text(encoding="utf-8")
 COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
-RESULTS = ("pursuit_steps", "pursuit_tuned", "pursuit_tuned_as_written")
+RESULTS = ("pursuit_steps", "pursuit_frozen", "pursuit_tuned", "pursuit_tuned_as_written")
 
 
 @pytest.mark.parametrize("name", RESULTS)
@@ -30,6 +30,8 @@ def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_results_are_of_the_specs() -> None:
     steps = published.load(EXAMPLES / "pursuit_steps.json").outline
     assert steps.table == Spec.load(EXAMPLES / "pursuit_steps.toml").table()
+    frozen = published.load(EXAMPLES / "pursuit_frozen.json").outline
+    assert frozen.table == Spec.load(EXAMPLES / "pursuit_frozen.toml").table()
     own = Spec.load(EXAMPLES / "pursuit.toml")
     for name, alike in (("pursuit_tuned", True), ("pursuit_tuned_as_written", False)):
         tuned = published.load(EXAMPLES / f"{name}.json").outline.table

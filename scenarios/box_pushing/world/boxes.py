@@ -42,6 +42,8 @@ MOST_VERTICES = 1000
 """Of an outline and its holes; a drawing with more is to be simplified."""
 LEAST_EDGE = 1e-6
 """Shortest edge [m]."""
+LEAST_PIECE = 2e-9
+"""Smallest area of a convex piece [m2]; Box2D takes none below 1.2e-9."""
 LARGEST = 100.0
 """Greatest distance of a vertex from another one [m]."""
 STRAIGHT = 1e-9
@@ -266,8 +268,21 @@ class BoxSpec:
 
     @cached_property
     def fixtures(self) -> tuple[FloatArray, ...]:
-        """Convex pieces ``(<= 8, 2)`` [m]; empty for a disc."""
-        return () if self.polygon is None else convex_pieces(self.polygon)
+        """Convex pieces ``(<= 8, 2)`` [m]; empty for a disc.
+
+        Raises
+        ------
+        ValueError
+            If one is too small to be simulated.
+        """
+        pieces = () if self.polygon is None else convex_pieces(self.polygon)
+        least = min((Polygon(piece).area for piece in pieces), default=LEAST_PIECE)
+        if least < LEAST_PIECE:
+            raise ValueError(
+                f"box {self.name!r}: a convex piece of it has {least:.2g} m2, must be at least "
+                f"{LEAST_PIECE:g} m2 to be simulated"
+            )
+        return pieces
 
     @cached_property
     def moments(self) -> Moments:

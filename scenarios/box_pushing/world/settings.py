@@ -19,9 +19,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ....core.hierarchy.failures import Names
 from ....core.numerics import BoolArray, FloatArray
-from ....core.plugins.settings import NonNegative, Positive, Settings, unwritten
+from ....core.plugins.settings import Names, NonNegative, Positive, Settings, unwritten
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
 
 GRAVITY = 9.81

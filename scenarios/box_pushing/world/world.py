@@ -1,12 +1,11 @@
 """The physical world: robots and a box on a plane, seen from above, in Box2D.
 
-The rest of the package speaks SI; Box2D wants bodies of 0.1 to 10 units, so that this module, and
-nothing else, talks to it in decimetres. A control period is a whole number of physics steps. One
-physics step is one compiled call for the forces of all wheels, one force and one torque per robot
-handed to Box2D, and one step of Box2D. Box2D itself takes a few microseconds a step; what costs
-time are the calls from Python into it, mostly to find the C++ object behind a Python one. The inner
-loop therefore calls the functions of SWIG's flat interface on the bare handles (`.this`), which is
-more than 10 times faster than the same methods of the Python classes.
+The rest of the package speaks SI; Box2D wants bodies of 0.1 to 10 units, so that this module and
+`stepping`, and nothing else, talk to it in decimetres. A control period is a whole number of
+physics steps: forces of all wheels, and one step of Box2D. All steps of a decision are one compiled
+call, see `stepping`. Where that cannot be, the same is done from Python, by the functions of SWIG's
+flat interface on the bare handles (`.this`), which is more than 10 times faster than the same
+methods of the Python classes.
 
 Box2D keeps impulses from step to step to start its solver from ("warm starting"); that is switched
 off, so that the future depends on poses and velocities alone and a saved world can be restored.
@@ -21,18 +20,19 @@ failure are described in `nested_agents.scenarios.faults.settings`.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, SupportsInt
 
 import Box2D
 import numpy as np
 from Box2D import _Box2D
 
-from ....core.numerics import BoolArray, FloatArray
+from ....core.numerics import BoolArray, FloatArray, IntArray
 from ...faults.settings import Failures, FailureSettings, Free
 from .boxes import BoxSpec
 from .geometry import gaps, infrared_readings
 from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
+from .stepping import POSITION_ITERATIONS, VELOCITY_ITERATIONS, advance, step_address
 
 UNIT = 10.0
 """Box2D units per metre."""
@@ -43,8 +43,6 @@ SKIN = 0.005
 """Rounding of polygons in Box2D [dm]; its default is twice that."""
 SUBSTEPS = 4
 """Physics steps of a control period."""
-VELOCITY_ITERATIONS = 8
-POSITION_ITERATIONS = 3
 
 # SWIG's flat interface.
 get_x = _Box2D.b2Vec2_x_get
@@ -188,6 +186,7 @@ class World:
             # takes a body out of here keeps its world by it.
             body.world_kept = self._world
         self._handles = [_handles(body) for body in (self._box, *self._bodies)]
+        self._addresses: IntArray = np.array([int(body) for body, _, _ in self._handles])
         self._last = state.last.copy()
         self._wrenches = state.wrenches.copy()
         self._motion: FloatArray = np.empty((len(self.robots), 4))
@@ -200,13 +199,39 @@ class World:
 
         They are held, ``(n_wheels,)``, or those of each period, ``(periods, n_wheels)``.
         """
+        speeds = np.full((periods, self.n_wheels), wheel_speeds) * UNIT
+        function = step_address()
+        if function is None:
+            self._advance_by_steps(speeds)
+            return
+        outline = self.box.outline
+        poses, self.gaps, self.contact_time = advance(
+            function,
+            int(self._world.this),
+            self._addresses,
+            speeds,
+            SUBSTEPS,
+            self.dt,
+            UNIT,
+            self._wheels,
+            self._last,
+            self._wrenches,
+            outline.edges,
+            outline.rounding,
+            self._radii,
+            TOUCHING,
+        )
+        self._know(poses)
+
+    def _advance_by_steps(self, speeds: FloatArray) -> None:
+        """Let control periods pass with speeds ``(periods, n_wheels)``, step by step."""
         touched = np.zeros(len(self.robots))
-        for speeds in np.full((periods, self.n_wheels), wheel_speeds) * UNIT:
+        for of_period in speeds:
             for _ in range(SUBSTEPS):
-                self._step(speeds)
+                self._step(of_period)
             self._observe()
             touched += self.contact
-        self.contact_time = touched / periods
+        self.contact_time = touched / len(speeds)
 
     @property
     def twists(self) -> FloatArray:
@@ -256,6 +281,10 @@ class World:
             ]
         )
         self.gaps = gaps(poses[1:], poses[:1], outline.edges, outline.rounding, self._radii)
+        self._know(poses)
+
+    def _know(self, poses: FloatArray) -> None:
+        """Take poses ``(M + 1, 3)`` of box and robots for the present ones."""
         self.contact: BoolArray = self.gaps < TOUCHING
         self.box_pose = poses[0]
         self.robot_poses = poses[1:]
@@ -282,7 +311,7 @@ class World:
             )
 
 
-def _handles(body: Box2D.b2Body) -> tuple[object, object, object]:
+def _handles(body: Box2D.b2Body) -> tuple[SupportsInt, object, object]:
     """Return the bare handles of a body, its position and its velocity; all show the present."""
     return body.this, body.position.this, body.linearVelocity.this
 

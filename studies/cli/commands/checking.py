@@ -103,7 +103,8 @@ def _report_order(source: str, changes: tuple[str, ...], steps: int) -> bool:
     trials = trials_of(Spec.load(Path(source), changes))
     if not has_programs(trials[0]):
         return False
-    fault = fault_of_order(trials, steps)
+    with refused():
+        fault = fault_of_order(trials, steps)
     if fault:
         print_text(f"FAULT   order of trials: {fault}")
     else:

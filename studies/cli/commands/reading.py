@@ -9,14 +9,16 @@ from typing import Literal, TypedDict, Unpack
 
 import click
 
-from ...errors import SpecError, printable, refused
+from ....core.plugins.printing import printable
+from ...api.status import describe, progress
+from ...errors import SpecError, refused
 from ...presentation.progress import say
 from ...spec.outline import StudyOutline, sources_of
 from ...store import durable
 from ...store.store import Store
 from .. import options
 from ..display import Form, in_form, print_data, print_study, print_table, print_text
-from ..loading import describe, load_results, open_study, progress, trust_files, untrusted
+from ..loading import load_results, open_study, trust_files, untrusted
 
 PERIOD = 2.0
 """How often a study that is watched is looked at [s]."""
@@ -219,13 +221,14 @@ def results(directory: Path, form: Literal["table", "csv", "json"], phase: str) 
     return 0
 
 
-Files = Literal["csv", "json", "marl-eval"]
+Files = Literal["csv", "parquet", "json", "marl-eval"]
 
 
 @click.command()
 @options.directory
 @options.formats(
     "csv",
+    "parquet",
     "json",
     "marl-eval",
     text="Of the files; distances and returns are left out of json.",
@@ -244,11 +247,11 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
         trust_files(directory)
     with open_study(directory) as store:
         store.verify()
-        paths = {folder / name: text for name, text in _texts(store, form).items()}
+        paths = {folder / name: content for name, content in _contents(store, form).items()}
     there = [path for path in paths if path.exists()]
     # Of an export that was killed the first file is left, and is what would be written.
     is_rest = len(there) < len(paths) and all(
-        path.is_file() and path.read_bytes() == paths[path].encode() for path in there
+        path.is_file() and path.read_bytes() == paths[path] for path in there
     )
     if there and not (overwrite or is_rest):
         raise SpecError(f"{there[0]}: exists; --overwrite replaces it, --out writes elsewhere")
@@ -256,13 +259,13 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise SpecError(f"--out {folder}: {error.strerror or error}") from None
-    for path, text in paths.items():
-        durable.write(path, text.encode())
+    for path, content in paths.items():
+        durable.write(path, content)
     print_text(*paths)
     return 0
 
 
-def _texts(store: Store, form: Files) -> dict[str, str]:
+def _contents(store: Store, form: Files) -> dict[str, bytes]:
     """Return the content of each file by its name, see `results.published`."""
     from ...catalogue.study import select_published
     from ...presentation.tables import in_csv
@@ -274,12 +277,19 @@ def _texts(store: Store, form: Files) -> dict[str, str]:
     if form == "json":
         with sources_of(store).active():
             kept = select_published(outline.study, results)
-        return {"results.json": published.dumps(outline, kept)}
+        return {"results.json": published.dumps(outline, kept).encode()}
     if form == "marl-eval":
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
-        return {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study)}
-    frames = {"episodes.csv": results.episodes, "trials.csv": results.trials}
-    return {name: in_csv(frame) for name, frame in frames.items()}
+        return {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study).encode()}
+    frames = {"episodes": results.episodes, "trials": results.trials}
+    if form == "csv":
+        return {f"{name}.csv": in_csv(frame).encode() for name, frame in frames.items()}
+    try:
+        return {f"{name}.parquet": frame.to_parquet() for name, frame in frames.items()}
+    except ImportError:
+        raise SpecError(
+            "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"
+        ) from None
 
 
 @click.command()
@@ -315,22 +325,17 @@ def explain(directory: Path, condition: str | None, seed: int | None, trust: boo
     keeps its teams (keep_teams = true in its spec), training is run again, which takes seconds, and
     must give the episodes that are kept.
     """
-    from ...explain import team
-    from ...explain.text import MOST_AGENTS, draw, text
+    from ...api.explaining import explain_team
     from ...presentation.figures import save
-    from ...trials.keeping import finished_trial
 
     if trust:
         trust_files(directory)
-    with open_study(directory) as store:
-        trial = finished_trial(store, condition, seed)
-        conditions = list(store.columns())
-        explanation = team.explain(store, trial)
-    folder = team.folder_of(directory, trial, conditions)
-    folder.mkdir(parents=True, exist_ok=True)
-    written = folder / "explanation.txt"
-    durable.write(written, text(explanation).encode())
-    figures = save(draw(explanation), folder)
-    print_text(text(explanation, MOST_AGENTS))
+    with open_study(directory):
+        explained = explain_team(directory, condition, seed)
+    explained.folder.mkdir(parents=True, exist_ok=True)
+    written = explained.folder / "explanation.txt"
+    durable.write(written, explained.text.encode())
+    figures = save(explained.figures, explained.folder)
+    print_text(str(explained))
     print_text(written, *figures)
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import OrderedDict
 from typing import Any
 
@@ -346,6 +347,22 @@ class HugeActions(Walkers):
 
     def action_space(self, agent: Any) -> Any:
         return Box(-3e38, 3e38, (1,), np.float32)
+
+
+class Leaving(Walkers):
+    """Ends the process that plays it."""
+
+    def step(self, actions: Any) -> Any:
+        sys.exit(0)
+
+
+class Ordering(Walkers):
+    """Has an id, and says words, that a terminal obeys."""
+
+    ids = ("\x1b[31m", "b")
+
+    def step(self, actions: Any) -> Any:
+        raise RuntimeError("\x1b[2J")
 
 
 class Turns(AECEnv[Any, Any, Any]):

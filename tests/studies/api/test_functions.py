@@ -7,11 +7,17 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.plugins.sources import ANSWERS
 from nested_agents.studies.api.running import run
 from nested_agents.studies.api.study import StudyResults
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.database import SPEC_FILE
+from nested_agents.studies.trials.arrangement import arrange, check_conditions
+from nested_agents.studies.trials.trial import trials_of
 
 PROGRAM = """
 import socket
@@ -100,3 +106,94 @@ def test_a_mixed_team_of_one_kind_has_the_rows_of_the_plain_one(tmp_path: Path) 
     plain = run({**spec, "learner": learner}, tmp_path / "plain", jobs=1, progress=False)
     study = run({**spec, "learner": mixed}, tmp_path / "mixed", jobs=1, progress=False)
     assert rows(study).equals(rows(plain))
+
+
+LINE_UP = {
+    "preset": "own-value", "seeds": 1, "episodes": 3, "steps": 20, "evaluation": 2,
+    "scenario": {"kind": "line-up", "carts": 3},
+}  # fmt: skip
+LEARNER = {"kind": "batch-td", "weights": "role"}
+
+
+@pytest.fixture
+def kept(tmp_path: Path) -> Path:
+    spec = {**LINE_UP, "learner": LEARNER, "keep_teams": True, "episodes": 10}
+    study = run(spec, tmp_path / "kept", jobs=1, progress=False)
+    path = tmp_path / "trained.npz"
+    study.team(study.trials["condition"].iloc[0], 0)[1].save(path)
+    return path
+
+
+def mixed(*parts: dict) -> dict:
+    return {**LINE_UP, "learner": {"kind": "mixed", "parts": list(parts)}}
+
+
+def test_a_part_begins_with_the_weights_of_a_kept_team(kept: Path, tmp_path: Path) -> None:
+    old = {"agents": "cart1", "learner": {**LEARNER, "kind": "frozen"}, "team": str(kept)}
+    new = {"agents": "*", "learner": LEARNER}
+    spec = Spec.of(mixed(old, new))
+    there = arrange(spec.conditions()[0].settings, 0)
+    with np.load(kept) as arrays:
+        theta = arrays["learner.theta"]
+    assert np.any(theta)
+    begun, learning = there.team.parts
+    assert begun.learner.theta.tolist() == theta.tolist()
+    assert not learning.learner.theta.any()
+    list(control_loop(there.scenario, there.team, episodes=2, steps=10, seed=0))
+    assert begun.learner.theta.tolist() == theta.tolist()
+    assert learning.learner.theta.any()
+    study = run(mixed(old, new), tmp_path / "out", jobs=1, progress=False)
+    kept.unlink()  # the study has its own copy
+    again = run(tmp_path / "out" / SPEC_FILE, tmp_path / "again", jobs=1, progress=False)
+    assert rows(again).equals(rows(study))
+
+
+def test_other_weights_are_another_trial(kept: Path) -> None:
+    def identity() -> str:
+        part = {"agents": "*", "learner": LEARNER, "team": str(kept)}
+        return trials_of(Spec.of(mixed(part)))[0].identity
+
+    before = identity()
+    with np.load(kept) as arrays:
+        changed = {**arrays, "learner.theta": arrays["learner.theta"] + 1.0}
+    with open(kept, "wb") as file:
+        np.savez(file, allow_pickle=False, **changed)
+    assert identity() != before
+
+
+@pytest.mark.parametrize(
+    ("learner", "content", "complaint"),
+    [
+        (
+            {**LEARNER, "weights": "own"},
+            None,
+            r"learner\.parts\[0\]\.team = .* its learner\.theta has",
+        ),
+        (
+            {"kind": "frozen", "weights": "own"},
+            None,
+            r"weights of roles .* fit teams of other sizes",
+        ),
+        (LEARNER, b"PK nothing", r"learner\.parts\[0\]\.team = .*"),
+        (LEARNER, b"text", r"trained\.npz: is no file of a team"),
+    ],
+)
+def test_a_file_that_holds_no_such_weights_is_refused(kept, learner, content, complaint) -> None:
+    if content is not None:
+        kept.write_bytes(content)
+    with pytest.raises(ValueError, match=complaint) as caught:
+        check_conditions(Spec.of(mixed({"agents": "*", "learner": learner, "team": str(kept)})))
+    assert "\n" not in str(caught.value)
+
+
+def test_agents_that_leave_have_the_recovery_table_of_wheels(tmp_path: Path) -> None:
+    spec = {
+        **LINE_UP, "study": "wheel-failure", "seeds": 2, "episodes": 24, "learner": LEARNER,
+        "topology": {
+            "kind": "chain",
+            "failures": [{"kind": "left", "agents": "cart2", "episode": 12, "action": "zero"}],
+        },
+    }  # fmt: skip
+    study = run(spec, tmp_path / "out", jobs=1, progress=False)
+    table = str(study.table())
+    assert all(title in table for title in ("before", "just after", "end"))

@@ -8,6 +8,7 @@ from nested_agents.core.agents.team import Team
 from nested_agents.studies.api import planning
 from nested_agents.studies.api.planning import learning_time, try_out
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.presentation.progress import duration
 from nested_agents.studies.trials.trial import trials_of
 
 SPEC = na.Spec(
@@ -21,12 +22,13 @@ def test_a_plan_tells_trials_time_memory_and_power() -> None:
     assert (plan.trials, plan.processes, plan.comparisons) == (10, 2, 1)
     quick, slow = plan.seconds
     assert 0.0 < quick < slow / 2
+    assert quick < plan.likely < slow
     assert quick > 0.1, "a worker has to start"
     assert 5e7 < plan.memory < 1e10
     text = str(plan)
     assert "trials   10, each 4 episodes of up to 20 steps" in text
     assert "5 seeds cannot give an adjusted p below .05" in text
-    assert "with 2 processes, the start of workers included" in text
+    assert f"time     about {duration(plan.likely)} with 2 processes" in text
     assert "at most" not in text
     assert max(map(len, text.splitlines())) <= 80
 
@@ -55,7 +57,8 @@ def test_learning_from_all_that_is_kept_grows_with_the_square_of_training() -> N
 
 def test_what_a_condition_takes_is_tried_out() -> None:
     tried = try_out(trials_of(SPEC)[0])
-    assert 0.0 < tried.seconds[0] <= tried.seconds[1] < 60.0
+    quick, usual, slow = tried.seconds
+    assert 0.0 < quick <= usual <= slow < 60.0
     assert tried.memory > 0.0
 
 
@@ -71,8 +74,8 @@ def test_of_many_agents_first_steps_are_tried(monkeypatch) -> None:
 
 
 def test_episodes_that_were_not_tried_last_from_a_quarter_to_twice_as_long() -> None:
-    assert planning._mean_length([4.0, 8.0], 20, 100).tolist() == [1.5, 16.0]
-    assert planning._mean_length([4.0, 4.0], 20, 4).tolist() == [4.0, 20.0], (
+    assert planning._mean_length([4.0, 8.0], 20, 100).tolist() == [1.5, 6.0, 16.0]
+    assert planning._mean_length([4.0, 4.0], 20, 4).tolist() == [4.0, 12.0, 20.0], (
         "not tried to their ends"
     )
 
@@ -97,3 +100,23 @@ def test_doubtful_sizes_are_told_before_anything_is_spent(tmp_path, capsys) -> N
     path.write_text("seeds = 2\n[scenario.infrared]\nreach = 60.0\n")
     assert main(["plan", str(path), "--no-timed"]) == 0
     assert "scenario.infrared.reach = 60 m: perhaps meant in mm" in capsys.readouterr().out
+
+
+def test_what_functions_cost_is_told_by_condition(tmp_path) -> None:
+    program = "def decide(observation, told):\n    return {'action': 0, 'costs': {'tokens': 2}}\n"
+    (tmp_path / "f.py").write_text(program)
+    spec = {
+        "seeds": 2, "episodes": 1, "steps": 5, "evaluation": 1,
+        "scenario": {"kind": "line-up", "carts": 3},
+        "learner": {"kind": str(tmp_path / "f.py:decide"), "costs": {"tokens": "1"}},
+        "sweep": {"topology": ["chain", "independent"]},
+    }  # fmt: skip
+    plan = planning.plan(spec, jobs=1)
+    lines = [line.split() for line in str(plan).splitlines()]
+    assert ["messages", "calls", "message_bytes", "tokens", "joint", "actions"] in lines
+    assert ["chain", "3", "3", "0", "6", "0"] in lines
+    assert ["independent", "0", "3", "0", "6", "0"] in lines
+    # two seeds, ten decisions a trial, three calls each
+    assert "at most 60 messages, 120 calls, 0 message_bytes, 240 tokens." in " ".join(
+        str(plan).split()
+    )

@@ -128,3 +128,25 @@ def test_what_holds_no_study_is_refused_in_one_line(tmp_path) -> None:
         na.load(tmp_path)
     with pytest.raises(na.SpecError, match="needs a directory"):
         na.load()
+
+
+def test_the_status_and_a_team_in_words(study, places) -> None:
+    assert str(study.status).splitlines()[1] == "done     6 of 6 trials"
+    assert study.status.progress.left == 0
+    with pytest.raises(na.SpecError, match="not the results of one study"):
+        _ = na.load(*places).status
+
+
+@pytest.mark.slow
+def test_a_trained_team_is_explained_and_played(tmp_path) -> None:
+    spec = {"seeds": 1, "episodes": 2, "steps": 8, "evaluation": 1}
+    study = na.run(spec, tmp_path, jobs=1, progress=False)
+    explained = study.explain()
+    assert "in units of the return" in " ".join(str(explained).split())
+    assert "policy" in explained.figures
+    assert explained._repr_html_().startswith("<pre>default, seed 0")
+    html = study.replay()._repr_html_()
+    assert html.startswith(
+        "<iframe title='default, seed 0, last episode' srcdoc='&lt;!DOCTYPE html"
+    )
+    assert html.count("'") == 6, "the page is escaped"

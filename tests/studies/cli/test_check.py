@@ -230,3 +230,17 @@ def test_errors_of_learned_predictors_are_shown_once_beside_those_of_persistence
     head, *rows = (line for line in table.splitlines() if line)
     assert head.split() == ["learned", "as", "it", "is", "given"]
     assert [row.split()[0] for row in rows] == ["distance", "lead"]
+
+
+def test_a_topology_that_fails_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "broken.py").write_text("def broken(agents, groups):\n    raise ValueError(1)\n")
+    (tmp_path / "spec.toml").write_text(
+        'seeds = 1\nepisodes = 1\nsteps = 2\ntopology = "broken.py:broken"\n'
+        'scenario = { kind = "line-up", carts = 2 }\n'
+    )
+    assert main(["check", str(tmp_path / "spec.toml")]) == 2
+    _, err = capsys.readouterr()
+    assert err.count("\n") == 1
+    assert "broken.py:broken': broken raised ValueError" in err

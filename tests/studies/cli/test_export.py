@@ -4,8 +4,10 @@ import re
 from pathlib import Path
 
 import made_up
+import pandas as pd
 import pytest
 
+from nested_agents.studies.api.study import load
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
@@ -161,3 +163,26 @@ def test_what_has_no_table_is_refused(study, arguments, said, capsys):
     assert main(["table", *(a.format(study=study) for a in arguments)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert said in line
+
+
+def test_parquet_holds_the_same_with_types(study, tmp_path, capsys):
+    pytest.importorskip("pyarrow", reason="extra [parquet]")
+    assert main(["export", str(study), "--format", "parquet", "--out", str(tmp_path)]) == 0
+    names = [Path(line).name for line in capsys.readouterr().out.splitlines()]
+    assert names == ["episodes.parquet", "trials.parquet"]
+    episodes = pd.read_parquet(tmp_path / "episodes.parquet")
+    expected = load(study).episodes
+    assert episodes["success"].dtype == bool
+    pd.testing.assert_frame_equal(episodes, expected, check_dtype=False)
+    assert len(pd.read_parquet(tmp_path / "trials.parquet")) == 8
+
+
+def test_parquet_without_its_package_is_one_line(study, tmp_path, monkeypatch, capsys):
+    def refuse(*_, **__):
+        raise ImportError("Unable to find a usable engine")
+
+    monkeypatch.setattr(pd.DataFrame, "to_parquet", refuse)
+    assert main(["export", str(study), "--format", "parquet", "--out", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert "pyarrow is not installed; pip install 'nested-agents[parquet]'" in error
+    assert error.count("\n") == 1

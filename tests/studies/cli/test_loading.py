@@ -9,8 +9,8 @@ import made_up
 import pytest
 from made_up_commands import Command, finish, run_here
 
+from nested_agents.studies.api.status import Progress, progress
 from nested_agents.studies.cli.commands import reading
-from nested_agents.studies.cli.loading import Progress, progress
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import Store

@@ -3,7 +3,7 @@ import json
 import made_up
 import pytest
 
-from nested_agents.studies.cli.loading import _estimate, progress
+from nested_agents.studies.api.status import _estimate, progress
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec import outline
 from nested_agents.studies.store import database

@@ -36,6 +36,25 @@ def test_the_law_that_holds_is_chosen_and_predicts(name) -> None:
     assert [size for size, *_ in law.held_out] == [32.0, 64.0]
 
 
+def test_pairs_of_agents_are_linear_to_quadratic() -> None:
+    """As messages of a chain are, n (n - 1) / 2, which no power law predicts."""
+    sample = laws.of_numbers(SIZES, np.tile(SIZES * (SIZES - 1.0) / 2.0, (3, 1)))
+    law = laws.choose(sample)
+    assert law.curve.name == "linear to quadratic"
+    assert float(law.predict(128.0).value) == pytest.approx(128 * 127 / 2, rel=1e-4)
+
+
+def test_sizes_that_deviate_from_a_law_widen_what_it_predicts_far_away() -> None:
+    """By the variance of a new value in a regression: s^2 (1 + 1 / m + (x - mean)^2 / S_xx)."""
+    deviations = np.exp([0.2, -0.2, -0.2, 0.2, 0.2, -0.2])
+    sample = laws.of_numbers(SIZES, np.tile(SIZES * deviations, (3, 1)))
+    law = laws.fit(laws.POWER, sample)
+    x = np.log(SIZES)
+    far = np.log(1024.0) - x.mean()
+    variance = law.misfit * (1.0 + 1.0 / 6.0 + far**2 / ((x - x.mean()) ** 2).sum())
+    assert law.distribution(1024.0)[1] == pytest.approx(variance, rel=1e-4)
+
+
 def test_a_break_is_met_by_a_fit() -> None:
     def broken(n):
         return np.where(n < 8.0, n**0.2, 8.0**0.2 * (n / 8.0) ** 1.5)

@@ -13,10 +13,17 @@ from nested_agents.core.plugins.settings import Settings
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.spec.keys import Key, Table, keys_below, tables
+from nested_agents.studies.spec.keys import (
+    OWN_FUNCTION,
+    Key,
+    Table,
+    keys_below,
+    of_functions,
+    tables,
+)
 from nested_agents.topologies import TOPOLOGIES
 
-TABLES = tables()
+TABLES = (*tables(), of_functions())
 
 
 def subclasses(cls: type) -> set[type]:
@@ -70,7 +77,7 @@ def test_registries_are_walked() -> None:
         if isinstance(item, Plugged)
     ]  # fmt: skip
     kinds = {table.kind for table in TABLES if table.name == "learner"}
-    assert kinds == {"", *metadata.registry.built_in}
+    assert kinds == {"", *metadata.registry.built_in, OWN_FUNCTION}
 
 
 def the_key(name: str) -> Key:

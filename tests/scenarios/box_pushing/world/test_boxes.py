@@ -19,6 +19,7 @@ from nested_agents.scenarios.box_pushing.world.boxes import (
     AREA,
     BOXES,
     BoxSpec,
+    Vertices,
     _merge,
     box_for,
     growth,
@@ -205,6 +206,21 @@ def test_bad_boxes_are_refused(arguments: dict[str, object], word: str) -> None:
         with pytest.raises(ValueError, match=word) as error:
             BoxSpec("bad", **arguments)  # type: ignore[arg-type]
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "vertices",
+    [
+        ((0, 0), (1e-5, 0), (1e-5, 1e-5)),
+        ((0, 0), (2e-5, 0), (2e-5, 2e-5), (0, 2e-5)),
+    ],
+)
+def test_a_piece_too_small_for_the_physics_is_refused_before_it(vertices: Vertices) -> None:
+    box = BoxSpec("tiny", vertices)
+    with pytest.raises(
+        ValueError, match=r"convex piece of it has .* m2, must be at least 2e-09 m2"
+    ):
+        _ = box.fixtures
 
 
 @pytest.mark.parametrize("seed", range(12))

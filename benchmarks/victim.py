@@ -1,0 +1,195 @@
+"""A finished study that is harmed again and again, and what commands make of it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import random
+import shutil
+import sys
+import time
+import traceback
+from collections.abc import Callable, Generator, Sequence
+from functools import cache
+from pathlib import Path
+
+from nested_agents.core.interface.measures import Measure
+from nested_agents.studies.api.study import load
+from nested_agents.studies.cli.main import main as command_line
+from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.arrangement import check_conditions
+from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
+from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
+from nested_agents.studies.workers.runner import Outcome, RunTrial, save
+
+SPEC = Spec.of(
+    {"seeds": 5, "episodes": 2, "steps": 10, "evaluation": 1, "keep_teams": True,
+     "sweep": {"preset": ["default", "frozen"]}}
+)  # fmt: skip
+EXPLAIN = "explain"
+TEAM = "na.load(...).team()"
+"""No command: what a user reads in Python."""
+LINES = (
+    "results --format csv", "status", "table --format csv", "compare", "compare --statistics",
+    "report", "export", TEAM,
+)  # fmt: skip
+"""The commands that read."""
+
+Answer = tuple[int, str, str]
+"""Exit status, output and errors of a command."""
+
+
+@cache
+def _run_once() -> tuple[tuple[Measure, ...], tuple[Trial, ...], dict[str, TrialResult]]:
+    """Return what the study measures, its trials, and by identity what they measured."""
+    measures, trials = check_conditions(SPEC), trials_of(SPEC)
+    return measures, trials, {trial.identity: run_trial(trial) for trial in trials}
+
+
+class Adversary:
+    """A finished study, which is damaged and mended again and again.
+
+    Parameters
+    ----------
+    folder
+        Where to work.
+    rng
+        Draws the damage.
+    lines
+        The commands whose answers of the sound study are needed.
+    """
+
+    def __init__(self, folder: Path, rng: random.Random, lines: Sequence[str] = LINES) -> None:
+        self.sound, self.study, self.rng = folder / "sound", folder / "study", rng
+        self.measures, self.trials, self.results = _run_once()
+        self.finish(self.sound)
+        self.expected = self.content(self.sound)
+        shutil.copytree(self.sound, self.study)
+        self.answers = {line: self.command(line) for line in lines}
+        self.files = [p for p in sorted(self.sound.rglob("*")) if p.is_file() and p.stat().st_size]
+
+    def command(self, line: str) -> Answer:
+        """Run a command on the study in this process."""
+        if line == TEAM:
+            return self.team()
+        name, *options = line.split()
+        out, error = io.StringIO(), io.StringIO()
+        if name in ("report", "export"):
+            shutil.rmtree(self.study.parent / "written", ignore_errors=True)
+            written = self.study.parent / "written"
+            written.mkdir()
+            options += ["--out", str(written / "page.html" if name == "report" else written)]
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+            status = command_line([name, str(self.study), *options])
+        text = out.getvalue()
+        if name in ("report", "export") and status == 0:
+            text += "".join(p.read_text() for p in sorted(written.iterdir()))
+        if name == EXPLAIN and status == 0:
+            text += next(self.study.glob("explain/*/explanation.txt")).read_text()
+        return status, text, error.getvalue()
+
+    def team(self) -> Answer:
+        """Load the team that was trained first, as a user's script does."""
+        try:
+            with contextlib.redirect_stderr(error := io.StringIO()):
+                _, team = load(self.study).team()
+        except SpecError as refusal:
+            return 2, "", str(refusal)
+        arrays = {name: array.tolist() for name, array in team.arrays().items()}
+        return 0, str(arrays), error.getvalue()
+
+    def finish(self, directory: Path) -> list[str]:
+        """Run what is left of a study; return what had to be said."""
+        with open_to_run(directory, SPEC, self.trials, self.measures) as store:
+            for trial in pending(store, self.trials):
+                save(store, trial, self.result(trial), 1.0)
+            return store.notes
+
+    def result(self, trial: Trial) -> TrialResult:
+        """Return what a trial measures: a function of it, so that it is run once only."""
+        if trial.identity not in self.results:
+            self.results[trial.identity] = run_trial(trial)
+        return self.results[trial.identity]
+
+    def content(self, directory: Path) -> object:
+        """Return all that a study has found."""
+        with Store.open(directory) as store:
+            store.verify()
+            names, episodes = store.episodes()
+            kept = names, list(episodes)
+            rows = kept, store.planned(), store.columns(), spec_of(store) == SPEC
+        paths = sorted((directory / "recordings").glob("[!.]*.npz"))
+        return rows, [(path.name, path.read_bytes()) for path in paths]
+
+    def damage(self) -> Path:
+        """Flip a bit of a file, mostly where it is not empty; return the file."""
+        weights = [p.stat().st_size ** 0.5 for p in self.files]
+        source = self.rng.choices(self.files, weights)[0]
+        data = bytearray(source.read_bytes())
+        places = [i for i, byte in enumerate(data) if byte] if self.rng.random() < 0.7 else data
+        at = self.rng.choice(places) if places is not data else self.rng.randrange(len(data))
+        data[at] ^= 1 << self.rng.randrange(8)
+        path = self.study / source.relative_to(self.sound)
+        path.write_bytes(data)
+        return path
+
+    def restore(self) -> None:
+        """Make the study sound again."""
+        shutil.rmtree(self.study)
+        shutil.copytree(self.sound, self.study)
+
+
+class Here:
+    """Workers that are this process; trials are those that an adversary has run before."""
+
+    processes = 1
+
+    def __init__(self, adversary: Adversary) -> None:
+        self.adversary = adversary
+
+    def arrivals(
+        self,
+        trials: Sequence[Trial],
+        run_trial: RunTrial,
+        started: Callable[[str], None],
+        ended: Callable[[str], None],
+    ) -> Generator[Outcome]:
+        """See `nested_agents.studies.workers.runner.Workers.arrivals`."""
+        for trial in trials:
+            started(trial.identity)
+            time.sleep(0.08)
+            result = self.adversary.result(trial)
+            ended(trial.identity)
+            yield Outcome(trial, None, 1.0, result)
+
+
+def read(adversary: Adversary, line: str, path: Path) -> str:
+    """Return what a command that reads makes of a study of which a file is harmed."""
+    try:
+        answer = adversary.command(line)
+    except BaseException:
+        print(f"{line}, {path.name}:\n{traceback.format_exc()}", file=sys.stderr)
+        return "traceback"
+    if answer == adversary.answers[line]:
+        return "equal"
+    is_reported = (
+        path.name in answer[1] + answer[2] or "recording is missing or damaged" in answer[1]
+    )
+    if is_reported:
+        return "told"
+    print(f"{line}, {path.name}: silence: {answer[2]}", file=sys.stderr)
+    return "silence"
+
+
+def mended(adversary: Adversary, path: Path) -> str:
+    """Return what a run makes of it."""
+    try:
+        adversary.finish(adversary.study)
+        is_equal = adversary.content(adversary.study) == adversary.expected
+    except BaseException:
+        print(f"run, {path.name}:\n{traceback.format_exc()}", file=sys.stderr)
+        return "run: traceback"
+    return "run: equal" if is_equal else "run: unequal"

@@ -1,0 +1,190 @@
+"""What fuzzy agents decide by: one view that all share, or a view of each agent's own.
+
+As a rule the agents of a team share one prediction and know each other's consequent weights. With
+``[learner.decision.errors]``, or in a scenario that agents perceive each for itself, every agent
+decides by
+a view of its own. Then it plans for itself, too: no plan is handed down, and what it is told are
+actions alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ..adaptation.foresight import Foresight
+from ..decision.errors import Errors
+from ..evaluators.evaluator import concerned
+from ..hierarchy.hierarchy import Hierarchy
+from ..interface.agents import Placement
+from ..interface.experience import Observation
+from ..interface.measures import Measure
+from ..interface.prediction import Prediction
+from ..learners.learner import LearnerSettings
+from ..numerics import FloatArray, IntArray
+
+UNKNOWN: FloatArray = np.zeros(0)
+"""The weights of agents of another part."""
+COSTS = (
+    Measure("agreement", "agreement", gathering="mean", better="higher", least=0.0, greatest=1.0),
+    Measure("told", "actions told", "1/decision", gathering="mean", least=0.0),
+    Measure("broadcast", "states broadcast", "1/decision", gathering="mean", least=0.0),
+)
+"""What is measured of agents with views of their own, as means of an episode: in how many of the
+others an agent was right about what they then did (those that told it are among them); and what was
+communicated in a decision, the actions told and the states of other bodies sent to an agent."""
+
+
+class OwnView(NamedTuple):
+    """What one agent decides by."""
+
+    prediction: Prediction
+    """What it predicts joint actions to lead to."""
+    weights: list[FloatArray]
+    """What it takes for the consequent weights of every agent."""
+
+
+@dataclass
+class FuzzyInputs:
+    """What fuzzy agents decide by."""
+
+    left: FloatArray
+    """``(n, d)`` the states that they are in; where they value actions, with a column for each
+    action that they are told, filled in turn by turn."""
+    previous: IntArray | None
+    """``(n,)`` what all did in the decision before; none: there was none, or nobody asks."""
+    prediction: Prediction
+    """What joint actions would lead to."""
+    weights: list[FloatArray]
+    """The consequent weights of every agent."""
+    frequencies: FloatArray
+    """``(n, A)`` how often each agent was seen to take each action, rows summing to one."""
+    explore: bool
+    """Whether they explore."""
+    views: dict[int, OwnView] = field(default_factory=dict)
+    """By agent, what it decides by in place of prediction and weights; empty: all by these."""
+    expected: dict[int, IntArray] = field(default_factory=dict)
+    """By agent with a view and a plan, the joint action that it expected when it decided."""
+    agreement: float = 1.0
+    """How far these were right, see `nested_agents.core.agents.views`."""
+
+
+class Views:
+    """The views of agents that each have one of their own.
+
+    Parameters
+    ----------
+    settings, placement
+        Of the agents.
+    rows
+        Per agent of the team the row of its weights; none: they are not known.
+    n_rules
+        Rules of the rule base.
+    foresight
+        What they predict by.
+
+    Attributes
+    ----------
+    costs
+        What is measured of them in an episode.
+
+    Raises
+    ------
+    ValueError
+        If constants shall be wrong that the scenario's predictor has not; one line.
+    """
+
+    costs = COSTS
+
+    def __init__(
+        self,
+        settings: LearnerSettings,
+        placement: Placement,
+        rows: list[int | None],
+        n_rules: int,
+        foresight: Foresight,
+    ) -> None:
+        self._members = placement.members.tolist()
+        self._rows = rows
+        self._foresight = foresight
+        hierarchy = placement.hierarchy
+        self._broadcast = float(placement.scenario.perceived[placement.members].sum())
+        self._errors: Errors | None = None
+        if settings.decision.errors is not None:
+            bodies = placement.scenario.embodiment() if settings.decision.errors.constants else None
+            whose = concerned(hierarchy, settings.decision.value_of)
+            n_constants = 0 if bodies is None else len(bodies.constants)
+            self._errors = Errors(
+                settings.decision.errors, whose, rows, n_rules, n_constants, placement.seed
+            )
+
+    def by_agent(
+        self, seen: Observation, shared: Prediction, theta: FloatArray
+    ) -> dict[int, OwnView]:
+        """Return by agent what it takes for true, of a prediction and of weights."""
+        views: dict[int, OwnView] = {}
+        for agent in self._members:
+            prediction = shared
+            own = theta
+            if self._errors is not None:
+                own = self._errors.weights(agent, theta)
+                constants = self._errors.constants(agent)
+                if constants is not None:
+                    prediction = self._foresight.predict(seen, constants) or shared
+            views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
+        return views
+
+    def spent(self, inputs: FuzzyInputs, hierarchy: Hierarchy) -> Mapping[str, float]:
+        """Return how far expectations were right, and what was communicated in a decision."""
+        share = len(self._members) / len(hierarchy)  # those of other parts add theirs
+        return {
+            "agreement": inputs.agreement * share,
+            "told": float(sum(len(hierarchy.above(i)) for i in self._members)),
+            "broadcast": self._broadcast,
+        }
+
+
+def weights_by_agent(rows: list[int | None], theta: FloatArray) -> list[FloatArray]:
+    """Return the consequent weights of every agent by the rows that agents have."""
+    return [UNKNOWN if row is None else theta[row] for row in rows]
+
+
+def agreement(expected: dict[int, IntArray], joint_action: IntArray) -> float:
+    """Return in how many of the others an agent was right, on average, as a share.
+
+    Parameters
+    ----------
+    expected
+        By agent, the joint action ``(n,)`` that it expected when it decided.
+    joint_action
+        ``(n,)`` what all then did.
+
+    Examples
+    --------
+    >>> agreement({0: np.array([1, 2, 0]), 1: np.array([1, 1, 3])}, np.array([1, 1, 3]))
+    0.5
+    """
+    n = len(joint_action)
+    if n == 1 or not expected:
+        return 1.0
+    right = 0
+    for agent, plan in expected.items():
+        hit = plan == joint_action
+        right += int(hit.sum()) - int(hit[agent])
+    return right / (len(expected) * (n - 1))
+
+
+def senders_of(settings: LearnerSettings, hierarchy: Hierarchy) -> list[list[int]]:
+    """Return, by agent, whose actions are part of its state, in the order of decision."""
+    if not settings.values_actions:
+        return []
+    if hierarchy.neighbours:
+        raise ValueError(
+            f"learner.kind = {settings.kind!r}: agents use what they are told, and neighbours tell "
+            "nothing; set topology.oriented, in which order they decide"
+        )
+    every = range(len(hierarchy))
+    return [sorted(hierarchy.above(i), key=hierarchy.order.index) for i in every]

@@ -1,0 +1,99 @@
+"""Errors of an agent's own, by which agents come to disagree.
+
+An error is drawn once, from the seed of the trial, and stays::
+
+    theta_i = theta + s * std(theta) * E_i,    c_i = c * exp(s_c * N_i)
+
+with the standard deviation over the consequent weights of one agent or role, and E_i, N_i of
+standard normal numbers of agent i.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..numerics import FloatArray, IntArray
+from ..plugins.settings import NonNegative, Settings
+
+STREAM = 2**32 - 5
+"""Key of the stream from which errors of agents are drawn, under the seed of the team."""
+
+
+class ErrorSettings(Settings):
+    """Errors of each agent's own: the ``[learner.decision.errors]`` table of a spec."""
+
+    weights: NonNegative = 0.0
+    """Standard deviation of the error of a consequent weight, in those of the agent's weights."""
+    constants: NonNegative = 0.0
+    """Standard deviation of the logarithm of a constant of its predictor."""
+
+
+class Errors:
+    """The errors of every agent, which stay what they are.
+
+    Parameters
+    ----------
+    settings
+        How large they are.
+    concerned
+        Per agent ``(k,)`` by whose values it decides.
+    rows
+        Per agent the row of its weights; none: they are not known.
+    n_rules
+        Rules of the rule base.
+    n_constants
+        Constants of the predictor.
+    seed
+        That of the team.
+
+    Examples
+    --------
+    >>> seed = np.random.SeedSequence(1)
+    >>> errors = Errors(ErrorSettings(weights=0.5), [np.array([0])], [0], 2, 0, seed)
+    >>> theta = np.array([[1.0, 3.0]])
+    >>> drawn = np.random.default_rng(np.random.SeedSequence(1, spawn_key=(STREAM, 0)))
+    >>> expected = theta + 0.5 * 1.0 * drawn.standard_normal((1, 2))
+    >>> bool(np.array_equal(errors.weights(0, theta), expected))
+    True
+    """
+
+    def __init__(
+        self,
+        settings: ErrorSettings,
+        concerned: list[IntArray],
+        rows: list[int | None],
+        n_rules: int,
+        n_constants: int,
+        seed: np.random.SeedSequence,
+    ) -> None:
+        if settings.constants and not n_constants:
+            raise ValueError(
+                f"learner.decision.errors.constants = {settings.constants}: the scenario's "
+                "predictor has no constants, use 0"
+            )
+        self._settings = settings
+        self._rows: list[IntArray] = []
+        self._weights: list[FloatArray] = []
+        self._constants: list[FloatArray] = []
+        for agent, whose in enumerate(concerned):
+            child = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, STREAM, agent))
+            rng = np.random.default_rng(child)
+            known = {row for other in whose.tolist() if (row := rows[other]) is not None}
+            self._rows.append(np.array(sorted(known), dtype=np.int64))
+            size = len(known) if settings.weights else 0
+            self._weights.append(rng.standard_normal((size, n_rules)))
+            self._constants.append(settings.constants * rng.standard_normal(n_constants))
+
+    def weights(self, agent: int, theta: FloatArray) -> FloatArray:
+        """Return what an agent takes for the weights `theta` ``(n_rows, n_rules)``."""
+        if not self._settings.weights:
+            return theta
+        rows = self._rows[agent]
+        scale = self._settings.weights * theta[rows].std(axis=1, keepdims=True)
+        taken = theta.copy()
+        taken[rows] += scale * self._weights[agent]
+        return taken
+
+    def constants(self, agent: int) -> FloatArray | None:
+        """Return an agent's errors ``(c,)`` of the logarithms of constants; None: it has none."""
+        return self._constants[agent] if self._settings.constants else None

@@ -1,0 +1,102 @@
+"""The figures of the atlas, one for each question."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..core.numerics import pd
+from ..studies.presentation import figures
+from ..studies.results.statistics import Estimate, bootstrap, stack_estimates
+from . import atlas
+
+PANEL = (5.0, 2.4)
+"""Width and height of a panel [inch]."""
+MARGIN = (0.4, 0.4)
+
+
+def draw_success(rows: pd.DataFrame) -> Figure:
+    """Return who succeeds where: by task, success against size; a line for each team."""
+    known = rows[rows["success"].notna()]
+    tasks = list(dict.fromkeys(known["task"]))
+    figure, panels = figures.grid(len(tasks), 2, PANEL, MARGIN, sharey=True)
+    for axes, task in zip(panels.flat, tasks, strict=False):
+        own = known[known["task"] == task]
+        teams = list(own.groupby(list(atlas.TeamKind._fields), sort=False))
+        handles = []
+        for index, (team, of_team) in enumerate(teams):
+            by_size = of_team.groupby("size")["success"]
+            sizes = [int(n) for n, _ in by_size]
+            values = [bootstrap(v.to_numpy(dtype=float), bounds=(0.0, 1.0)) for _, v in by_size]
+            figures.draw_line(axes, sizes, values, index, len(teams))
+            handles.append(figures.handle(name_of(team), **figures.style(index)))
+        figures.scale_axis(axes, sorted(int(n) for n in own["size"].unique()))
+        figures.as_rates(axes)
+        axes.set_title(task, loc="left")
+        axes.legend(handles=handles, fontsize=6, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.supxlabel("number of agents, success in evaluation with 95 % intervals", fontsize=8)
+    return figure
+
+
+def draw_exponents(rows: pd.DataFrame) -> Figure:
+    """Return how time, memory and messages of a decision grow: exponents, 95 % intervals."""
+    names = ("decision_median", "team_bytes", "messages", "steps")
+    by_measure = {name: atlas.exponents(rows, name) for name in names}
+    teams = list(dict.fromkeys(team for own in by_measure.values() for team in own))
+    height = 1.0 + 0.2 * len(teams)
+    figure, panels = figures.panels(1, len(names), (10.5, height), sharey=True)
+    for axes, (name, own) in zip(panels[0], by_measure.items(), strict=True):
+        places = [teams.index(team) for team in own]
+        known = stack_estimates(list(own.values()))
+        axes.hlines(places, known.low, known.high, lw=1.2)
+        axes.plot(known.value, places, "o", markersize=4)
+        axes.axvline(1.0, color="#888888", lw=0.8, ls=":")
+        axes.set_title(atlas.MEASURES[name], loc="left", fontsize=8)
+        axes.set_xlabel("exponent of n")
+    labels = [f"{team.task}: {name_of(team)}" for team in teams]
+    panels[0, 0].set_yticks(range(len(teams)), labels)
+    panels[0, 0].invert_yaxis()
+    return figure
+
+
+def draw_checks(checked: Sequence[atlas.Check]) -> Figure:
+    """Return what laws of small teams predicted, over what larger ones measured."""
+    by_measure = {k: list(own) for k, own in groupby(sorted(checked, key=_measure), key=_measure)}
+    figure, panels = figures.grid(len(by_measure), 3, (3.0, 2.2), MARGIN)
+    for axes, (name, own) in zip(panels.flat, by_measure.items(), strict=False):
+        ratios = [Estimate(*(e / check.measured for e in check.predicted)) for check in own]
+        known = stack_estimates(ratios)
+        places = np.arange(len(own))
+        colours = ["C0" if check.is_inside else "C3" for check in own]
+        axes.vlines(places, known.low, known.high, color=colours, lw=1.2)
+        axes.scatter(places, known.value, c=colours, s=12)
+        axes.axhline(1.0, color="#888888", lw=0.8, ls=":")
+        figures.log_axis(axes)
+        axes.set_xticks(places, [str(check.size) for check in own], fontsize=6)
+        axes.set_title(atlas.MEASURES[name], loc="left")
+    figure.supylabel("predicted / measured", fontsize=8)
+    figure.supxlabel("number of agents; red: outside the 90 % interval", fontsize=8)
+    return figure
+
+
+def _measure(check: atlas.Check) -> str:
+    return check.measure
+
+
+def name_of(team: Sequence[str]) -> str:
+    """Return what a team is called beside others of its task."""
+    _, hierarchy, learner, fault = team
+    return ", ".join([hierarchy, learner, *([fault] if fault != atlas.NO_FAULT else [])])
+
+
+FIGURES: Mapping[str, Callable[[pd.DataFrame], Figure]] = {
+    "atlas-success": draw_success,
+    "atlas-exponents": draw_exponents,
+    "atlas-predictions": lambda rows: draw_checks(
+        [*atlas.checks(rows), *atlas.checks(rows, atlas.SMALL // 2)]
+    ),
+}
+"""By name of the file."""

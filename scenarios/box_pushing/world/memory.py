@@ -1,0 +1,61 @@
+"""What a kernel needs to work with objects of Box2D: their memory, and one function of theirs.
+
+numba is imported with this module, so that nothing imports it before a kernel is compiled.
+"""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import config as config
+from numba import types
+from numba.extending import intrinsic
+
+FLOAT = ir.FloatType()
+POINTER = ir.IntType(8).as_pointer()
+
+
+@intrinsic
+def load(context: Any, address: Any) -> Any:
+    """Return the single-precision number at an address."""
+
+    def generate(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
+        return builder.load(builder.inttoptr(arguments[0], FLOAT.as_pointer()))
+
+    return types.float32(types.int64), generate
+
+
+@intrinsic
+def store(context: Any, address: Any, value: Any) -> Any:
+    """Write a single-precision number to an address."""
+
+    def generate(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
+        builder.store(arguments[1], builder.inttoptr(arguments[0], FLOAT.as_pointer()))
+
+    return types.void(types.int64, types.float32), generate
+
+
+@intrinsic
+def set_bits(context: Any, address: Any, bits: Any) -> Any:
+    """Set bits of the 16 at an address."""
+
+    def generate(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
+        at = builder.inttoptr(arguments[0], ir.IntType(16).as_pointer())
+        builder.store(builder.or_(builder.load(at), arguments[1]), at)
+
+    return types.void(types.int64, types.int16), generate
+
+
+@intrinsic
+def call(
+    context: Any, function: Any, world: Any, seconds: Any, velocities: Any, positions: Any
+) -> Any:
+    """Call ``b2World::Step`` of a world, both by address."""
+
+    def generate(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
+        whole = ir.IntType(32)
+        signature = ir.FunctionType(ir.VoidType(), [POINTER, FLOAT, whole, whole])
+        step = builder.inttoptr(arguments[0], signature.as_pointer())
+        builder.call(step, [builder.inttoptr(arguments[1], POINTER), *arguments[2:]])
+
+    of = (types.int64, types.int64, types.float32, types.int32, types.int32)
+    return types.void(*of), generate

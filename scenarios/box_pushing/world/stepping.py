@@ -1,0 +1,165 @@
+"""A whole decision of the physical world in one compiled call.
+
+From Python a step of Box2D takes a pose, a force and a torque for each body, calls that take
+several times as long as the step itself. Here a kernel reads and writes the bodies where they lie
+in memory and calls ``b2World::Step`` by its exported symbol, with the same bits. Where bodies lie
+otherwise, or there is no such symbol, nothing of this is used, see `step_address`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from typing import TYPE_CHECKING
+
+import Box2D
+import numpy as np
+from Box2D import _Box2D
+
+from ....core.numerics import FloatArray, IntArray, njit
+from .geometry import gaps
+from .robots import WheelModel, wheel_wrenches
+
+if TYPE_CHECKING:
+    from .memory import call, load, set_bits, store
+
+FLAGS = 4
+POSITION = 12
+ANGLE = 56
+VELOCITY = 64
+TURNING = 72
+FORCE = 76
+TORQUE = 84
+"""Where a ``b2Body`` of Box2D 2.3 has them [bytes]; vectors are two numbers."""
+AWAKE = 2
+"""The flag of bodies that have not come to rest; whoever pushes one wakes it."""
+STEP = "_ZN7b2World4StepEfii"
+"""Symbol of ``b2World::Step(float, int, int)``."""
+VELOCITY_ITERATIONS = 8
+POSITION_ITERATIONS = 3
+PUSH = (0.3, -0.7, 0.11)
+SECONDS = 0.016
+AT_REST = 60
+"""The force and torque, the step [s] and the number of steps by which it is seen what holds."""
+
+
+@njit(cache=True, names_of="memory")
+def advance(
+    function: int,
+    world: int,
+    bodies: IntArray,
+    speeds: FloatArray,
+    substeps: int,
+    dt: float,
+    unit: float,
+    model: WheelModel,
+    last: FloatArray,
+    wrenches: FloatArray,
+    edges: FloatArray,
+    rounding: float,
+    radii: FloatArray,
+    touching: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Let control periods pass; return poses ``(M + 1, 3)``, gaps and contact time ``(M,)``.
+
+    Parameters
+    ----------
+    function, world, bodies
+        Addresses of ``b2World::Step``, a world, and its box and robots ``(M + 1,)``.
+    speeds
+        ``(periods, n)`` of the wheels, in units of Box2D.
+    substeps, dt
+        Steps of Box2D in a period, and how long one is [s].
+    unit
+        Units of Box2D per metre.
+    model, last, wrenches
+        Of the wheels, see `wheel_wrenches`; the latter two are modified.
+    edges, rounding, radii
+        Outline of the box, and radii ``(M,)`` of the robots.
+    touching
+        Gap below which a robot is in contact [m].
+    """
+    n_robots = len(bodies) - 1
+    motion = np.empty((n_robots, 4))
+    poses = np.empty((n_robots + 1, 3))
+    apart: FloatArray = np.empty(n_robots)
+    touched = np.zeros(n_robots)
+    for period in range(len(speeds)):
+        for _ in range(substeps):
+            for r in range(n_robots):
+                body = bodies[r + 1]
+                motion[r, 0] = load(body + ANGLE)
+                motion[r, 1] = load(body + VELOCITY)
+                motion[r, 2] = load(body + VELOCITY + 4)
+                motion[r, 3] = load(body + TURNING)
+            wheel_wrenches(motion, speeds[period], dt, model, last, wrenches)
+            for r in range(n_robots):
+                body = bodies[r + 1]
+                set_bits(body + FLAGS, np.int16(AWAKE))
+                for k in range(3):  # force and torque lie side by side, and are added to
+                    at = body + FORCE + 4 * k
+                    store(at, load(at) + np.float32(wrenches[r, k]))
+            call(function, world, np.float32(dt), VELOCITY_ITERATIONS, POSITION_ITERATIONS)
+        for r in range(n_robots + 1):
+            poses[r, 0] = load(bodies[r] + POSITION) / unit
+            poses[r, 1] = load(bodies[r] + POSITION + 4) / unit
+            poses[r, 2] = load(bodies[r] + ANGLE)
+        apart = gaps(poses[1:], poses[:1], edges, rounding, radii)
+        for r in range(n_robots):
+            touched[r] += apart[r] < touching
+    return poses, apart, touched / len(speeds)
+
+
+@cache
+def step_address() -> int | None:
+    """Return the address of ``b2World::Step``; None if bodies are not to be written to.
+
+    Two worlds alike are stepped, one through Box2D's own functions and one through memory: all that
+    is read must be what these functions say, and both must come to the same bits.
+    """
+    from .memory import config  # numba takes its time
+
+    if config.DISABLE_JIT:
+        return None
+    try:
+        function = getattr(ctypes.CDLL(_Box2D.__file__), STEP)
+    except (OSError, AttributeError):
+        return None
+    address = ctypes.cast(function, ctypes.c_void_p).value or 0
+    of = (ctypes.c_void_p, ctypes.c_float, ctypes.c_int32, ctypes.c_int32)
+    step = ctypes.CFUNCTYPE(None, *of)(address)
+    official, pushed = _world()
+    other, written = _world()
+    memory = (ctypes.c_float * (TORQUE // 4 + 1)).from_address(int(written.this))
+    flags = ctypes.c_uint16.from_address(int(written.this) + FLAGS)
+    places = (POSITION, POSITION + 4, ANGLE, VELOCITY, VELOCITY + 4, TURNING)
+    for push in (True, *[False] * AT_REST, True, False):  # in between they come to rest
+        if push:
+            pushed.ApplyForceToCenter(tuple(PUSH[:2]), True)
+            pushed.ApplyTorque(PUSH[2], True)
+            flags.value |= AWAKE
+            for at, value in enumerate(PUSH, FORCE // 4):
+                memory[at] = value
+        official.Step(SECONDS, VELOCITY_ITERATIONS, POSITION_ITERATIONS)
+        step(int(other.this), SECONDS, VELOCITY_ITERATIONS, POSITION_ITERATIONS)
+        seen = [memory[place // 4] for place in places]
+        if not seen == _told(pushed) == _told(written) or pushed.awake != written.awake:
+            return None
+    return address
+
+
+def _world() -> tuple[Box2D.b2World, Box2D.b2Body]:
+    world = Box2D.b2World(gravity=(0, 0), doSleep=False, warmStarting=False)
+    body = world.CreateDynamicBody(
+        position=(1.25, -0.5), angle=0.75, linearDamping=20.0, angularDamping=20.0
+    )
+    body.CreateCircleFixture(radius=1.0, density=1.0)
+    return world, body
+
+
+def _told(body: Box2D.b2Body) -> list[float]:
+    """Return position, angle and velocities as Box2D's own functions tell them."""
+    position = body.position
+    velocity = body.linearVelocity
+    told = [position.x, position.y, body.angle]
+    return [*told, velocity.x, velocity.y, body.angularVelocity]

@@ -1,0 +1,59 @@
+"""Trained teams explained: rules, policy and self-model, in words and figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..explain import team
+from ..explain.team import Explanation
+from ..explain.text import MOST_AGENTS, draw, text
+from ..store.store import Store
+from ..trials.keeping import finished_trial
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class TeamExplanation:
+    """What is known of a trained team; printed, as the command ``explain`` says it."""
+
+    explanation: Explanation = field(repr=False)
+    """Its parts, as numbers."""
+    folder: Path
+    """Where the command keeps it."""
+
+    @property
+    def text(self) -> str:
+        """All of it in words, every agent's rules."""
+        return text(self.explanation)
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """Its figures by name."""
+        return draw(self.explanation)
+
+    def __str__(self) -> str:
+        return text(self.explanation, MOST_AGENTS)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+def explain_team(
+    directory: Path, condition: str | None = None, seed: int | None = None
+) -> TeamExplanation:
+    """Explain the team of a trial: the one that is kept, else it is trained again.
+
+    Raises
+    ------
+    SpecError
+        If there is no such trial, it has not finished, or its team has no rules; one line.
+    """
+    with Store.open(directory) as store:
+        trial = finished_trial(store, condition, seed)
+        folder = team.folder_of(directory, trial, list(store.columns()))
+        return TeamExplanation(team.explain(store, trial), folder)

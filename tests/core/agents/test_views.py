@@ -1,0 +1,99 @@
+"""Agents with views of their own: errors that stay, plans of their own, what is measured of it."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from acting import look
+
+from nested_agents.core.agents.fuzzy import FuzzyAgents
+from nested_agents.core.agents.team import Team
+from nested_agents.core.agents.views import agreement
+from nested_agents.core.decision.errors import Errors, ErrorSettings
+from nested_agents.core.decision.settings import DecisionSettings
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.learners.batch import BatchTDSettings
+
+SEED = np.random.SeedSequence(7)
+
+
+def team_of(world, told: str = "ancestors", **decision) -> Team:
+    settings = BatchTDSettings(decision=DecisionSettings(evaluator="best-response", **decision))
+    hierarchy = Hierarchy(world.agents, list(pairwise(world.agents)), told=told)
+    team = Team(settings, world, hierarchy, SEED)
+    rng = np.random.default_rng(3)
+    theta = team.only(FuzzyAgents).learner.theta
+    theta[:] = rng.standard_normal(theta.shape)
+    return team
+
+
+@pytest.fixture
+def world(line_world):
+    return line_world(carts=3, wheels=1, closed=0.05)
+
+
+def test_errors_are_of_the_size_that_is_said_and_stay() -> None:
+    theta = np.random.default_rng(0).standard_normal((2, 5000)) * [[1.0], [10.0]]
+    every = [np.array([0]), np.array([0, 1])]
+    errors = Errors(ErrorSettings(weights=0.3), every, [0, 1], 5000, 0, SEED)
+    off = errors.weights(1, theta) - theta
+    np.testing.assert_allclose(off.std(axis=1) / theta.std(axis=1), 0.3, rtol=0.05)
+    np.testing.assert_array_equal(errors.weights(1, theta) - theta, off)
+    np.testing.assert_array_equal(errors.weights(0, theta)[1], theta[1])  # not its concern
+    assert (errors.weights(0, theta)[0] != errors.weights(1, theta)[0]).any()
+    half = Errors(ErrorSettings(weights=0.15), every, [0, 1], 5000, 0, SEED)
+    np.testing.assert_allclose(half.weights(1, theta) - theta, off / 2)
+
+
+def test_agreement_by_hand() -> None:
+    joint = np.array([1, 2, 3])
+    assert agreement({0: joint, 1: joint}, joint) == 1.0
+    assert agreement({0: np.array([0, 2, 0])}, joint) == 0.5  # its own action does not count
+    assert agreement({0: np.array([1, 0, 0]), 2: joint}, joint) == 0.5
+
+
+def test_silent_agents_without_errors_do_what_they_did(world) -> None:
+    world.reset(0)
+    seen = look(world, world.present())
+    joint = [
+        team_of(world, "none", errors=errors).act(seen, explore=False).joint_action
+        for errors in (None, ErrorSettings())
+    ]
+    np.testing.assert_array_equal(*joint)
+
+
+def test_what_was_expected_and_communicated_is_measured(world) -> None:
+    world.reset(0)
+    seen = look(world, world.present())
+    plain = team_of(world, value_of="own")
+    plain.act(seen)
+    assert plain.costs == ()
+    told = team_of(world, value_of="own", errors=ErrorSettings(weights=0.2))
+    told.act(seen, explore=False)
+    assert told.spent["told"] == 3.0
+    assert told.spent["broadcast"] == 6.0
+    assert 0.0 <= told.spent["agreement"] <= 1.0
+    silent = team_of(world, "none", value_of="own", errors=ErrorSettings(weights=0.2))
+    silent.act(seen, explore=False)
+    assert silent.spent["told"] == 0.0
+
+
+def test_agents_without_errors_that_tell_expect_what_is_done(world) -> None:
+    """The last of a chain is told all; with one value of the team each expects the same."""
+    team = team_of(world, value_of="team", errors=ErrorSettings())
+    world.reset(0)
+    team.act(look(world, world.present()), explore=False)
+    assert team.spent["agreement"] >= 2 / 3
+
+
+@pytest.mark.parametrize(
+    ("decision", "problem"),
+    [
+        ({"errors": ErrorSettings(constants=0.1)}, "learner.decision.errors.constants = 0.1: "),
+        ({"errors": ErrorSettings(), "plan": "common"}, "no plan in common"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(world, decision, problem: str) -> None:
+    with pytest.raises(ValueError, match=problem) as error:
+        team_of(world, **decision)
+    assert "\n" not in str(error.value)

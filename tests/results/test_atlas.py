@@ -1,0 +1,106 @@
+"""The atlas: rows of trials, laws of small teams tested on large ones, and the committed rows."""
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nested_agents.core.numerics import pd
+from nested_agents.results import SPECS, atlas
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.spec import Spec
+
+pytest.importorskip("pyarrow")
+
+
+def rows_of(of_star: float = 1.0, fault: str = "") -> pd.DataFrame:
+    """Return rows of two hierarchies at 2 to 64 agents, with five seeds."""
+    rng = np.random.default_rng(0)
+    lines = []
+    for hierarchy, size, seed in product(("chain", "star"), (2, 4, 8, 16, 32, 64), range(5)):
+        steps = 10.0 * size**0.5 * float(np.exp(rng.normal(0.0, 0.05)))
+        success = (0.9 if hierarchy == "chain" else 0.5 * of_star) + 0.05 * rng.uniform()
+        team = ("boxes", hierarchy, "batch-td", fault or atlas.NO_FAULT)
+        lines.append((*team, size, seed, 20, success, steps))
+    names = [*atlas.TeamKind._fields, "size", "seed", "episodes", "success", "steps"]
+    return pd.DataFrame(lines, columns=names)
+
+
+def test_laws_of_small_teams_meet_large_ones() -> None:
+    checked = [check for check in atlas.checks(rows_of()) if check.measure == "steps"]
+    assert [check.size for check in checked] == [32, 64, 32, 64]
+    assert {check.law for check in checked} == {"power law"}
+    inside = sum(check.is_inside for check in checked)
+    assert inside >= 3
+    assert atlas.coverage(checked)[0].startswith(f"all: {inside} of 4 inside, 2 laws, share ")
+
+
+def test_a_law_that_does_not_go_on_is_found_out() -> None:
+    rows = rows_of()
+    rows.loc[rows["size"] == 64, "steps"] *= 10.0
+    inside = {c.size: c.is_inside for c in atlas.checks(rows) if c.measure == "steps"}
+    assert inside == {32: True, 64: False}
+
+
+def test_the_best_hierarchy_is_chosen_by_small_teams() -> None:
+    choice = atlas.choices(rows_of())[0]
+    assert (choice.predicted, choice.measured) == ("chain", "chain")
+    assert choice.p < 0.001
+    assert str(choice).startswith("boxes, batch-td, 32 agents: chain was predicted: best, less the")
+
+
+def test_what_losing_messages_costs_is_paired_by_seed() -> None:
+    lost = rows_of(fault="lost 0.3")
+    lost["success"] -= 0.2 + 0.01 * lost["seed"]
+    lines = atlas.losses(pd.concat([rows_of(), lost]))
+    assert len(lines) == 12
+    assert all(float(one.difference.value) == pytest.approx(-0.22) for one in lines)
+
+
+def test_committed_rows_are_made_again_from_published_ones() -> None:
+    committed = pd.read_parquet(atlas.COMMITTED / f"{atlas.ALREADY}.parquet")
+    pd.testing.assert_frame_equal(committed, atlas.published_rows())
+
+
+@pytest.mark.parametrize("spec", sorted((SPECS / "atlas").glob("*.toml")), ids=lambda p: p.stem)
+def test_names_of_conditions_are_hierarchy_learner_and_fault(spec: Path) -> None:
+    for condition in Spec.load(spec).conditions():
+        parts = str(condition.columns["name"]).split(", ")
+        assert len(parts) in (2, 3)
+        assert len([key for key in condition.columns if key in atlas.SIZES]) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--jobs", "2"], "--jobs: needs --out"),
+        (["--rows", "nowhere"], "nowhere: holds no rows of the atlas"),
+        (["--out", "there", "--task", "arm"], "--task = 'arm': did you mean 'arms'?"),
+    ],
+)
+def test_bad_input(
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["atlas", *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_the_command_prints_what_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["atlas"]) == 0
+    page = Path(__file__).resolve().parents[2] / "docs" / "atlas.md"
+    assert capsys.readouterr().out.strip() in page.read_text(encoding="utf-8")
+
+
+def test_the_page_has_the_law_of_decisions_to_success(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["fit", str(atlas.ROWS / "scaling.json"), "--criterion", ".8", "--predict", "32"]
+    assert main(arguments) == 0
+    page = Path(__file__).resolve().parents[2] / "docs" / "atlas.md"
+    shown = capsys.readouterr().out.splitlines()
+    text = page.read_text(encoding="utf-8")
+    assert all(line.rstrip() in text for line in shown)

@@ -1,0 +1,53 @@
+"""Settings of what others run: they say what is so, and the notebook runs."""
+
+import json
+import os
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+
+
+def read(name: str) -> Any:
+    return yaml.safe_load((ROOT / name).read_text(encoding="utf-8"))
+
+
+def test_the_workflow_runs_what_ci_runs_on_the_versions_that_are_promised() -> None:
+    job = read(".github/workflows/tests.yml")["jobs"]["tests"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    named = re.findall(r"Python :: (3\.\d+)", "\n".join(project["classifiers"]))
+    assert [v for v in job["strategy"]["matrix"]["python"] if v != "3.13"] == named
+    assert job["steps"][-1]["run"] == "bash .ci/run"
+
+
+def test_hooks_and_pages_use_the_one_door() -> None:
+    (local,) = read(".pre-commit-config.yaml")["repos"]
+    assert all(hook["entry"].startswith("./dev ") for hook in local["hooks"])
+    assert "./dev docs" in read(".readthedocs.yaml")["build"]["commands"][0]
+
+
+def test_the_container_is_not_root() -> None:
+    lines = (ROOT / "Containerfile").read_text(encoding="utf-8").splitlines()
+    assert lines.index("USER agent") < lines.index("RUN ./dev setup")
+    assert lines[-1] == 'CMD ["./dev", "test"]'
+
+
+@pytest.mark.slow
+def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    notebook = json.loads((ROOT / "examples" / "colab.ipynb").read_text(encoding="utf-8"))
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    texts = ["".join(c["source"]) for c in cells if "install" not in c["metadata"].get("tags", [])]
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    for text in texts:
+        short = text.replace("seeds=4, episodes=12, steps=100", "seeds=2, episodes=2, steps=9")
+        *above, last = short.rstrip().splitlines()
+        exec("\n".join(above), names)
+        shown = eval(last, names) if "=" not in last.partition("(")[0] else exec(last, names)
+        assert shown is not None
+    assert os.listdir("out") == ["colab"]
