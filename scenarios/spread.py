@@ -23,7 +23,8 @@ from pydantic import Field
 from ..core.interface.measures import Measure
 from ..core.interface.scenario import Scenario, Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
-from ..core.interface.worlds import StackedWorlds, Transitions
+from ..core.interface.stacked import StackedWorlds
+from ..core.interface.worlds import Transitions
 from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 

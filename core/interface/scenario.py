@@ -20,11 +20,10 @@ from ..numerics import BoolArray, FloatArray, IntArray
 from .measures import Measure
 from .prediction import EmbodiedPrediction, Prediction
 from .spaces import ActionSet, StateSpace
+from .worlds import Worlds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from .worlds import Worlds
 
 
 @dataclass(frozen=True)

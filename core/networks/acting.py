@@ -29,7 +29,7 @@ InputNames = Mapping[str, Sequence[str]]
 """By network, ``policy_net`` and ``value_net``, what each of its inputs is."""
 
 
-class Policy(ABC):
+class SharedPolicy(ABC):
     """A policy and its critic, of agents that share their weights."""
 
     actor: Callable[[FloatArray], FloatArray]
@@ -136,7 +136,7 @@ class Policies(Agents[PolicyInputs]):
         self._rows = np.full(n, -1)
         self._rows[self.members] = rows
         self._n_joint = self.inputs.n_joint if settings.critic == "central" else 0
-        self.policies: Mapping[str, Policy] = {
+        self.policies: Mapping[str, SharedPolicy] = {
             str(name): self.policy_of(self.members[rows == row]) for row, name in enumerate(names)
         }
         self._actors = [policy.actor for policy in self.policies.values()]
@@ -165,7 +165,7 @@ class Policies(Agents[PolicyInputs]):
         return sum(policy.weight_bytes for policy in self.policies.values())
 
     @abstractmethod
-    def policy_of(self, agents: IntArray) -> Policy:
+    def policy_of(self, agents: IntArray) -> SharedPolicy:
         """Return the policy and critic of agents that share weights."""
 
     @property

@@ -21,8 +21,8 @@ from ..interface.agents import Memory, Placement, under
 from ..interface.experience import Observation
 from ..interface.worlds import Transitions
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
-from .acting import InputNames, Policies, Policy, PolicyInputs
-from .perceptron import Adam, Moments, Perceptron
+from .acting import InputNames, Policies, PolicyInputs, SharedPolicy
+from .perceptron import Adam, Perceptron, RunningMoments
 from .settings import MultiAgentPPOSettings
 
 MOST_GRADIENT = 0.5
@@ -59,8 +59,8 @@ class Batch(NamedTuple):
         )
 
 
-class NetworkPolicy(Policy):
-    """Policy and critic of agents that share these weights, their rollout and update.
+class NetworkPolicy(SharedPolicy):
+    """SharedPolicy and critic of agents that share these weights, their rollout and update.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class NetworkPolicy(Policy):
         self.actor.begin_orthogonal(rng, 0.01)
         self.critic.begin_orthogonal(rng, 1.0)
         self._adam = Adam(self.weights, self.gradient)
-        self._moments = Moments()
+        self._moments = RunningMoments()
         self._discounted: FloatArray = np.zeros(0)
         self._held: dict[str, AnyArray] = {}
         self._steps = 0

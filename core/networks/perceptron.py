@@ -149,7 +149,7 @@ class Adam:
         self._steps = int(memory["steps"])
 
 
-class Moments:
+class RunningMoments:
     """Mean and variance of all numbers so far, taken in many at a time (Chan et al. 1979)."""
 
     def __init__(self) -> None:

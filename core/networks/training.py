@@ -22,7 +22,7 @@ from stable_baselines3.common.torch_layers import MlpExtractor
 
 from ..interface.agents import Memory, under
 from ..numerics import AnyArray, FloatArray, IntArray
-from .acting import InputNames, Policy
+from .acting import InputNames, SharedPolicy
 from .inputs import RewardScale
 from .settings import PolicyGradientSettings
 
@@ -166,8 +166,8 @@ class SplitPolicy(ActorCriticPolicy):
         self.mlp_extractor = SplitExtractor(*self._seen, self.net_arch, self.activation_fn)
 
 
-class ActorCritic(Policy):
-    """Policy and critic with their buffer and update, for agents that share these weights.
+class ActorCritic(SharedPolicy):
+    """SharedPolicy and critic with their buffer and update, for agents that share these weights.
 
     Parameters
     ----------

@@ -38,7 +38,8 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
-from ...core.interface.worlds import StackedWorlds, Transitions
+from ...core.interface.stacked import StackedWorlds
+from ...core.interface.worlds import Transitions
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.words import closest

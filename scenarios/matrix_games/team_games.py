@@ -28,7 +28,8 @@ from ...core.coordination.graphs import Elimination, Shape, build_shape
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ...core.interface.worlds import StackedWorlds, Transitions
+from ...core.interface.stacked import StackedWorlds
+from ...core.interface.worlds import Transitions
 from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings
 from .scenario import OF_OPTIMA

@@ -25,7 +25,7 @@ from ...core.agents.team import Team
 from ...core.interface.plain import as_scenario
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario
-from ...core.interface.worlds import LoopedWorlds
+from ...core.interface.stacked import LoopedWorlds
 from ..spec.controls import LEARN_NOTHING
 from ..store.database import EVALUATION, STAGE
 from ..store.durable import TEAM, Recording

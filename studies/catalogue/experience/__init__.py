@@ -81,7 +81,7 @@ def measure(trial: Trial) -> TrialResult:
     return session.finish({DECISIONS: float(done)}, usage)
 
 
-class LearningCourse(NamedTuple):
+class ReturnCourse(NamedTuple):
     """How one condition fares with experience."""
 
     condition: str
@@ -122,7 +122,7 @@ def analyse(results: Results) -> Analysis:
             estimates["CPU [s]"] = bootstrap(numbers[last])
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
         stacked = stack_estimates([*values.values()])
-        courses.append(LearningCourse(condition, np.array([*values], float), stacked))
+        courses.append(ReturnCourse(condition, np.array([*values], float), stacked))
     if not courses:
         return Analysis(())
     means = [results.means(condition, "evaluation", name) for condition in conditions]

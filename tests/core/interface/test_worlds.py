@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.interface.plain import as_scenario
-from nested_agents.core.interface.worlds import LoopedWorlds
+from nested_agents.core.interface.stacked import LoopedWorlds
 from nested_agents.scenarios import SCENARIOS
 
 TABLES = {

@@ -10,7 +10,7 @@ from nested_agents.core.hierarchy.failures import LeftAgents
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Observation
 from nested_agents.core.networks.many_worlds import Batch, NetworkPolicy, estimate, share_left
-from nested_agents.core.networks.perceptron import Moments, orthogonal
+from nested_agents.core.networks.perceptron import RunningMoments, orthogonal
 from nested_agents.core.networks.settings import (
     HierarchyPPOSettings,
     IPPOSettings,
@@ -74,7 +74,7 @@ def test_advantages_by_hand():
 
 def test_moments_are_those_of_all_numbers():
     parts = [np.arange(5.0), np.array([[10.0, -3.0]]), np.full(3, 2.0)]
-    moments = Moments()
+    moments = RunningMoments()
     for part in parts:
         moments.add(part)
     every = np.concatenate([part.ravel() for part in parts])
