@@ -368,4 +368,4 @@ class BoxPushing(Scenario, Embodiment):
             self.box.friction_radius,
         )
         own = self._space.own(poses[self._body], self._speeds, self._goal)
-        return np.hstack([own, self._space.sense(view, range(len(poses)))[self._body, 0]])
+        return np.hstack([own, self._space.observe(view)[self._body]])

@@ -155,7 +155,7 @@ class StudyResults:
     def power(self) -> tuple[str, ...]:
         """What comparisons with the first condition can find, as `compare` says it."""
         is_measured = SUCCESS.name in (measure.name for measure in self.results.measures)
-        return power_with_first(self.results) if is_measured else ()
+        return power_with_first(self.results) if is_measured and self.results.phases else ()
 
     @cached_property
     def analysis(self) -> Any:

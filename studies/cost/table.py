@@ -27,6 +27,7 @@ from .cost import (
     CostRow,
     StepCost,
     agents_below,
+    broadcasts,
     joint_actions,
     measure,
     messages,
@@ -86,6 +87,7 @@ def _record(row: CostRow) -> dict[str, object]:
         record["ratio"] = float(row.ratio) if row.ratio < 2**53 else round(row.ratio)
     if row.network is not None:
         record["messages"], record["messages_in_turn"] = row.network
+        record["broadcast"] = row.broadcast
     if row.formula is not None:
         counts = asdict(row.formula)
         record |= {f"{name}_formula_per_step": n for name, n in counts.items()}
@@ -156,6 +158,7 @@ def _table(rows: Sequence[CostRow]) -> str:
         lines += [*align(tables["network"], "><>>>>>>", 2), ""]
         lines += ["in turn: how many follow one another, others going at once, of 1 or 10 ms each;"]
         lines += ["*: on a channel that carries one message at a time."]
+        lines += ["Not counted: n (n - 1) states sent to others, to predict by (broadcast)."]
     return "\n".join(lines)
 
 
@@ -292,6 +295,7 @@ def cost_table(
             formula=step_formula(text, n) if measured else None,
             measured=measure(text, n, repeats) if measured else None,
             network=messages(text, n) if network else None,
+            broadcast=broadcasts(text, n) if network else 0,
         )
         rows.append(row)
     return CostTable(tuple(rows))

@@ -184,6 +184,8 @@ def values_of(results: Results, name: str, phase: str) -> tuple[Measure, dict[st
     """Return a measure, its means of seeds by condition, and the phase that they are of."""
     measures = {m.name: m for m in (*results.measures, *EPISODES)}
     name = next((m.name for m in measures.values() if m.heading == name), name)
+    if not results.phases:
+        raise SpecError("no trial has finished")
     if name in measures:
         if phase not in results.phases:
             raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")

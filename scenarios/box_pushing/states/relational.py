@@ -19,14 +19,16 @@ Built-in variables are compiled for prediction: with one of its seven shared var
 here, the decision of a team of two e-Pucks takes about a third longer.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from math import pi
 
 import numpy as np
 
-from ....core.numerics import FloatArray, njit, wrap
+from ....core.numerics import FloatArray, IntArray, njit, wrap
 from ....core.plugins.registry import Registry
 from ...state_variables import Situations, StateFunction, StateVariable, freeze, state_variable
 from ..world.geometry import Outline, surface
@@ -139,6 +141,15 @@ class View(Situations):
         """Turn ``(m,)`` of the box from the goal pose [rad]."""
         return freeze(wrap(self.box[:, 2] - self.goal[2]))
 
+    def seen_by_each(self) -> View:
+        """Return the only situation ``M`` times: in the k-th one robot k is the first.
+
+        The other robots follow in their order.
+        """
+        order = _each_first(self.gaps.shape[1])
+        boxes = np.repeat(self.box, len(order), axis=0)
+        return replace(self, robots=self.robots[0][order], box=boxes, gaps=self.gaps[0][order])
+
     def azimuth(self, robot: int) -> FloatArray:
         """Direction ``(m,)`` from a robot to the box [rad]."""
         pose = self.robots[:, robot]
@@ -152,6 +163,13 @@ class View(Situations):
         points = np.ascontiguousarray(points)
         boxes = np.ascontiguousarray(self.box)
         return _inward(points, boxes, self.outline.edges, self.outline.rounding)
+
+
+@cache
+def _each_first(number: int) -> IntArray:
+    """Return the orders ``(number, number)`` of robots in which each is the first."""
+    others = [[r for r in range(number) if r != first] for first in range(number)]
+    return np.array([[first, *behind] for first, behind in enumerate(others)])
 
 
 def _direction(ways: FloatArray) -> FloatArray:
@@ -306,7 +324,8 @@ def others_away(view: View, robot: int) -> FloatArray:
     Of a robot that is alone, its own.
     """
     others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
-    return np.clip(view.gaps[:, others] / AWAY, 0.0, 1.0).mean(axis=1)
+    gaps = np.ascontiguousarray(view.gaps[:, others])  # added up alike however many situations
+    return np.clip(gaps / AWAY, 0.0, 1.0).mean(axis=1)
 
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)

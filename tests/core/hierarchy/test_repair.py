@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from nested_agents.core.agents.loop import policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.hierarchy.failures import LeftAgents
+from nested_agents.core.hierarchy.failures import AbsentAgents, LeftAgents
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.hierarchy.messages import Messages
 from nested_agents.core.hierarchy.repair import without
@@ -131,6 +131,16 @@ def test_functions_that_have_left_are_not_called_and_pay_nothing() -> None:
             team.act(look(world))
             spent.append((team.spent["calls"], team.spent["messages"]))
     assert spent == [(3, 3), (2, 1)]
+
+
+def test_functions_that_are_absent_are_not_called_either() -> None:
+    source = "def decide(observation):\n    return 0\n"
+    with Sources(texts={"f.py": source}).active():
+        team, world = carts([AbsentAgents(agents="cart2")], {"kind": "f.py:decide"}, 3)
+        team.begin_world(0, 0)
+        assert team.act(look(world)).joint_action.tolist() == [0, 2, 0]
+    # cart2 says nothing, and cart3 hears cart1 alone
+    assert (team.spent["calls"], team.spent["messages"]) == (2, 1)
 
 
 def test_an_action_that_there_is_not_is_refused() -> None:

@@ -314,3 +314,24 @@ def test_shells_are_told_how_a_line_goes_on(monkeypatch, capsys):
     monkeypatch.setenv("COMP_CWORD", "2")
     assert main([]) == 0
     assert capsys.readouterr().out == "plain,--backend\n"
+
+
+def test_a_study_whose_trials_all_fail_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "dies.py").write_text(
+        "import nested_agents as na\n"
+        "from nested_agents.scenarios.line_up import LineUp\n\n\nclass Dies(LineUp):\n"
+        "    class Settings(na.ScenarioSettings):\n        carts: int = 2\n\n"
+        "    def step(self, joint_action):\n        raise RuntimeError('dies')\n"
+    )
+    (tmp_path / "spec.toml").write_text(
+        'seeds = 1\nepisodes = 1\nsteps = 2\nscenario = { kind = "dies.py:Dies" }\n'
+    )
+    line = ["run", str(tmp_path / "spec.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    assert main(line) == 1
+    out, err = capsys.readouterr()
+    assert "no trial has finished" in out
+    assert "1 trial failed: nested-agents status" in err
+    assert main(["compare", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err == "nested-agents: error: no trial has finished\n"

@@ -203,9 +203,10 @@ def test_what_a_network_costs(said) -> None:
     command = ("--agents", "8,1024", "--topology", "chain", "graph=coordination-graph", "--network")
     lines = said(*command)[1].splitlines()
     assert max(map(len, lines)) <= 80
-    assert lines[-7].split() == ["8", "chain", "28", "7", "0.007", "0.07", "0.028", "0.28"]
+    assert lines[-8].split() == ["8", "chain", "28", "7", "0.007", "0.07", "0.028", "0.28"]
     (record,) = json.loads(said("--agents", "8", "--network", "--format", "json")[1])
     assert (record["messages"], record["messages_in_turn"]) == (28, 7)
+    assert record["broadcast"] == 8 * 7
     assert said(*command, "--format", "latex")[1].count("tabular") == 4
 
 

@@ -247,6 +247,19 @@ def test_all_robots_sense_what_each_does_alone(space: BoxStateSpace) -> None:
     )
 
 
+@pytest.mark.parametrize("space", [*STATE_SPACES.values(), EVERY])
+@pytest.mark.parametrize("robots", [1, 2, 9, 64])
+def test_observing_has_the_bits_of_sensing_robot_by_robot(
+    space: BoxStateSpace, robots: int
+) -> None:
+    rng = np.random.default_rng(robots)
+    poses = 0.3 * rng.normal(size=(1, robots, 3))
+    gaps = 0.02 * np.abs(rng.normal(size=(1, robots)))
+    seen = View(poses, poses[:, 0] + 0.3, gaps, GOAL, ORIGIN, 1.0, SQUARE, 0.08)
+    expected = space.sense(seen, range(robots))[:, 0]
+    assert space.observe(seen).tobytes() == expected.tobytes()
+
+
 def test_what_is_common_is_sensed_once() -> None:
     asked = []
 
