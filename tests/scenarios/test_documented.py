@@ -1,4 +1,4 @@
-"""The documentation of worlds: its specs can be built, its code runs, its table is right."""
+"""The documentation of environments: its specs can be built, its code runs, its table is right."""
 
 import re
 from pathlib import Path
@@ -14,15 +14,16 @@ from nested_agents.studies.trials.arrangement import check_conditions
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TEXT = (DOCS / "worlds.md").read_text(encoding="utf-8")
+PAGES = TEXT + (DOCS / "environments.md").read_text(encoding="utf-8")
 TUTORIAL = (DOCS / "tutorials" / "scenario.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("spec", re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL))
+@pytest.mark.parametrize("spec", re.findall(r"```toml\n(.*?)```", PAGES, re.DOTALL))
 def test_specs(spec: str) -> None:
     check_conditions(Spec.parse(spec))
 
 
-@pytest.mark.parametrize("code", re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL))
+@pytest.mark.parametrize("code", re.findall(r"```python\n(.*?)```", PAGES, re.DOTALL))
 def test_code(code: str) -> None:
     exec(code, {"__name__": "example"})
 

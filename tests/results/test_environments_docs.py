@@ -1,4 +1,4 @@
-"""docs/worlds.md holds the table that the committed results give."""
+"""docs/environments_results.md holds the tables that the committed results give."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "worlds.md"
+PAGE = ROOT / "docs" / "environments_results.md"
 COLUMNS = ("success last 5", "evaluation success", "total reward")
 
 
@@ -31,7 +31,9 @@ COLUMNS = ("success last 5", "evaluation success", "total reward")
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
-    assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
+    assert table in PAGE.read_text(encoding="utf-8"), (
+        f"docs/environments_results.md: put in\n{table}"
+    )
 
 
 SPEED = 180.0
@@ -64,7 +66,9 @@ def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
         speeds = {t: bootstrap(v.mean(axis=1) / SPEED) for t, v in each.items()}
         lines.append(Summary(condition, len(results.seeds(condition)), speeds))
     table = tabulate(lines).markdown
-    assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
+    assert table in PAGE.read_text(encoding="utf-8"), (
+        f"docs/environments_results.md: put in\n{table}"
+    )
 
 
 @pytest.mark.parametrize(
@@ -81,7 +85,9 @@ def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixt
     of = ("--measure", "total_reward", "--format", "markdown")
     assert main(["compare", path, *of, *by]) == 0
     table = capsys.readouterr().out
-    assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
+    assert table in PAGE.read_text(encoding="utf-8"), (
+        f"docs/environments_results.md: put in\n{table}"
+    )
 
 
 @pytest.mark.slow
