@@ -55,7 +55,9 @@ MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
         "interface.spaces", "interface.scenario", "interface.prediction", "interface.measures",
         "interface.experience", "interface.agents", "interface.plain", "hierarchy.hierarchy",
-        "hierarchy.turns", "hierarchy.failures", "agents.team", "agents.fuzzy", "agents.peer",
+        "hierarchy.turns", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
+        "functions.settings", "functions.plain", "functions.recorded", "agents.mixed",
+        "agents.team", "agents.fuzzy", "agents.peer",
         "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
         "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
         "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",

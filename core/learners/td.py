@@ -30,7 +30,7 @@ import numpy as np
 from pydantic import Field
 
 from ..numerics import FloatArray, IntArray
-from ..plugins.settings import Fraction, NonNegative, Positive
+from ..plugins.settings import Fraction, NonNegative, Positive, unwritten
 from ..rules.kernels.updates import add_features, td_update
 from ..rules.rule_base import RuleBase
 from .learner import Learner, LearnerSettings
@@ -46,6 +46,8 @@ class Online(Learner):
     kept: tuple[str, ...] = ("theta", "trace", "reach")
     """Names of the arrays that are saved: those of rows, and of agents the `traces`."""
     traces = ("trace", "reach")
+    reward_of: Literal["left", "entered"] = "left"
+    """Whose reward is in the TD error of a step: of the state left, or of the one entered."""
 
     def __init__(self, settings: Any, rules: RuleBase, rows: IntArray) -> None:
         self.settings, self.discount = settings, settings.discount
@@ -85,10 +87,12 @@ class Online(Learner):
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
         """Update for the step from the previous states to these."""
         changed = 0
+        entered = np.broadcast_to(np.asarray(reward, dtype=float), (len(states),)).copy()
         if self._previous is not None:
-            changed += self._update(self._previous, self._rewards, states)
+            rewards = self._rewards if self.reward_of == "left" else entered
+            changed += self._update(self._previous, rewards, states)
         self._previous = states.copy()
-        self._rewards = np.broadcast_to(np.asarray(reward, dtype=float), (len(states),)).copy()
+        self._rewards = entered
         if terminated:
             changed += self._update(states, self._rewards / (1.0 - self.discount), None)
         return changed
@@ -99,7 +103,7 @@ class Online(Learner):
 
     @abstractmethod
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        """Learn from R(s) of `states` and the states entered after them, none if terminal.
+        """Learn from the rewards of `states` and the states entered after them, none if terminal.
 
         Returns the number of weights changed.
         """
@@ -166,6 +170,9 @@ class TDLambdaSettings(LearnerSettings):
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
     """Steps over which the weights that decide average those that learn; 1: they are the same."""
+    reward_of: Annotated[Literal["left", "entered"], unwritten("left")] = "left"
+    """Whose reward R in Eq. 7 is: of the state that a step leaves, s_previous, as it is printed
+    there; or of the one that it enters, as Section V calculates rewards, after the move."""
 
 
 class TDLambda(Online):
@@ -180,6 +187,10 @@ class TDLambda(Online):
     With a normalised step size alpha is divided by the squared length of phi(s), so that
     ``step_size = 1`` would remove the TD error of s at once.
 
+    R(s') stands in place of R(s) with ``reward_of = "entered"``, as Section V can be read: then a
+    value does not contain the reward of its own state, which all after-states of a decision differ
+    in. A terminal state is worth the same in either reading.
+
     With averaging over n steps this is learned by w in place of theta, and the agent decides by::
 
         theta = theta + (w - theta) / min(t, n)    after t updates
@@ -190,6 +201,7 @@ class TDLambda(Online):
 
     def __init__(self, settings: TDLambdaSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
+        self.reward_of = settings.reward_of
         self.updates: FloatArray = np.zeros(())
         if settings.averaging > 1:
             self.weights = np.zeros_like(self.theta)

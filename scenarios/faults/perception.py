@@ -20,14 +20,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import networkx as nx
 import numpy as np
 
 from ...core.interface.plain import as_prediction
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import StateSpace
-from ...core.numerics import BoolArray, FloatArray, IntArray, stream_of
+from ...core.numerics import BoolArray, FloatArray, IntArray, nx, stream_of
 from ...core.plugins.settings import PerceptionSettings, mask_of
 
 STREAM = 2**32 - 6

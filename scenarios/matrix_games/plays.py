@@ -360,7 +360,7 @@ def _learning(learner: Learner) -> Learning | None:
     if not isinstance(learner, Online) or learner.discount > 0.0:
         return None
     s = learner.settings
-    if type(learner) is TDLambda and s.averaging == 1:
+    if type(learner) is TDLambda and s.averaging == 1 and s.reward_of == "left":
         return known._replace(step_size=s.step_size)
     if type(learner) is OptimisticTD:
         return known._replace(step_size=s.step_size, falling=s.falling)

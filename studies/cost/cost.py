@@ -117,6 +117,10 @@ class CostRow:
     measured: StepCost | None = None
     network: tuple[int, int] | None = None
     """If asked for, messages of a decision, and how many of them follow one another."""
+    broadcast: int = 0
+    """If these are, states that are sent to agents beside them."""
+    free: int = 0
+    """Most agents for which one decides, itself included; of hierarchies alone, else 0."""
 
     @property
     def by_formula(self) -> dict[str, int | Fraction | None]:
@@ -157,6 +161,15 @@ def messages(text: str, n: int) -> tuple[int, int]:
         return hierarchy.messages, hierarchy.depth - 1
     rounds = MaxPlusSettings().rounds
     return (rounds * hierarchy.messages, rounds) if text == "max-plus" else (2 * n - 2, 2 * n - 2)
+
+
+def broadcasts(text: str, n: int) -> int:
+    """Return how many states are sent to agents before a decision, beside its messages.
+
+    Each agent sends its own to all others, from which they predict. A single agent is told states
+    by the messages that it hears.
+    """
+    return 0 if text == SINGLE_AGENT else n * (n - 1)
 
 
 def _hierarchy(text: str, n: int) -> Hierarchy:

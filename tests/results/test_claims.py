@@ -279,6 +279,8 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "edges-arms",
         "edges-games",
         "edges-broken",
+        "edges-again",
+        "signals",
         "edges-sixteen",
         "orders-arm",
         "orders-arm-ppo",

@@ -92,7 +92,7 @@ def p_of(of_seeds: np.ndarray) -> str:
     return "< .001" if p < 0.001 else f"{p:.1g}".removeprefix("0") if p < 0.1 else f"{p:.2f}"[1:]
 
 
-EQUAL_TREATMENT = ("edges",)
+EQUAL_TREATMENT = ("edges", "edges-again")
 """Rows whose evaluations are compared with the chain over all settings."""
 
 
@@ -106,6 +106,23 @@ def test_what_is_equal_to_the_chain(name: str) -> None:
         longer = f"{value:.2f} [{low:.2f}, {high:.2f}] times"
         line = f"| {other} | {gained} | {success.verdict} | {longer} | {decisions.verdict} |"
         assert line in page, f"docs/topologies.md: put in\n{line}"
+
+
+def test_the_table_of_equal_treatment(capsys: pytest.CaptureFixture[str]) -> None:
+    columns = ("evaluation success", "decisions to goal")
+    cells = {}
+    for name in EQUAL_TREATMENT:
+        for line in print_table(name, columns, capsys).splitlines()[2:]:
+            label, _, *values = line[2:-2].split(" | ")
+            cells[label.removeprefix("2 robots, ").removeprefix("own, ")] = " | ".join(values)
+    for row, maintain, plans in (
+        ("told and considering", "as trained", "told, own plans"),
+        ("told only", "told only", "told only, plans"),
+        ("considered only", "considered only", "considered only, private plans"),
+        ("neither", "neither", "neither, plans"),
+    ):
+        line = f"| {row} | {cells[maintain]} | {cells[plans]} |"
+        assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
 
 
 EVALUATED_AS = (

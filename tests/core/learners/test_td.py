@@ -75,6 +75,30 @@ def test_eight_rules_over_three_steps_by_hand() -> None:
     assert learner.theta[0] == pytest.approx(expected, abs=1e-15)
 
 
+def test_the_reward_of_the_state_entered_by_hand() -> None:
+    # Section V's reading of Eq. 7. alpha = 0.5, gamma = 0.9, lambda = 0; states 0, 1, 2 of a table.
+    learner = learner_of(TABLE, step_size=0.5, discount=0.9, trace_decay=0.0, reward_of="entered")
+    learner.begin_episode()
+    learner.observe(np.array([[0.0]]), 7.0, False)  # nothing comes before it: its R is not learned
+    learner.observe(np.array([[1.0]]), 2.0, False)  # delta = 2 + 0 - 0, theta_0 = 1
+    assert learner.theta[0] == pytest.approx([1.0, 0, 0, 0, 0])
+    # Terminal, R = 3: theta_1 = 0.5 * 3; then entered for ever, theta_2 = 0.5 * 3 / 0.1 = 15.
+    learner.observe(np.array([[2.0]]), 3.0, True)
+    assert learner.theta[0] == pytest.approx([1.0, 1.5, 15.0, 0, 0])
+
+
+def test_in_the_limit_the_readings_differ_by_the_reward_of_the_state() -> None:
+    # States 0, 1, 2 with R = 1, 2, 4, the last for ever, gamma = 0.5. R of the state left:
+    # f = 4 / 0.5 = 8, 2 + 4 = 6, 1 + 3 = 4; of the state entered: 8, 4 + 4 = 8, 2 + 4 = 6.
+    expected = {"left": [4.0, 6.0, 8.0], "entered": [6.0, 8.0, 8.0]}
+    states = np.array([[0.0], [1.0], [2.0]])
+    for reading, values in expected.items():
+        learner = learner_of(TABLE, step_size=0.5, discount=0.5, trace_decay=0.0, reward_of=reading)
+        for _ in range(60):
+            feed(learner, states, np.array([1.0, 2.0, 4.0]), True)
+        assert learner.theta[0, :3] == pytest.approx(values)
+
+
 def test_a_terminal_state_by_hand() -> None:
     # The same episode, but the last state is terminal: it is followed by itself for ever, worth
     # 0.5 / (1 - 0.9) = 5. delta = 5 - 0.46722499375 = 4.53277500625; e_LLL = 0.45 * 0.4275 + 1

@@ -203,9 +203,10 @@ def test_what_a_network_costs(said) -> None:
     command = ("--agents", "8,1024", "--topology", "chain", "graph=coordination-graph", "--network")
     lines = said(*command)[1].splitlines()
     assert max(map(len, lines)) <= 80
-    assert lines[-7].split() == ["8", "chain", "28", "7", "0.007", "0.07", "0.028", "0.28"]
+    assert lines[-8].split() == ["8", "chain", "28", "7", "0.007", "0.07", "0.028", "0.28"]
     (record,) = json.loads(said("--agents", "8", "--network", "--format", "json")[1])
     assert (record["messages"], record["messages_in_turn"]) == (28, 7)
+    assert record["broadcast"] == 8 * 7
     assert said(*command, "--format", "latex")[1].count("tabular") == 4
 
 
@@ -323,3 +324,9 @@ def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
     rows = cost_table(["chain"], [2], Problem(), measured=True).rows
     (record,) = json.loads(format_rows(rows, "json"))
     assert record["joint_actions_per_step"] == record["joint_actions_formula_per_step"] == 20
+
+
+@pytest.mark.parametrize(("agents", "is_said"), [("5", False), ("5:6", True)])
+def test_where_the_default_evaluator_is_another_one_is_said(said, agents, is_said) -> None:
+    out = said("--agents", agents, "--topology", "chain", "star", "independent", "best-response")[1]
+    assert ("see best-response. Rows: chain, star.\n" in out) == is_said
