@@ -312,7 +312,9 @@ def _losses(task: str, rows: pd.DataFrame, measure: str, sign: int) -> Iterator[
 
 
 def _holm(lines: Sequence[MessageLoss]) -> list[MessageLoss]:
-    adjusted = holm([line.p for line in lines]) if lines else []
+    if not lines:
+        return []
+    adjusted = holm([line.p for line in lines])
     return [line._replace(p=float(p)) for line, p in zip(lines, adjusted, strict=True)]
 
 

@@ -23,6 +23,7 @@ SCENARIOS = SettingsRegistry(
         "signals": f"{__name__}.signals.scenario:SignalsSettings",
         "kinematic-chain": f"{__name__}.kinematic_chain.config:KinematicChainSettings",
         "line-up": f"{__name__}.line_up:LineUpSettings",
+        "spread": f"{__name__}.spread:SpreadSettings",
         "gymnasium": f"{__name__}.adapters.settings:GymnasiumSettings",
         "pettingzoo": f"{__name__}.adapters.settings:PettingZooSettings",
     },

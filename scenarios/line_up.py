@@ -25,6 +25,8 @@ from ..core.interface.measures import SUCCESS, Measure
 from ..core.interface.prediction import Blocks, Prediction, Tables
 from ..core.interface.scenario import Scenario, Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
+from ..core.interface.stacked import StackedWorlds
+from ..core.interface.worlds import Transitions
 from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 
@@ -126,14 +128,49 @@ class LineUp(Scenario):
         """Return this scenario: its predictions are exact."""
         return self
 
+    def worlds(self, count: int) -> LineUpWorlds:
+        """Return many such worlds, stepped in one call."""
+        return LineUpWorlds(self, count)
+
     def _commanded(self, joint_actions: IntArray) -> FloatArray:
-        unit = np.array([INCREMENT])
-        limit = np.array([MAX_SPEED])
-        return self.action_set.apply(self._commands, joint_actions, unit, limit)
+        return commanded(self._commands, joint_actions, self.action_set)
 
     def _states(self) -> FloatArray:
-        lead = self._places - self._places.mean()
-        return np.stack([self._places, lead], axis=1)
+        return observe(self._places)
+
+
+class LineUpWorlds(StackedWorlds[LineUp]):
+    """Many worlds of carts."""
+
+    def stack(self, world: LineUp, count: int) -> None:
+        """Make room."""
+        self._places: FloatArray = np.zeros((count, len(world.agents)))
+        self._speeds: FloatArray = np.zeros_like(self._places)
+        self._commands: FloatArray = np.zeros_like(self._places)
+
+    def take(self, place: int, world: LineUp) -> None:
+        """Put the carts in their places, at rest."""
+        self._places[place] = world._places
+        self._speeds[place] = 0.0
+        self._commands[place] = 0.0
+
+    def step(self, joint_actions: IntArray) -> Transitions:
+        """Carry out joint actions ``(W, n)`` for one period."""
+        self._commands = commanded(self._commands, joint_actions, self.scenario.action_set)
+        self._places, self._speeds = advance(self._places, self._speeds, self._commands)
+        arrived = np.all(np.abs(self._places) < TOLERANCE, axis=1)
+        paid = np.broadcast_to(reward(self._places)[:, None], joint_actions.shape)
+        return Transitions(observe(self._places), paid, arrived, np.zeros(self.count, dtype=bool))
+
+
+def commanded(commands: FloatArray, joint_actions: IntArray, actions: ActionSet) -> FloatArray:
+    """Return the speeds ``(..., n)`` [m/s] that joint actions command."""
+    return actions.apply(commands, joint_actions, np.array([INCREMENT]), np.array([MAX_SPEED]))
+
+
+def observe(places: FloatArray) -> FloatArray:
+    """Return the states ``(..., n, 2)`` of carts at places ``(..., n)`` [m]."""
+    return np.stack([places, places - places.mean(axis=-1, keepdims=True)], axis=-1)
 
 
 class LineUpPrediction(Prediction, Tables):

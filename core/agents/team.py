@@ -19,7 +19,8 @@ from ..interface.experience import Decision, Experience, Observation
 from ..interface.measures import Measure
 from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
-from ..numerics import AnyArray, IntArray
+from ..interface.worlds import Transitions
+from ..numerics import AnyArray, BoolArray, IntArray
 from .kept import begin_with
 
 if TYPE_CHECKING:
@@ -262,6 +263,11 @@ class Team:
         """Learn from what a decision led to."""
         for part, inputs in zip(self.parts, experience.decision.inputs, strict=True):
             part.learn(experience, inputs)
+
+    def learn_in_worlds(self, decision: Decision, steps: Transitions, last: BoolArray) -> None:
+        """Learn from what a decision led to in many worlds, of which some episodes end."""
+        for part, inputs in zip(self.parts, decision.inputs, strict=True):
+            part.learn_in_worlds(decision.joint_action, inputs, steps, last)
 
     def continue_from(self, former: Team) -> None:
         """Begin where the team of another scenario or hierarchy ended, between two episodes.

@@ -18,10 +18,11 @@ import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn
-from ..numerics import AnyArray, IntArray
+from ..numerics import AnyArray, BoolArray, IntArray
 from .experience import Experience, Observation
 from .measures import Measure
 from .scenario import Scenario
+from .worlds import Transitions
 
 I = TypeVar("I")  # noqa: E741 - the inputs of a kind of agents
 Memory = dict[str, AnyArray]
@@ -159,6 +160,24 @@ class Agents(ABC, Generic[I]):
 
     def learn(self, experience: Experience, inputs: I) -> None:
         """Learn from what a decision led to; of the `last` one of an episode, all of it."""
+
+    def learn_in_worlds(
+        self, joint: IntArray, inputs: I, steps: Transitions, last: BoolArray
+    ) -> None:
+        """Learn from what a decision led to in many worlds at once, if they can.
+
+        Parameters
+        ----------
+        joint
+            ``(W, n)`` what was decided.
+        inputs
+            What it was decided by.
+        steps
+            What it led to.
+        last
+            ``(W,)`` whether an episode ends with it.
+        """
+        raise NotImplementedError(f"{type(self).__name__} learns in one world")
 
     @abstractmethod
     def memory(self) -> Memory:

@@ -20,6 +20,7 @@ from ..numerics import BoolArray, FloatArray, IntArray
 from .measures import Measure
 from .prediction import EmbodiedPrediction, Prediction
 from .spaces import ActionSet, StateSpace
+from .worlds import Worlds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -166,6 +167,10 @@ class Scenario(ABC):
     @abstractmethod
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out a joint action ``(n,)`` for one decision period."""
+
+    def worlds(self, count: int) -> Worlds | None:
+        """Return many worlds of the same settings, stepped in one call; None: it has no such."""
+        return None
 
     @property
     def predicts(self) -> bool:

@@ -161,6 +161,11 @@ class TeamSettings(PartSettings):
         return [MembersOf(np.arange(len(hierarchy)), self)]
 
     @property
+    def at_once(self) -> int:
+        """In how many worlds it learns at once."""
+        return 1
+
+    @property
     def needs_prediction(self) -> bool:
         """Whether it acts only in scenarios that predict, see `core.interface.scenario`."""
         return False

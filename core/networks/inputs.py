@@ -68,20 +68,27 @@ class Inputs:
         ]
 
     def each(self, states: FloatArray) -> FloatArray:
-        """Return the inputs ``(n, n_own)`` of every agent: its state, and which one it is."""
-        return np.hstack([self._scaled(states), self._identities])
+        """Return the inputs ``(..., n, n_own)`` of every agent: its state, and which one it is."""
+        scaled = self._scaled(states)
+        identities = np.broadcast_to(
+            self._identities, (*scaled.shape[:-1], len(self._identities.T))
+        )
+        return np.concatenate([scaled, identities], axis=-1)
 
     def joint(self, states: FloatArray) -> FloatArray:
-        """Return the inputs ``(n_joint,)`` of all: what agents of a group share stands once."""
-        scaled, own = self._scaled(states), self._own
-        return np.concatenate([scaled[:, own].ravel(), scaled[self._firsts][:, ~own].ravel()])
+        """Return the inputs ``(..., n_joint)`` of all: what agents of a group share stands once."""
+        scaled = self._scaled(states)
+        lead = scaled.shape[:-2]
+        of_agents = scaled[..., self._own].reshape(*lead, -1)
+        of_groups = scaled[..., self._firsts, :][..., ~self._own].reshape(*lead, -1)
+        return np.concatenate([of_agents, of_groups], axis=-1)
 
     def _scaled(self, states: FloatArray) -> FloatArray:
         place = (states - self._low) / self._span
         linear = np.clip(2.0 * place - 1.0, -FARTHEST, FARTHEST)
-        angles = 2.0 * np.pi * place[:, self._periodic]
+        angles = 2.0 * np.pi * place[..., self._periodic]
         columns = np.where(self._periodic, np.sin(2.0 * np.pi * place), linear)
-        return np.hstack([columns, np.cos(angles)])
+        return np.concatenate([columns, np.cos(angles)], axis=-1)
 
 
 class RewardScale:

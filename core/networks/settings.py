@@ -3,9 +3,10 @@
 Defaults are those of stable-baselines3, but for those that docs/peers.md names and accounts for.
 """
 
-from typing import Annotated, Any, ClassVar, Literal
+from pkgutil import resolve_name
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ..interface.agents import Agents, Placement
 from ..learners.learner import CORE, TeamSettings
@@ -97,6 +98,35 @@ class MultiAgentPPOSettings(PolicyGradientSettings):
     """Whether critics see all states beside the agent's own, or that alone."""
     value_of: Annotated[Literal["own", "team"], unwritten("own")] = "own"
     """Whether an agent's reward is its own, or the mean of all agents'."""
+    worlds: Annotated[int, Field(ge=1, le=4096), unwritten(1)] = 1
+    """Worlds that are stepped at once: from 2 on the networks are in NumPy and need no extra, and
+    `rollout` counts decisions of every world. The keys below are theirs."""
+    normalised: Annotated[Literal["rewards", "values"], unwritten("rewards")] = "rewards"
+    """What is divided by the deviation of returns so far: rewards, or what critics learn."""
+    learning_rate_decisions: Annotated[Count | None, unwritten(None)] = None
+    """Decisions of all worlds over which `learning_rate` falls to 0 in a line; none: it stays."""
+    entropy_decisions: Annotated[Count | None, unwritten(None)] = None
+    """The same of `entropy`."""
+
+    @property
+    def at_once(self) -> int:
+        """In how many worlds it learns at once."""
+        return self.worlds
+
+    @model_validator(mode="after")
+    def _of_many_worlds(self) -> Self:
+        keys = ("normalised", "learning_rate_decisions", "entropy_decisions")
+        changed = self.model_dump(include=set(keys))
+        if self.worlds == 1 and changed:
+            name, value = next(iter(changed.items()))
+            raise ValueError(f"{name} = {value!r}: needs worlds, 2 or more")
+        return self
+
+    def agents(self, placement: Placement) -> Agents[Any]:
+        """Return the agents that act in a scenario, in many worlds by NumPy alone."""
+        if self.worlds == 1:
+            return super().agents(placement)
+        return resolve_name(f"{CORE}.networks.many_worlds:ManyWorldsPPO")(self, placement)
 
 
 class HierarchyPPOSettings(MultiAgentPPOSettings):

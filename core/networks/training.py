@@ -8,7 +8,7 @@ of the state that it broke off in (Pardo et al. 2018).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -22,6 +22,7 @@ from stable_baselines3.common.torch_layers import MlpExtractor
 
 from ..interface.agents import Memory, under
 from ..numerics import AnyArray, FloatArray, IntArray
+from .acting import InputNames, SharedPolicy
 from .inputs import RewardScale
 from .settings import PolicyGradientSettings
 
@@ -165,8 +166,8 @@ class SplitPolicy(ActorCriticPolicy):
         self.mlp_extractor = SplitExtractor(*self._seen, self.net_arch, self.activation_fn)
 
 
-class ActorCritic:
-    """Policy and critic with their buffer and update, for agents that share these weights.
+class ActorCritic(SharedPolicy):
+    """SharedPolicy and critic with their buffer and update, for agents that share these weights.
 
     Parameters
     ----------
@@ -261,6 +262,11 @@ class ActorCritic:
             self.model.train()
         buffer.reset()
 
+    @property
+    def weight_bytes(self) -> int:
+        """How much memory the weights take."""
+        return bytes_of(self.model.policy)
+
     def memory(self) -> Memory:
         """Return all that is remembered: weights, Adam's moments, what the buffer holds."""
         buffer = self.model.rollout_buffer
@@ -292,18 +298,7 @@ class ActorCritic:
     def continue_from(
         self, former: ActorCritic, names: InputNames, former_names: InputNames
     ) -> None:
-        """Begin with the weights of another one, whose inputs may be others.
-
-        What an input weighs goes with its name; inputs that the other one has not met weigh nothing
-        at first. Adam's moments and the buffer begin anew.
-
-        Parameters
-        ----------
-        former
-            Of the same settings.
-        names, former_names
-            What the inputs of actor and critic are, here and there.
-        """
+        """Begin with the weights of another one, whose inputs may be others."""
         weights = weights_of(self.model.policy)
         for name, array in weights_of(former.model.policy).items():
             net = next((n for n in names if name == f"mlp_extractor.{n}.0.weight"), None)
@@ -319,8 +314,6 @@ class ActorCritic:
         self._rewards.restore(former._rewards.memory())
 
 
-InputNames = Mapping[str, Sequence[str]]
-"""By network, ``policy_net`` and ``value_net``, what each of its inputs is."""
 BUFFERED = (
     "observations",
     "actions",

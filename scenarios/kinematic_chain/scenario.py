@@ -20,12 +20,15 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import EmbodiedPrediction, Exploring, first_alike
 from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
+from ...core.interface.stacked import StackedWorlds
+from ...core.interface.worlds import Transitions
 from ...core.numerics import FloatArray, IntArray
 from ...core.rules.rule_base import RuleBase
 from ..faults.settings import Failures
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
 from .responses import Options, respond
 from .variables import ChainStates, ChainView, ends_of, postures_of
+from .worlds import observe_worlds
 
 MEASURES = (
     SUCCESS,
@@ -131,6 +134,11 @@ class KinematicChain(Scenario, Embodiment):
         measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
         return Transition(states, received, terminated, truncated, measured, twists)
 
+    def worlds(self, count: int) -> ChainWorlds | None:
+        """Return many such arms, stepped in one call; None: some fail, or have other variables."""
+        is_plain = self._states.is_compiled and not self.settings.failures
+        return ChainWorlds(self, count) if is_plain else None
+
     def embodiment(self) -> Embodiment:
         """Return itself: its joints are open to self-models."""
         return self
@@ -207,6 +215,48 @@ class KinematicChain(Scenario, Embodiment):
         fractions = self._speeds[None] / self.settings.top_speed
         view = ChainView(self._places()[None], self._angles[None], fractions, self._goal, before)
         return self._states.of_joints(view, 0, len(self.agents))[:, 0]
+
+
+class ChainWorlds(StackedWorlds[KinematicChain]):
+    """Many arms of as many joints, none of which fails."""
+
+    def stack(self, world: KinematicChain, count: int) -> None:
+        """Make room."""
+        n = len(world.agents)
+        self._angles: FloatArray = np.zeros((count, n))
+        self._speeds: FloatArray = np.zeros((count, n))
+        self._goals: FloatArray = np.zeros((count, 2))
+        self._before: FloatArray = np.zeros(count)
+        self._done = np.zeros(count, dtype=np.int64)
+
+    def take(self, place: int, world: KinematicChain) -> None:
+        """Put an arm and its goal in their place."""
+        self._angles[place] = world._angles
+        self._speeds[place] = 0.0
+        self._goals[place] = world._goal
+        self._before[place] = world._distance()
+        self._done[place] = 0
+
+    def step(self, joint_actions: IntArray) -> Transitions:
+        """Turn all joints of all arms for one decision period."""
+        arm = self.scenario
+        settings = arm.settings
+        unit = settings.speed_increment * arm._limits
+        self._speeds = arm.action_set.apply(self._speeds, joint_actions, unit, arm._limits)
+        turned = self._angles + PERIOD * self._speeds
+        self._angles = np.clip(turned, -arm._most, arm._most)
+        self._done += 1
+        places = postures_of(self._angles, arm.length)
+        fractions = self._speeds / settings.top_speed
+        rows = arm._states.rows
+        states = observe_worlds(places, self._angles, fractions, self._goals, self._before, rows)
+        away = np.hypot(*(self._goals - places[:, -1]).T)
+        rewards = arm._reward(away, self._before - away)
+        self._before = away
+        reached = away < settings.tolerance
+        late = ~reached & (self._done >= settings.most_decisions)
+        paid = np.broadcast_to(rewards[:, None], joint_actions.shape)
+        return Transitions(states, paid, reached, late)
 
 
 class ChainPrediction(EmbodiedPrediction, RespondingPrediction):

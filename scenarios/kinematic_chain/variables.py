@@ -228,12 +228,17 @@ class ChainStates:
         self.space = space_of("+".join(names), SPEED, self._things)
         # Beyond the last of the compiled columns: the column is none of these.
         rows = [COMPILED.index(name) if name in COMPILED else len(COMPILED) for name in names]
-        self._rows = np.array([-1, *rows])
+        self.rows = np.array([-1, *rows])
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether all variables are built in."""
+        return all(thing.trusted for thing in self._things)
 
     def of_joints(self, view: ChainView, first: int, count: int) -> FloatArray:
         """Return the states ``(count, m, d)`` of joints from `first` on, compiled if possible."""
         states = columns(
-            view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
+            view.places, view.angles, view.speeds, view.goal, view.before, first, count, self.rows
         )
         sense(self._things, view, range(first, first + count), states[:, :, 1:])
         return states

@@ -38,6 +38,8 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
+from ...core.interface.stacked import StackedWorlds
+from ...core.interface.worlds import Transitions
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.words import closest
@@ -232,6 +234,10 @@ class MatrixGame(Scenario, Prediction):
         """Return this game: its predictions are exact."""
         return self
 
+    def worlds(self, count: int) -> MatrixGameWorlds:
+        """Return many such worlds, played in one call."""
+        return MatrixGameWorlds(self, count)
+
     def states_after(self, joint_actions: IntArray) -> FloatArray:
         """Return the states ``(..., n, d)`` of all agents after joint actions ``(..., n)``."""
         played = np.asarray(joint_actions, dtype=float)
@@ -243,6 +249,28 @@ class MatrixGame(Scenario, Prediction):
             return every
         above = np.where(np.arange(n - 1) < np.arange(n)[:, None], every[..., :-1], 0.0)
         return np.concatenate([played[..., None], above], axis=-1)
+
+
+class MatrixGameWorlds(StackedWorlds[MatrixGame]):
+    """Many worlds of one game."""
+
+    def stack(self, world: MatrixGame, count: int) -> None:
+        """Make room."""
+        self._generators = [world.rng] * count
+
+    def take(self, place: int, world: MatrixGame) -> None:
+        """Keep what draws the payoffs of a world."""
+        self._generators[place] = world.rng
+
+    def step(self, joint_actions: IntArray) -> Transitions:
+        """Play once in every world."""
+        drawn = np.zeros(self.count, dtype=np.int64)
+        if self.scenario.is_stochastic:
+            drawn[:] = [generator.integers(0, 2) for generator in self._generators]
+        payoffs = self.scenario.payoffs[(drawn, *joint_actions.T)]
+        never = np.zeros(self.count, dtype=bool)
+        paid = np.broadcast_to(payoffs[:, None], joint_actions.shape)
+        return Transitions(self.scenario.states_after(joint_actions), paid, never, never)
 
 
 def _state_space(

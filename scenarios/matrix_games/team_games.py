@@ -28,6 +28,8 @@ from ...core.coordination.graphs import Elimination, Shape, build_shape
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
+from ...core.interface.stacked import StackedWorlds
+from ...core.interface.worlds import Transitions
 from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings
 from .scenario import OF_OPTIMA
@@ -81,6 +83,10 @@ class Game(ABC):
     @abstractmethod
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
         """Return the payoffs ``(m,)`` of joint actions ``(m, n)``."""
+
+    def payoffs_of_worlds(self, states: FloatArray, joint_actions: IntArray) -> FloatArray:
+        """Return the payoffs ``(W,)`` of joint actions ``(W, n)`` in worlds of these states."""
+        return self.payoffs(joint_actions)
 
     def is_optimal(self, joint_action: IntArray) -> bool:
         """Return whether nothing pays more, but for rounding."""
@@ -136,8 +142,13 @@ class Landmarks(Game):
 
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
         """Return the share of landmarks that are taken, less the cost of the mean distance."""
-        n = len(self.states)
-        far = self.states[np.arange(n), joint_actions].mean(axis=1)
+        return self.payoffs_of_worlds(self.states[None], joint_actions)
+
+    def payoffs_of_worlds(self, states: FloatArray, joint_actions: IntArray) -> FloatArray:
+        """Return the payoffs ``(W,)`` of joint actions ``(W, n)`` by distances ``(W, n, ...)``."""
+        n = joint_actions.shape[1]
+        rows = np.arange(len(states))[:, None]
+        far = states[rows, np.arange(n), joint_actions].mean(axis=1)
         return distinct(joint_actions) / n - self._cost * far
 
     def is_optimal(self, joint_action: IntArray) -> bool:
@@ -146,10 +157,15 @@ class Landmarks(Game):
 
     def advance(self, rng: np.random.Generator) -> None:
         """Draw other places, and find the assignment of least distance."""
-        agents, landmarks = rng.random((2, len(self.states), 2))
-        self.states = np.linalg.norm(agents[:, None] - landmarks, axis=2)
+        self.states = self.drawn([rng.random((2, len(self.states), 2))])[0]
         assigned = optimize.linear_sum_assignment(self.states)[1]
         self.best = float(self.payoffs(assigned[None])[0])
+
+    @staticmethod
+    def drawn(draws: Sequence[FloatArray]) -> FloatArray:
+        """Return the distances ``(W, n, n)`` of agents from landmarks at places ``(2, n, 2)``."""
+        agents, landmarks = np.moveaxis(np.stack(draws), 1, 0)
+        return np.linalg.norm(agents[:, :, None] - landmarks[:, None], axis=3)
 
 
 def distinct(joint_actions: IntArray) -> IntArray:
@@ -231,5 +247,35 @@ class TeamGame(Scenario):
         self.game.advance(self._rng)
         return Transition(self._states(), payoff, False, False, info)
 
+    def worlds(self, count: int) -> TeamGameWorlds:
+        """Return many such worlds, played in one call."""
+        return TeamGameWorlds(self, count)
+
     def _states(self) -> FloatArray:
         return np.hstack([self.game.states, self._numbers])
+
+
+class TeamGameWorlds(StackedWorlds[TeamGame]):
+    """Many worlds of one game; all seeds that begin their episodes are of one trial."""
+
+    def stack(self, world: TeamGame, count: int) -> None:
+        """Make room."""
+        self._generators = [world._rng] * count
+        self._states = np.stack([world._states()] * count)
+
+    def take(self, place: int, world: TeamGame) -> None:
+        """Keep what draws the next plays of a world, and the first of them."""
+        self._generators[place] = world._rng
+        self._states[place] = world._states()
+
+    def step(self, joint_actions: IntArray) -> Transitions:
+        """Play once in every world."""
+        game = self.scenario.game
+        payoffs = game.payoffs_of_worlds(self._states, joint_actions)
+        if isinstance(game, Landmarks):
+            n = joint_actions.shape[1]
+            self._states = self._states.copy()
+            self._states[:, :, :n] = game.drawn([g.random((2, n, 2)) for g in self._generators])
+        never = np.zeros(self.count, dtype=bool)
+        paid = np.broadcast_to(payoffs[:, None], joint_actions.shape)
+        return Transitions(self._states, paid, never, never)

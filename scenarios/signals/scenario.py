@@ -141,6 +141,10 @@ class Signals(Scenario):
         reward = right.astype(float) if self.settings.pays == "own" else vote
         return Transition(self._advance(), reward, False, False, info)
 
+    def worlds(self, count: int) -> SignalWorlds:
+        """Return many such worlds, played in one call."""
+        return SignalWorlds(self, count)
+
     def _advance(self) -> FloatArray:
         draws = self._rng.random(self.settings.players + 2)
         self._play = Plays.of(draws, self.settings.accuracy)
@@ -169,11 +173,16 @@ class SignalWorlds(Worlds):
     def __init__(self, scenario: Signals, count: int) -> None:
         self.scenario: Signals = scenario
         self.count = count
+        self._generators = [np.random.default_rng(0) for _ in range(count)]
+        self._draws: FloatArray = np.zeros((count, scenario.settings.players + 2))
 
-    def reset(self, seeds: Sequence[np.random.SeedSequence], episode: int = 0) -> FloatArray:
-        """Begin with the first play in every world."""
-        self._generators = [np.random.default_rng(seed) for seed in seeds]
-        return self._advance()
+    def begin(
+        self, places: Sequence[int], seeds: Sequence[np.random.SeedSequence], first_episode: int
+    ) -> FloatArray:
+        """Begin with the first play in some worlds."""
+        for place, seed in zip(places, seeds, strict=True):
+            self._generators[place] = np.random.default_rng(seed)
+        return self._advance(places)[np.asarray(places)]
 
     def step(self, joint_actions: IntArray) -> Transitions:
         """Play once in every world."""
@@ -183,16 +192,15 @@ class SignalWorlds(Worlds):
         is_own = self.scenario.settings.pays == "own"
         never = np.zeros(self.count, dtype=bool)
         return Transitions(
-            states=self._advance(),
+            states=self._advance(range(self.count)),
             rewards=right if is_own else np.broadcast_to(vote[:, None], right.shape),
             terminated=never,
             truncated=never,
-            each=(),
         )
 
-    def _advance(self) -> FloatArray:
-        n = self.scenario.settings.players
-        draws = np.stack([generator.random(n + 2) for generator in self._generators])
-        self.plays = Plays.of(draws, self.scenario.settings.accuracy)
+    def _advance(self, places: Sequence[int]) -> FloatArray:
+        for place in places:
+            self._draws[place] = self._generators[place].random(self._draws.shape[1])
+        self.plays = Plays.of(self._draws, self.scenario.settings.accuracy)
         """What is played next."""
         return self.plays.seen

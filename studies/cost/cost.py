@@ -119,6 +119,8 @@ class CostRow:
     """If asked for, messages of a decision, and how many of them follow one another."""
     broadcast: int = 0
     """If these are, states that are sent to agents beside them."""
+    free: int = 0
+    """Most agents for which one decides, itself included; of hierarchies alone, else 0."""
 
     @property
     def by_formula(self) -> dict[str, int | Fraction | None]:

@@ -14,6 +14,7 @@ from itertools import product
 from typing import Literal
 
 from ...core.agents.cost import Problem, is_chain
+from ...core.evaluators.enumeration import AutoSettings
 from ...core.numerics import pd
 from ...topologies.view import align, format_count
 from ..presentation.tables import in_csv, in_latex
@@ -141,6 +142,7 @@ def _table(rows: Sequence[CostRow]) -> str:
     lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
     if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
         lines.append("The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4.")
+    lines += _of_another_evaluator(rows)
     if "formula" in tables:
         same = [row.formula == row.measured.counted for row in rows if row.measured is not None]
         lines += ["", f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):"]
@@ -158,6 +160,19 @@ def _table(rows: Sequence[CostRow]) -> str:
         lines += ["*: on a channel that carries one message at a time."]
         lines += ["Not counted: n (n - 1) states sent to others, to predict by (broadcast)."]
     return "\n".join(lines)
+
+
+def _of_another_evaluator(rows: Sequence[CostRow]) -> list[str]:
+    """Return for which rows the default evaluator does not try what the formulas count."""
+    most = AutoSettings().exact_up_to
+    own = dict.fromkeys(row.topology for row in rows if row.free > most)
+    if not own:
+        return []
+    return [
+        f"They count the evaluator exact. The default one, auto, is that for {most} agents,",
+        "one and those below it; for more it tries fewer joint actions by another one,",
+        f"see best-response. Rows: {', '.join(own)}.",
+    ]
 
 
 def _measured_cells(row: CostRow) -> list[str]:
@@ -266,7 +281,8 @@ def cost_table(
     for (label, text), n in product(named, agents):
         if labels.count(label) > 1:
             raise ValueError(f"topology = {label!r} more than once; name each: LABEL={text}")
-        is_one = text not in {SINGLE_AGENT, *WAYS} and is_chain(agents_below(text, n))
+        below = () if text in {SINGLE_AGENT, *WAYS} else agents_below(text, n)
+        is_one = bool(below) and is_chain(below)
         tried = None if text == SINGLE_AGENT else joint_actions(text, n, problem.actions)
         row = CostRow(
             agents=n,
@@ -274,6 +290,7 @@ def cost_table(
             nested_exact=None if tried is None else problem.sweep(tried),
             nested_closed_form=problem.chain_closed_form(n) if is_one else None,
             nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
+            free=1 + max(below, default=-1),
             single_agent=problem.single_agent(n),
             formula=step_formula(text, n) if measured else None,
             measured=measure(text, n, repeats) if measured else None,

@@ -165,6 +165,9 @@ class Spec(Settings):
     """A list of seeds, or their number: n stands for 0 to n - 1."""
     episodes: Length = 20
     """Training episodes of a trial."""
+    decisions: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
+    """Joint decisions of a trial's training in place of `episodes`, where the study is
+    ``experience``; those of all worlds count."""
     steps: Length = 450
     """Most decisions in an episode."""
     evaluation: Annotated[int, Field(ge=0, le=1_000_000)] = 10
@@ -287,7 +290,27 @@ class Spec(Settings):
             with refused(f"{key}: "):
                 sources.permit(module)
         spec._sources = sources.only(set(names))
+        spec._check_decisions()
         return spec
+
+    def _check_decisions(self) -> None:
+        """Refuse a budget in decisions where a study counts episodes, and the other way round."""
+        if (
+            self.decisions is not None
+            and self.study != "experience"
+            and self.study in STUDIES.names()
+        ):
+            raise SpecError(
+                f"decisions = {self.decisions}: {self.study} counts episodes, allowed where study "
+                "= 'experience'"
+            )
+        for condition in self._conditions:
+            worlds = condition.settings.learner.at_once
+            if worlds > 1 and self.decisions is None:
+                raise SpecError(
+                    f"learner.worlds = {worlds}: needs a budget in decisions, study = 'experience' "
+                    f"with decisions = 1000000 (condition {condition.label!r})"
+                )
 
     @classmethod
     def read(

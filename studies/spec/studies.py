@@ -16,6 +16,7 @@ NAMES = (
     "games",
     "related",
     "peers",
+    "experience",
 )
 STUDIES = Registry(
     "study",

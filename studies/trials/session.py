@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any, Protocol
 
@@ -19,10 +20,13 @@ from ...core.agents.loop import (
     control_loop,
     world_seed,
 )
+from ...core.agents.many_worlds import ManyWorldsLoop
 from ...core.agents.team import Team
 from ...core.interface.plain import as_scenario
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario
+from ...core.interface.stacked import LoopedWorlds
+from ..spec.controls import LEARN_NOTHING
 from ..store.database import EVALUATION, STAGE
 from ..store.durable import TEAM, Recording
 from .arrangement import Arrangement, arrange, teach, transfer
@@ -105,6 +109,7 @@ class Session:
         self._measures = self._own.measures
         self._recordings: dict[str, Recording] = {}
         self._watch = Stopwatch()
+        self._decided = 0
         self.deciding = self._watch.decisions
         """Seconds of every decision in training."""
 
@@ -146,6 +151,49 @@ class Session:
             there, phase, [time, record], at_once=not kept, episodes=episodes,
             steps=self.trial.steps, first_episode=first,
         )  # fmt: skip
+
+    def train_until(self, decisions: int) -> int:
+        """Let the team learn until it has decided so often in all; return how often it has.
+
+        In many worlds at once if its learner says so: then rows are of the first world's episodes.
+        """
+        worlds = self.trial.settings.learner.at_once
+        if self.trial.settings.learner.kind in LEARN_NOTHING:
+            return decisions
+        while worlds == 1 and self._decided < decisions:
+            self.train(1, len(self._rows_of_training))
+            self._decided = sum(row.steps for row in self._rows_of_training)
+        if worlds > 1:
+            self._train_in_worlds(decisions)
+            self._decided = self._many.decisions
+        return self._decided
+
+    @property
+    def _rows_of_training(self) -> list[EpisodeRow]:
+        return [row for row in self._rows if row.phase == "training"]
+
+    @cached_property
+    def _many(self) -> ManyWorldsLoop:
+        settings = self.trial.settings
+        count = settings.learner.at_once
+        first = arrange(settings, self.trial.seed)
+        worlds = first.scenario.worlds(count) or LoopedWorlds(
+            [first.scenario, *(arrange(settings, 0).scenario for _ in range(count - 1))]
+        )
+        return ManyWorldsLoop(worlds, self.scenario, self.team, self.trial.steps, self.trial.seed)
+
+    def _train_in_worlds(self, decisions: int) -> None:
+        begin = perf_counter()
+        rates = [m.name for m in self._measures if m.source == "terminated"]
+        done = len(self._rows_of_training)
+        while self._many.decisions < decisions:
+            ended = self._many.step()
+            if ended is not None:
+                measured = dict.fromkeys(rates, ended.terminated)
+                row = EpisodeRow("training", done, ended.steps, measured, ended.return_)
+                self._rows.append(row)
+                done += 1
+        self._watch.seconds["learning"] += perf_counter() - begin
 
     def _record(self, record: StepRecord) -> None:
         """Record a step if it is of an episode of `Trial.recorded`."""

@@ -51,6 +51,8 @@ class Trial:
     """Stages that the team is trained in before its own scenario."""
     evaluation_steps: int | None = None
     """As in `Spec`."""
+    decisions: int | None = None
+    """As in `Spec`."""
     keep_teams: bool = False
     """As in `Spec`; changes nothing that is measured, and is no part of its identity."""
     sources: Sources = field(default_factory=Sources, compare=False)
@@ -68,6 +70,7 @@ class Trial:
             "steps": self.steps,
             "evaluation": self.evaluation,
             "evaluation_steps": self.evaluation_steps,
+            "decisions": self.decisions,
             "keep_teams": self.keep_teams,
         }
         return revive, (self.sources, self.settings.model_dump(), evaluations, curriculum, plain)
@@ -92,6 +95,8 @@ class Trial:
         }
         if self.evaluation_steps is not None:
             content["evaluation_steps"] = self.evaluation_steps
+        if self.decisions is not None:
+            content["decisions"] = self.decisions
         if self.evaluations:
             content["evaluations"] = [
                 [name, self._own_part(other).model_dump(mode="json")]
@@ -125,7 +130,9 @@ class Trial:
 
     @property
     def lengths(self) -> str:
-        """Its episodes of training, stage by stage, in words."""
+        """Its episodes of training, stage by stage, or its decisions, in words."""
+        if self.decisions is not None:
+            return f"{self.decisions} decisions"
         return lengths([[stage.episodes for stage in self.curriculum]], self.episodes)
 
     @property
@@ -177,6 +184,7 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
             steps=spec.steps,
             evaluation=spec.evaluation,
             evaluation_steps=spec.evaluation_steps,
+            decisions=spec.decisions,
             keep_teams=spec.keep_teams,
         )
         for condition in spec.conditions()

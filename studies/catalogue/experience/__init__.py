@@ -1,0 +1,158 @@
+"""The experience study: what teams return after more and more decisions, on a logarithmic axis.
+
+A trial trains for `decisions` joint decisions, and stops at 1,000, 3,000, 10,000 and so on for an
+evaluation without exploration, on the same worlds every time. Learners in many worlds at once count
+the decisions of all of them. Conditions that learn nothing are evaluated without training. The
+first condition is compared with all others at the end, paired by seed.
+"""
+
+from itertools import count
+from typing import NamedTuple
+
+import numpy as np
+
+from ....core.interface.measures import SUCCESS
+from ...errors import SpecError
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, differences, verdicts
+from ...results.results import Results
+from ...results.statistics import Array, Estimate, bootstrap, rate, stack_estimates
+from ...spec.spec import Spec
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
+from ..peers import AFTER, CPU
+from ..study import check_evaluated
+
+FIRST = 1000
+"""Decisions before the first evaluation."""
+DECISIONS = "decisions"
+"""Name of the number of decisions that a trial was trained for."""
+NUMBERS = (DECISIONS,)
+RETURN = "evaluation return"
+
+
+def stops(decisions: int) -> list[int]:
+    """Return after how many decisions there is an evaluation, the last one left out.
+
+    >>> stops(400_000), stops(500)
+    ([1000, 3000, 10000, 30000, 100000, 300000], [])
+    """
+    counts: list[int] = []
+    for k in count():
+        reached = FIRST * 10 ** (k // 2) * (3 if k % 2 else 1)
+        if reached >= decisions:
+            return counts
+        counts.append(reached)
+    return counts
+
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless there is a budget, and every learner's holds a rollout."""
+    check_evaluated(spec)
+    if spec.decisions is None:
+        raise SpecError("decisions: missing; experience needs a budget, as decisions = 1000000")
+    for condition in spec.conditions():
+        learner = condition.settings.learner
+        rollout = learner.model_dump().get("rollout", 0) * learner.at_once
+        if spec.decisions < rollout:
+            raise SpecError(
+                f"decisions = {spec.decisions}: less than a rollout of {rollout} decisions in "
+                f"{learner.at_once} worlds, nothing would be learned (condition "
+                f"{condition.label!r})"
+            )
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Train, with evaluations on the way; imported by name in workers."""
+    from time import process_time
+
+    session = Session(trial)
+    budget = trial.decisions or 0
+    seconds = 0.0
+    usage = {}
+    done = 0
+    for stop in (*stops(budget), budget):
+        begin = process_time()
+        done = session.train_until(stop)
+        seconds += process_time() - begin
+        usage[f"{CPU}{stop}"] = seconds
+        if stop < budget:
+            with session.team.drawing_apart():
+                session.evaluate(phase=f"{AFTER}{stop}")
+    return session.finish({DECISIONS: float(done)}, usage)
+
+
+class ReturnCourse(NamedTuple):
+    """How one condition fares with experience."""
+
+    condition: str
+    """Its label."""
+    decisions: Array
+    """``(k,)`` decisions experienced until each evaluation."""
+    values: Estimate
+    """What the evaluations come to ``(k,)``."""
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    conditions = results.of_phase("evaluation")
+    is_rate = all(results.has(condition, "evaluation", SUCCESS.name) for condition in conditions)
+    is_rate = is_rate and any(results.success(c, "evaluation").any() for c in conditions)
+    name = SUCCESS.name if is_rate else "return"
+    title = EVALUATED if is_rate else RETURN
+    table = []
+    courses = []
+    for condition in conditions:
+        stopped = {
+            int(phase.removeprefix(AFTER)): phase
+            for phase in results.phases
+            if phase.startswith(AFTER) and results.has(condition, phase)
+        }
+        phases = dict(sorted(stopped.items()))
+        phases[int(results.numbers(condition)[DECISIONS].mean())] = "evaluation"
+        values = {}
+        for stop, phase in phases.items():
+            own = results.values(condition, name, phase)
+            values[stop] = rate(own) if is_rate else bootstrap(own.mean(axis=1))
+        estimates = {f"after {stop:,}": values[stop] for stop in [*values][:-1]}
+        estimates[title] = [*values.values()][-1]
+        numbers = results.numbers(condition)
+        seconds = [key for key in numbers if key.startswith(CPU)]
+        if seconds:
+            last = max(seconds, key=lambda key: int(key.removeprefix(CPU)))
+            estimates["CPU [s]"] = bootstrap(numbers[last])
+        table.append(Summary(condition, len(results.seeds(condition)), estimates))
+        stacked = stack_estimates([*values.values()])
+        courses.append(ReturnCourse(condition, np.array([*values], float), stacked))
+    if not courses:
+        return Analysis(())
+    means = [results.means(condition, "evaluation", name) for condition in conditions]
+    pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
+    compared = differences({title: pairs[1:]}, of_rates=is_rate)
+    heads = {f"{title}, less that of {conditions[0]}": compared[title]}
+    notes = (
+        "after N: when evaluated after N joint decisions of training, of all worlds.",
+        *verdicts(heads, of_rates=is_rate),
+    )
+    return Analysis(tuple(table), notes, courses, compared)
+
+
+def draw(analysis: Analysis) -> Figures:
+    """Return the figure: evaluations against decisions experienced, bands 95 % intervals."""
+    from ...presentation import figures as f  # matplotlib takes its time
+
+    figure, panels = f.panels(1, 1, (5.4, 3.6))
+    axes = panels[0, 0]
+    for i, course in enumerate(analysis.cases):
+        f.draw_curve(axes, course.decisions, course.values, i, marker="o", markersize=3.5)
+    f.log_axis(axes, "x")
+    axes.set_xlabel("joint decisions of training")
+    is_rate = EVALUATED in analysis.differences
+    axes.set_ylabel(EVALUATED if is_rate else RETURN)
+    axes.grid(axis="y", alpha=0.25)
+    if is_rate:
+        f.as_rates(axes)
+    f.name_curves(figure, [c.condition for c in analysis.cases], marker="o", markersize=3.5)
+    return {"experience": figure}
+
+
+__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]
