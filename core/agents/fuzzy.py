@@ -13,7 +13,7 @@ import numpy as np
 
 from ..adaptation.foresight import Foresight
 from ..adaptation.predictors import GivenPredictor, Mirror
-from ..evaluators.evaluator import NOBODY, NOTHING_GIVEN, Deliberation, Evaluator
+from ..evaluators.evaluator import NOBODY, NOTHING_GIVEN, Aggregation, Deliberation, Evaluator
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn, all_hear_all
 from ..interface.agents import Agents, Counts, Memory, Placement, under
@@ -119,7 +119,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self._row_of = [own_rows.get(agent) for agent in range(n)]
         if self.is_private:
             n_rules = self.learner.theta.shape[1]
-            self.views = Views(settings, placement, self._row_of, n_rules, self.foresight)
+            plans = isinstance(self.evaluator, Aggregation) and self.evaluator.plans
+            self.views = Views(
+                settings, placement, self._row_of, n_rules, self.foresight, plans=plans
+            )
             self.costs = self.views.costs
         self.explorer = as_explorer(settings.exploration.build(n))
         self.rng = np.random.Generator(np.random.PCG64(placement.seed))

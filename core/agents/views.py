@@ -34,7 +34,8 @@ COSTS = (
     Measure("broadcast", "states broadcast", "1/decision", gathering="mean", least=0.0),
 )
 """What is measured of agents with views of their own, as means of an episode: in how many of the
-others an agent was right about what they then did (those that told it are among them); and what was
+others an agent was right about what they then did (those that told it are among them), where it
+makes plans; and what was
 communicated in a decision, the actions told and the states of other bodies sent to an agent."""
 
 
@@ -85,6 +86,8 @@ class Views:
         Rules of the rule base.
     foresight
         What they predict by.
+    plans
+        Whether they make plans, so that they expect something of the others.
 
     Attributes
     ----------
@@ -97,8 +100,6 @@ class Views:
         If constants shall be wrong that the scenario's predictor has not; one line.
     """
 
-    costs = COSTS
-
     def __init__(
         self,
         settings: LearnerSettings,
@@ -106,12 +107,17 @@ class Views:
         rows: list[int | None],
         n_rules: int,
         foresight: Foresight,
+        *,
+        plans: bool,
     ) -> None:
+        self.costs = COSTS if plans else COSTS[1:]
         self._members = placement.members.tolist()
         self._rows = rows
         self._foresight = foresight
         hierarchy = placement.hierarchy
-        self._broadcast = float(placement.scenario.perceived[placement.members].sum())
+        # Who values its own actions where it is predicts nothing, and needs no state but its own.
+        perceived = placement.scenario.perceived[placement.members]
+        self._broadcast = 0.0 if settings.values_actions else float(perceived.sum())
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
             bodies = placement.scenario.embodiment() if settings.decision.errors.constants else None
@@ -140,11 +146,12 @@ class Views:
     def spent(self, inputs: FuzzyInputs, hierarchy: Hierarchy) -> Mapping[str, float]:
         """Return how far expectations were right, and what was communicated in a decision."""
         share = len(self._members) / len(hierarchy)  # those of other parts add theirs
-        return {
+        spent = {
             "agreement": inputs.agreement * share,
             "told": float(sum(len(hierarchy.above(i)) for i in self._members)),
             "broadcast": self._broadcast,
         }
+        return {measure.name: spent[measure.name] for measure in self.costs}
 
 
 def weights_by_agent(rows: list[int | None], theta: FloatArray) -> list[FloatArray]:
