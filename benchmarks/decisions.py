@@ -3,8 +3,11 @@
 Teams of a preset with drawn weights decide in an episode of box pushing, or as the joints of an
 arm; the processor's time of each decision is taken, prediction included, and beside it that of the
 step of the world: physics, sensing and measures. The least is what the arithmetic takes, the median
-what a machine that others use makes of it. The memory is the greatest of the process so far: begin
-with few. The exponent of the time in the number of agents is fitted to teams of at least eight.
+what a machine that others use makes of it. With ``--training`` a team learns as in a study, and its
+last episode is timed. A fixed load, the loop of `benchmarks.machine`, is timed after every
+decision: the ratio of the medians compares machines, and hours of one that others use. The memory
+is the greatest of the process so far: begin with few. The exponent of the time in the number of
+agents is fitted to teams of at least eight.
 """
 
 from __future__ import annotations
@@ -21,10 +24,14 @@ from rich.table import Table
 
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.core.interface.experience import Observation
+from nested_agents.core.agents.team import Team
+from nested_agents.core.interface.experience import Experience, Observation
+from nested_agents.core.interface.scenario import Scenario
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
+
+from .machine import loop
 
 ROBOTS = (2, 4, 8, 16, 32, 64)
 WARM = 3
@@ -41,31 +48,54 @@ class Timed(NamedTuple):
     """Every decision, with its prediction [s]."""
     stepping: list[float]
     """Every step of the world [s]."""
+    load: list[float]
+    """The fixed load, after every decision [s]."""
     memory: float
     """The greatest of the process so far [MB]."""
 
 
-def timed(settings: dict[str, Any], number: int) -> Timed:
-    """Let a team decide so often."""
+def timed(settings: dict[str, Any], number: int, training: int) -> Timed:
+    """Let a team decide so often: with drawn weights, or after so many episodes of training."""
     begun = process_time()
     (trial,) = trials_of(Spec.of({"seeds": 1, **settings}))
     session = Session(trial)
     scenario = session.scenario
     team = session.team
     built = process_time() - begun
-    theta = team.only(FuzzyAgents).learner.theta
-    theta[:] = np.random.default_rng(0).normal(size=theta.shape)
-    states = scenario.reset(world_seed(0, 0), 0)
-    deciding, stepping = [], []
-    for _ in range(WARM + number):
-        begun = thread_time()
-        actions = team.act(Observation(states, scenario)).joint_action
-        decided = thread_time()
-        states = scenario.step(actions).states
-        deciding.append(decided - begun)
-        stepping.append(thread_time() - decided)
+    if not training:
+        theta = team.only(FuzzyAgents).learner.theta
+        theta[:] = np.random.default_rng(0).normal(size=theta.shape)
+    for episode in range(training):
+        _episode(scenario, team, episode, number, learn=True)
+    learn = training > 0
+    taken = _episode(scenario, team, training, WARM + number, learn=learn)[WARM:]
+    deciding, stepping, load = (list(times) for times in zip(*taken, strict=True))
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return Timed(len(scenario.agents), built, deciding[WARM:], stepping[WARM:], memory)
+    return Timed(len(scenario.agents), built, deciding, stepping, load, memory)
+
+
+def _episode(
+    scenario: Scenario, team: Team, episode: int, steps: int, *, learn: bool
+) -> list[tuple[float, float, float]]:
+    """Return what every decision, step and fixed load took [s]; episodes do not end early."""
+    seed = world_seed(0, episode)
+    seen = Observation(scenario.reset(seed, episode), scenario)
+    team.begin_world(seed, episode)
+    if learn:
+        team.begin_episode()
+    taken = []
+    for step in range(steps):
+        begun = thread_time()
+        decision = team.act(seen)
+        decided = thread_time()
+        transition = scenario.step(decision.joint_action)
+        stepped = thread_time()
+        loop()
+        taken.append((decided - begun, stepped - decided, thread_time() - stepped))
+        if learn:
+            team.learn(Experience(seen, decision, transition, step == steps - 1))
+        seen = Observation(transition.states, scenario, previous=decision.joint_action)
+    return taken
 
 
 def main() -> None:
@@ -76,6 +106,7 @@ def main() -> None:
     parser.add_argument("--joints", type=int, nargs="+", default=(), metavar="N", help="arms, too")
     parser.add_argument("--sweeps", type=int, metavar="N", help="of best responses, of robots")
     parser.add_argument("--number", type=int, default=30, help="decisions timed of each size")
+    parser.add_argument("--training", type=int, default=0, metavar="N", help="episodes before")
     options = parser.parse_args()
     settings: dict[str, Any] = {"preset": options.preset}
     boxes = dict(settings)
@@ -85,17 +116,32 @@ def main() -> None:
     teams = [(f"{n} joints", settings, {"kind": "kinematic-chain", "joints": n})
              for n in options.joints]  # fmt: skip
     teams += [(f"{n} robots", boxes, {"robots": n}) for n in options.robots]
-    headings = ("team", "agents", "least [ms]", "median [ms]", "world [ms]", "made [s]", "MB")
+    headings = (
+        "team",
+        "agents",
+        "least [ms]",
+        "median [ms]",
+        "of load",
+        "world [ms]",
+        "made [s]",
+        "MB",
+    )
     table = Table(*headings, box=SIMPLE)
     least: dict[int, float] = {}
     for name, learner, scenario in teams:
-        taken = timed({**learner, "scenario": scenario}, options.number)
+        taken = timed({**learner, "scenario": scenario}, options.number, options.training)
         if "robots" in name:
             least[taken.agents] = min(taken.deciding)
-        medians = (float(np.median(times)) for times in (taken.deciding, taken.stepping))
-        numbers = (f"{1e3 * seconds:.2f}" for seconds in (min(taken.deciding), *medians))
+        median = float(np.median(taken.deciding))
         table.add_row(
-            name, str(taken.agents), *numbers, f"{taken.built:.2f}", f"{taken.memory:.0f}"
+            name,
+            str(taken.agents),
+            f"{1e3 * min(taken.deciding):.2f}",
+            f"{1e3 * median:.2f}",
+            f"{median / np.median(taken.load):.3f}",
+            f"{1e3 * np.median(taken.stepping):.2f}",
+            f"{taken.built:.2f}",
+            f"{taken.memory:.0f}",
         )
     console = Console(width=80)
     console.print(table)

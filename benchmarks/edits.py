@@ -21,7 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from nested_agents.studies.api.study import load
+from nested_agents.studies.api.loading import load
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.store.database import DATABASE

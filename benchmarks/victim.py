@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from nested_agents.core.interface.measures import Measure
-from nested_agents.studies.api.study import load
+from nested_agents.studies.api.loading import load
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec

@@ -82,9 +82,10 @@ MODULES = {
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.comparison", "api.replay", "api.running", "api.planning",
-        "api.tuning", "api.reevaluation", "api.recovery",
-        "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
+        "api.study", "api.loading", "api.growth", "api.comparison", "api.replay", "api.running",
+        "api.planning", "api.tuning", "api.reevaluation", "api.recovery",
+        "errors", "spec.spec", "spec.keys", "spec.presets", "spec.schema", "trials.trial",
+        "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
         "results.power", "results.contrasts", "results.aggregates", "results.published",
         "catalogue.study", "cost.cost", "cost.table",

@@ -20,8 +20,8 @@ import numpy as np
 
 from ..core.numerics import pd, stats
 from ..core.plugins.words import closest
+from ..studies.api.loading import load
 from ..studies.api.running import run
-from ..studies.api.study import load
 from ..studies.errors import SpecError
 from ..studies.presentation.progress import Terminal
 from ..studies.results import laws

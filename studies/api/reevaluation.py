@@ -23,7 +23,8 @@ from ..trials.session import Session
 from ..trials.trial import Trial, TrialResult, trials_of
 from ..workers.runner import Observer, Outcome, run_trials
 from ..workers.workers import start_workers
-from .study import Place, StudyResults, load
+from .loading import load
+from .study import Place, StudyResults
 
 
 def reevaluate(

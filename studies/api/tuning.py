@@ -32,8 +32,9 @@ from ..store import durable
 from ..trials.arrangement import check_conditions
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer
+from .loading import load
 from .running import run_study
-from .study import StudyResults, load
+from .study import StudyResults
 
 FIRST_SEED = 10_000
 """The smallest seed to tune on: those below it are for reports."""

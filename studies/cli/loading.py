@@ -37,7 +37,7 @@ def load_results(
     better: Literal["higher", "lower"] = "higher",
 ) -> StudyResults:
     """Return the results at some places, as a study analyses them, or a choice of the trials."""
-    from ..api.study import load
+    from ..api.loading import load
 
     if trust:
         trust_files(*sources)

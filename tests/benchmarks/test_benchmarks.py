@@ -84,6 +84,9 @@ def test_decisions_of_every_size_are_timed(run: Run) -> None:
     said = run("benchmarks.decisions", *few)
     assert "time ~ n^" in said
     assert "with 8 to 10 agents (least)" in said
+    assert "2 robots" in run(
+        "benchmarks.decisions", "--robots", "2", "--number", "3", "--training", "1"
+    )
 
 
 @pytest.mark.slow

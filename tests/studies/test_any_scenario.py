@@ -14,7 +14,7 @@ import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
-from nested_agents.studies.api.study import load
+from nested_agents.studies.api.loading import load
 from nested_agents.studies.catalogue import scaling
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main

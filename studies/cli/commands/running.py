@@ -28,8 +28,8 @@ def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
     if print_spec:
         print_data(text)
         return 0
+    from ...api.loading import load
     from ...api.running import run
-    from ...api.study import load
     from ...presentation.progress import Terminal
     from ...spec.spec import Spec
     from ...workers.runner import Outcome

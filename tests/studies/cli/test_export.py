@@ -7,7 +7,7 @@ import made_up
 import pandas as pd
 import pytest
 
-from nested_agents.studies.api.study import load
+from nested_agents.studies.api.loading import load
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of

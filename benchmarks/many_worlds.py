@@ -1,0 +1,68 @@
+"""Joint decisions a second of learners in many worlds at once, updates included.
+
+``python -m benchmarks.many_worlds`` prints them for chains of PPO agents in spread and on arms, by
+processor time, with 64 worlds and with two, the least that NumPy learns in.
+"""
+
+from itertools import pairwise
+from time import process_time
+
+import numpy as np
+
+from nested_agents.core.agents.loop import policy_seed
+from nested_agents.core.agents.many_worlds import ManyWorldsLoop
+from nested_agents.core.agents.team import Team
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.networks.settings import HierarchyPPOSettings
+from nested_agents.scenarios import SCENARIOS
+
+CASES = (
+    ("spread, 3", "spread", {}, 64, 5),
+    ("spread, 3", "spread", {}, 64, 10),
+    ("spread, 3", "spread", {}, 2, 10),
+    ("arm of 4", "kinematic-chain", {"joints": 4}, 64, 5),
+    ("arm of 4", "kinematic-chain", {"joints": 4}, 64, 10),
+    ("arm of 16", "kinematic-chain", {"joints": 16}, 64, 5),
+)
+"""What acts where, in how many worlds, and how often an update passes over a rollout."""
+TRANSITIONS = 6400
+"""Joint decisions of a rollout, of all worlds."""
+
+
+def decisions_a_second(
+    kind: str, table: dict[str, int], worlds: int, epochs: int, *, updates: bool = True
+) -> float:
+    """Return joint decisions a second of processor time, over one rollout and its update."""
+    world = SCENARIOS.parsed(kind, **table).build()
+    agents = world.agents
+    chain = Hierarchy(agents, list(pairwise(agents)))
+    size = TRANSITIONS // worlds
+    rollout = size if updates else 2 * size
+    settings = HierarchyPPOSettings(
+        worlds=worlds, rollout=rollout, batch_size=1200, epochs=epochs, discount=0.95
+    )
+    team = Team(settings, world, chain, policy_seed(10_000))
+    loop = ManyWorldsLoop(world.worlds(worlds), world, team, 150, 10_000)
+    if updates:
+        for _ in range(size):  # the first rollout compiles and makes room
+            loop.step()
+    else:
+        loop.step()
+    begin = process_time()
+    steps = size if updates else size - 2
+    for _ in range(steps):
+        loop.step()
+    return steps * worlds / (process_time() - begin)
+
+
+def main() -> None:
+    """Print a line for every case."""
+    print("case       worlds epochs  decisions/s  without updates")
+    for title, kind, table, worlds, epochs in CASES:
+        whole = decisions_a_second(kind, table, worlds, epochs)
+        acting = decisions_a_second(kind, table, worlds, epochs, updates=False)
+        print(f"{title:<10} {worlds:>6} {epochs:>6} {np.round(whole):>12,.0f} {acting:>16,.0f}")
+
+
+if __name__ == "__main__":
+    main()
