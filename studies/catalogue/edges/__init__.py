@@ -29,7 +29,7 @@ from ..hierarchies.cases import HierarchyCase
 from ..hierarchies.pooled import effects, lines_of
 from ..study import check_evaluated, check_evaluations, check_rule_bases, distinct
 
-PUBLISHED = ("success",)
+PUBLISHED = ("success", "agreement")
 """Measures of an episode that published results keep."""
 TRAINED = "as trained"
 """How the hierarchy of training is called among the others."""

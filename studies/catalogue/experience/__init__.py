@@ -99,6 +99,9 @@ def analyse(results: Results) -> Analysis:
     is_rate = is_rate and any(results.success(c, "evaluation").any() for c in conditions)
     name = SUCCESS.name if is_rate else "return"
     title = EVALUATED if is_rate else RETURN
+    unknown = next((c for c in conditions if not results.has(c, "evaluation", name)), None)
+    if unknown is not None:  # published results keep no returns
+        raise SpecError(f"study = 'experience': results of {unknown!r} have no {name}")
     table = []
     courses = []
     for condition in conditions:

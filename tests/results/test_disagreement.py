@@ -1,0 +1,41 @@
+"""What a message is worth to agents that disagree: the page, and the threshold, by the rows."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import nested_agents as na
+from nested_agents.results import ROWS, disagreement
+from nested_agents.studies.presentation.tables import Cell
+
+DOCS = ROWS.parents[1] / "docs"
+
+
+def test_the_page_has_the_table_that_the_rows_give(tmp_path) -> None:
+    every = disagreement.rows()
+    page = (DOCS / "topologies.md").read_text(encoding="utf-8")
+    *table, _, threshold = disagreement.lines(every)
+    assert all(line in page for line in table)
+    assert threshold.split(": ")[1] in page
+    disagreement.draw(every).savefig(tmp_path / "figure.png")
+
+
+def test_the_threshold_is_where_the_line_crosses_zero() -> None:
+    line = np.tile(np.array(disagreement.ERRORS)[:, None] - 0.25, (1, 6))
+    e = disagreement._threshold(line)
+    assert [float(end) for end in e] == pytest.approx([0.25] * 3)
+    assert np.isnan(disagreement._threshold(-line).value)
+
+
+def test_the_table_of_simple_spread_is_that_of_the_rows() -> None:
+    rows = pd.read_csv(ROWS / "spread-experience.csv").sort_values("seed")
+    page = (DOCS / "peers.md").read_text(encoding="utf-8")
+    for condition, own in rows.groupby("condition"):
+        cells = [
+            Cell.of(na.bootstrap(own[own["decisions"] == n]["return"].to_numpy())).bracketed(" ")
+            for n in (1000, 10_000, 100_000, 400_000)
+        ]
+        assert f"| {condition} | {' | '.join(cells)} |" in page
+    last = rows.query("decisions == 400000")
+    compared = na.compare_table(last, score="return", seed="seed", reference="random")
+    assert [d.p < 0.05 for d in compared.differences] == [True] * 4
