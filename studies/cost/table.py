@@ -11,12 +11,14 @@ from dataclasses import asdict, astuple, dataclass
 from fractions import Fraction
 from html import escape
 from itertools import product
+from textwrap import wrap
 from typing import Literal
 
 from ...core.agents.cost import Problem, is_chain
 from ...core.evaluators.enumeration import AutoSettings
 from ...core.numerics import pd
 from ...topologies.view import align, format_count
+from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex
 from .cost import (
     LABELLED,
@@ -171,7 +173,7 @@ def _of_another_evaluator(rows: Sequence[CostRow]) -> list[str]:
     return [
         f"They count the evaluator exact. The default one, auto, is that for {most} agents,",
         "one and those below it; for more it tries fewer joint actions by another one,",
-        f"see best-response. Rows: {', '.join(own)}.",
+        *wrap(f"see best-response. Rows: {', '.join(own)}.", WIDTH, break_on_hyphens=False),
     ]
 
 

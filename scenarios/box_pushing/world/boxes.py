@@ -42,8 +42,8 @@ MOST_VERTICES = 1000
 """Of an outline and its holes; a drawing with more is to be simplified."""
 LEAST_EDGE = 1e-6
 """Shortest edge [m]."""
-LEAST_PIECE = 2e-9
-"""Smallest area of a convex piece [m2]; Box2D takes none below 1.2e-9."""
+LEAST_PIECE = 1.1921e-9
+"""Smallest area of a convex piece [m2]: Box2D takes none below the epsilon of single precision."""
 LARGEST = 100.0
 """Greatest distance of a vertex from another one [m]."""
 STRAIGHT = 1e-9

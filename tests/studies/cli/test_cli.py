@@ -249,7 +249,7 @@ BAD = {
     "status nowhere": "nowhere: holds no study",
     "retry nowhere": "nowhere: holds no study",
     "presets papr": "did you mean 'paper'",
-    "rum": "error: rum: unknown command; did you mean 'run'? known: benchmark, check",
+    "rum": "error: rum: unknown command; did you mean 'run'? known: atlas, benchmark",
     "--versio": "'--versio'. Did you mean '--version'?",
     "demo --job 3": "No such option '--job'. (Did you mean one of: '--jobs', '--out'?)",
     "demo extra": "unexpected extra argument (extra); see nested-agents demo --help",

@@ -42,7 +42,7 @@ def built_in_models() -> set[type[Settings]]:
         model
         for model in found
         if model.__module__.startswith("nested_agents.")
-        and not model.__module__.endswith((".scripted", ".wrappers", ".push_n"))
+        and not model.__module__.endswith((".scripted", ".bayesian", ".wrappers", ".push_n"))
         and set(model.model_fields) - {"kind"}
         and resolve_name(f"{model.__module__}:{model.__qualname__}") is model
     }
