@@ -20,7 +20,6 @@ from functools import cached_property
 from heapq import heapify, heappop, heappush
 from itertools import combinations
 from math import cos, pi, sin, sqrt
-from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -29,9 +28,9 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
-from ....core.numerics import FloatArray, nx, quadrature
+from ....core.numerics import FloatArray, nx
 from ....core.plugins.words import closest
-from .geometry import Outline, ring_edges
+from .geometry import Moments, Outline, moments, ring_edges
 from .settings import GRAVITY, BoxSettings
 
 Vertices = Sequence[tuple[float, float]]
@@ -48,39 +47,6 @@ LARGEST = 100.0
 """Greatest distance of a vertex from another one [m]."""
 STRAIGHT = 1e-9
 """Sine of the angle between edges that counts as straight on."""
-
-
-class Moments(NamedTuple):
-    """Area and its moments about the origin."""
-
-    area: float
-    """[m2]."""
-    first: FloatArray
-    """``(2,)`` integrals of x and y [m3]."""
-    second: FloatArray
-    """``(2, 2)`` integrals of the products of coordinates [m4]."""
-    radial: float
-    """Integral of the distance from the origin [m3]."""
-
-
-def moments(edges: FloatArray) -> Moments:
-    """Return the moments of the area within directed edges ``(n, 4)``, material on the left.
-
-    Sums over the signed triangles between the origin and each edge; exact but for `radial`, which
-    is a 64-point Gauss-Legendre quadrature along each edge.
-    """
-    a = edges[:, :2]
-    b = edges[:, 2:]
-    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    area = cross.sum() / 2
-    ends = a + b
-    first = (cross[:, None] * ends).sum(axis=0) / 6
-    outer = sum(np.einsum("n,ni,nj->ij", cross, p, p) for p in (a, b, ends)) / 24
-    nodes, weights = quadrature(64)
-    t = (nodes + 1) / 2
-    points = a[:, None] + t[:, None] * (b - a)[:, None]
-    mean_distance = np.hypot(points[..., 0], points[..., 1]) @ weights / 2
-    return Moments(float(area), first, outer, float((cross * mean_distance).sum() / 3))
 
 
 def polygon_edges(polygon: Polygon) -> FloatArray:
