@@ -12,7 +12,8 @@ nosearch: true
 ---
 # Archive of published tables
 
-Each file of `results/rows` as `nested-agents table` prints it, without times. Specs: [](../reproduce.md).
+Each file of `results/rows` as `nested-agents table` prints it, without times.
+[](../reproduce.md) names the specs.
 """
 
 
