@@ -29,7 +29,9 @@ from .world.boxes import box_for, growth
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD, Task, reward
 from .world.starts import place
+from .world.stepping import step_address
 from .world.world import WheelFailures, World
+from .worlds import BoxWorlds
 
 if TYPE_CHECKING:
     from .pictures.policy import Policy
@@ -134,6 +136,8 @@ class BoxPushing(Scenario, Embodiment):
         self.box = box_for(settings.box, settings.robots)
         similar = settings.scaling == "similar"
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
+        self.farthest = self._unit * settings.termination_radius
+        """Distance of the box from the goal beyond which an episode is broken off [m]."""
         robots = [self.robot] * settings.robots
         names = self.robot.wheel_names
         numbers = range(settings.robots)
@@ -141,12 +145,12 @@ class BoxPushing(Scenario, Embodiment):
         self.roles = names * settings.robots
         every = np.arange(len(self.agents)).reshape(-1, len(names))
         self.groups = tuple(map(tuple, every.tolist()))
-        self._body = np.repeat(numbers, len(names))
+        self.body = np.repeat(numbers, len(names))
         self.action_set = ActionSet()
         self.world = World(robots, self.box, infrared=settings.infrared)
-        self._space = state_space_for(settings.state_space, self.robot.max_speed)
+        self.space = state_space_for(settings.state_space, self.robot.max_speed)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
-        self.state_space = self._space.space
+        self.state_space = self.space.space
         self.nominal_effects = (nominal_effect(self.robot),) * settings.robots
         """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
         self.constants = CONSTANTS if settings.predictor == "push" else ()
@@ -158,17 +162,17 @@ class BoxPushing(Scenario, Embodiment):
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = WheelFailures(settings.failures, self.agents, self._limits)
         reward_settings = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
-        self._task = Task(
+        self.task = Task(
             reward_settings, self._unit * settings.tolerance, settings.orientation_tolerance
         )
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._premises = Premises(
             self._belief,
-            self._space,
+            self.space,
             self.action_set,
             settings.speed_increment,
             self._limits,
-            self._task,
+            self.task,
             settings.infrared,
             self.box.outline,
             settings.period,
@@ -213,10 +217,14 @@ class BoxPushing(Scenario, Embodiment):
         self._save()
         return self._observe(self.world.box_pose)
 
+    def commanded(self, speeds: FloatArray, joint_actions: IntArray) -> FloatArray:
+        """Return the wheel speeds ``(..., n)`` that joint actions command, given those before."""
+        unit = self.settings.speed_increment * self._limits
+        return self.action_set.apply(speeds, joint_actions, unit, self._limits)
+
     def step(self, joint_action: IntArray) -> Transition:
         """Command the wheels, let the world go on for one decision period, observe and reward."""
-        unit = self.settings.speed_increment * self._limits
-        self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
+        self._speeds = self.commanded(self._speeds, joint_action)
         before = self._distance()
         poses = self.world.robot_poses.copy()
         box = self.world.box_pose.copy()
@@ -237,8 +245,8 @@ class BoxPushing(Scenario, Embodiment):
         distance, way, turn = np.array([[away], [away - before], [measured["orientation_rad"]]])
         contact = self.world.contact[None]
         strongest = readings.max(axis=1)[None]
-        gained = reward(self._task, distance, way, turn, contact, strongest)[0]
-        received = gained[self._body] if self.settings.reward.of == "robot" else float(gained[0])
+        gained = reward(self.task, distance, way, turn, contact, strongest)[0]
+        received = gained[self.body] if self.settings.reward.of == "robot" else float(gained[0])
         sensed = perf_counter()
         if terminated:
             # Does the box come to rest within the tolerance when all wheels stop?
@@ -247,9 +255,16 @@ class BoxPushing(Scenario, Embodiment):
         self._step += 1
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
-        farthest = self._unit * self.settings.termination_radius
-        truncated = not terminated and away > farthest
+        truncated = not terminated and away > self.farthest
         return Transition(states, received, terminated, truncated, measured, twists)
+
+    def worlds(self, count: int) -> BoxWorlds | None:
+        """Return many such worlds in one call; None where something fails, is noisy or a user's."""
+        settings = self.settings
+        is_noisy = settings.failures or settings.infrared.noise or self._playground is not None
+        if is_noisy or not self.space.is_built_in or step_address() is None:
+            return None
+        return BoxWorlds(self, count)
 
     def embodiment(self) -> Embodiment:
         """Return itself: its robots are open to self-models."""
@@ -348,7 +363,7 @@ class BoxPushing(Scenario, Embodiment):
     def _reached(self) -> bool:
         distance = np.array([self._distance()])
         orientation = np.array([self._orientation()])
-        return bool(self._task.reached(distance, orientation)[0])
+        return bool(self.task.reached(distance, orientation)[0])
 
     def _observe(self, origin: FloatArray) -> FloatArray:
         """Return the states ``(n, d)`` of all agents: the error observation layer.
@@ -356,16 +371,21 @@ class BoxPushing(Scenario, Embodiment):
         `origin` is the pose ``(3,)`` of the box one decision period ago.
         """
         world = self.world
-        poses = self.world.robot_poses
+        poses = world.robot_poses[None]
+        here = world.box_pose[None]
+        return self.states_at(poses, here, world.gaps[None], origin, self._speeds[None])[0]
+
+    def states_at(
+        self, robots: FloatArray, box: FloatArray, gaps: FloatArray, origin: FloatArray,
+        speeds: FloatArray,
+    ) -> FloatArray:  # fmt: skip
+        """Return the states ``(m, n, d)`` of all agents in m situations, see `View`.
+
+        `speeds` are those commanded ``(m, n)`` [m/s].
+        """
         view = View(
-            poses[None],
-            world.box_pose[None],
-            world.gaps[None],
-            self._goal,
-            origin,
-            1.0,
-            self.box.outline,
-            self.box.friction_radius,
+            robots, box, gaps, self._goal, origin, 1.0, self.box.outline, self.box.friction_radius
         )
-        own = self._space.own(poses[self._body], self._speeds, self._goal)
-        return np.hstack([own, self._space.observe(view)[self._body]])
+        poses = robots[:, self.body].reshape(-1, 3)
+        own = self.space.own(poses, speeds.reshape(-1), self._goal).reshape(*speeds.shape, -1)
+        return np.concatenate([own, self.space.observe(view)[:, self.body]], axis=2)
