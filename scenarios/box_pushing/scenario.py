@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, NotRequired, TypedDict
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
-from ...core.numerics import BoolArray, FloatArray, IntArray, stream_of, wrap
+from ...core.interface.stacked import StackedWorlds
+from ...core.interface.worlds import Transitions
+from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from .config import BoxPushingSettings
+from .measurements import MEASURES, Measurements
 from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap
@@ -28,79 +30,15 @@ from .states.state_spaces import state_space_for
 from .world.boxes import box_for, growth
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD, Task, reward
-from .world.starts import place
+from .world.starts import GOAL, place
 from .world.stepping import step_address
-from .world.world import WheelFailures, World
-from .worlds import BoxWorlds
+from .world.world import TOUCHING, WheelFailures, World
 
 if TYPE_CHECKING:
     from .pictures.policy import Policy
 
 SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
-
-MEASURES = (
-    SUCCESS,
-    Measure(
-        "stopped_at_goal",
-        "stopped at goal",
-        source="stopped_at_goal",
-        better="higher",
-        is_rate=True,
-    ),
-    Measure("final_distance_m", "final distance", "m", "distance_m", better="lower", least=0.0),
-    Measure(
-        "final_orientation_rad",
-        "final orientation error",
-        "rad",
-        "orientation_error_rad",
-        better="lower",
-        least=0.0,
-    ),
-    Measure(
-        "contact_fraction",
-        "time in contact",
-        source="contact_fraction",
-        gathering="mean",
-        better="higher",
-        least=0.0,
-        greatest=1.0,
-    ),
-)
-"""What is measured of an episode: whether the box came within the tolerance of the goal at whatever
-speed, whether it was there once the robots had stopped, ..."""
-
-
-class Measurements(TypedDict):
-    """Poses, speeds, contact and errors of a state; poses [m, m, rad]."""
-
-    robot_poses: FloatArray
-    """``(M, 3)``."""
-    box_pose: FloatArray
-    """``(3,)``."""
-    goal_pose: FloatArray
-    """``(3,)``."""
-    wheel_speeds: FloatArray
-    """``(n,)`` as commanded [m/s]."""
-    contact: BoolArray
-    """``(M,)`` whether each robot touches the box now."""
-    contact_time: FloatArray
-    """``(M,)`` for which fraction of the last decision period each did."""
-    contact_fraction: float
-    """The mean of it."""
-    failed: BoolArray
-    """``(n,)`` wheels under a failure."""
-    distance_m: float
-    """Of the box from the goal."""
-    orientation_rad: float
-    """Of the box from the goal pose."""
-    orientation_error_rad: float
-    """The size of it."""
-    stopped_at_goal: bool
-    """Whether the box stayed at the goal once the wheels had stopped: known after the step that
-    ends the episode."""
-    seconds: NotRequired[dict[str, float]]
-    """What physics and sensors took in a step."""
 
 
 class BoxPushing(Scenario, Embodiment):
@@ -389,3 +327,56 @@ class BoxPushing(Scenario, Embodiment):
         poses = robots[:, self.body].reshape(-1, 3)
         own = self.space.own(poses, speeds.reshape(-1), self._goal).reshape(*speeds.shape, -1)
         return np.concatenate([own, self.space.observe(view)[:, self.body]], axis=2)
+
+
+class BoxWorlds(StackedWorlds[BoxPushing]):
+    """Many worlds of as many robots, without failures and without noise of sensors.
+
+    Their physics is one compiled call. What each has is, bit by bit, what it has by itself.
+
+    Box2D keeps the bodies of a world where it likes, so that every place has a `World` of its own:
+    that in which the scenario has begun the episode.
+    """
+
+    def stack(self, world: BoxPushing, count: int) -> None:
+        """Make room."""
+        one = world.world
+        n_robots = len(one.robots)
+        self._worlds = [World(one.robots, one.box, infrared=one.sensor) for _ in range(count)]
+        self._addresses: IntArray = np.zeros((count, n_robots + 2), dtype=np.int64)
+        self._last: FloatArray = np.zeros((count, n_robots, 3))
+        self._wrenches: FloatArray = np.zeros((count, n_robots, 3))
+        self._speeds: FloatArray = np.zeros((count, len(world.agents)))
+        self._boxes: FloatArray = np.zeros((count, 3))
+
+    def take(self, place: int, world: BoxPushing) -> None:
+        """Keep the world that has begun in a place; the scenario has the former one of it."""
+        begun = world.world
+        world.world = self._worlds[place]
+        self._worlds[place] = begun
+        self._addresses[place] = begun.addresses
+        self._last[place] = 0.0
+        self._wrenches[place] = 0.0
+        self._speeds[place] = 0.0
+        self._boxes[place] = begun.box_pose
+
+    def step(self, joint_actions: IntArray) -> Transitions:
+        """Command the wheels of all worlds for one decision period, observe and reward."""
+        one = self.scenario
+        before = self._boxes
+        self._speeds = one.commanded(self._speeds, joint_actions)
+        poses, gaps, readings = one.world.advance_many(
+            self._addresses, self._speeds, one.settings.action_repeat, self._last, self._wrenches
+        )
+        boxes = np.ascontiguousarray(poses[:, 0])
+        self._boxes = boxes
+        states = one.states_at(poses[:, 1:], boxes, gaps, before, self._speeds)
+        away = np.hypot(*(GOAL[:2] - boxes[:, :2]).T)
+        way = away - np.hypot(*(GOAL[:2] - before[:, :2]).T)
+        turn = wrap(boxes[:, 2] - GOAL[2])
+        reached = one.task.reached(away, turn)
+        paid = reward(one.task, away, way, turn, gaps < TOUCHING, readings)
+        if one.settings.reward.of == "robot":
+            paid = paid[:, one.body]
+        rewards = np.broadcast_to(paid, joint_actions.shape)
+        return Transitions(states, rewards, reached, ~reached & (away > one.farthest))
