@@ -13,7 +13,7 @@ DOCS = ROWS.parents[1] / "docs"
 
 def test_the_page_has_the_table_that_the_rows_give(tmp_path) -> None:
     every = disagreement.rows()
-    page = (DOCS / "topologies.md").read_text(encoding="utf-8")
+    page = (DOCS / "edges.md").read_text(encoding="utf-8")
     lines = disagreement.lines(every)
     thresholds = lines[-len(every) :]
     assert all(line in page for line in lines[: -len(every) - 1])
