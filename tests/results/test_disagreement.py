@@ -6,7 +6,7 @@ import pytest
 
 import nested_agents as na
 from nested_agents.results import ROWS, disagreement
-from nested_agents.studies.presentation.tables import Cell
+from nested_agents.studies.results.notation import bracketed
 
 DOCS = ROWS.parents[1] / "docs"
 
@@ -36,7 +36,7 @@ def test_the_table_of_simple_spread_is_that_of_the_rows() -> None:
     page = (DOCS / "peers.md").read_text(encoding="utf-8")
     for condition, own in rows.groupby("condition"):
         cells = [
-            Cell.of(na.bootstrap(own[own["decisions"] == n]["return"].to_numpy())).bracketed(" ")
+            bracketed(na.bootstrap(own[own["decisions"] == n]["return"].to_numpy()))
             for n in (1000, 10_000, 100_000, 400_000)
         ]
         assert f"| {condition} | {' | '.join(cells)} |" in page
