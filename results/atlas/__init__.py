@@ -1,0 +1,1 @@
+"""The atlas: who wins where, how it grows, and what small teams tell of large ones."""
