@@ -9,7 +9,8 @@ import numpy as np
 
 from ...core.numerics import pd, stats
 from ...studies.results.analysis import format_p
-from ...studies.results.statistics import LEVEL, Estimate, bootstrap, holm, two_figures
+from ...studies.results.notation import bracketed, signed, two_figures
+from ...studies.results.statistics import LEVEL, Estimate, bootstrap, holm
 from .rows import MEASURES, NO_FAULT, TeamKind, qualities
 
 DOSES = {"lost": "messages lost", "left": "members gone"}
@@ -31,8 +32,8 @@ class FaultCost(NamedTuple):
 
     def __str__(self) -> str:
         head = f"{self.task}, {self.hierarchy}, {self.size} agents, {self.fault}"
-        value, low, high = (two_figures(float(end)) for end in self.difference)
-        return f"{head}: {MEASURES[self.measure]} {value} [{low}, {high}], p {format_p(self.p)}"
+        shown = bracketed(self.difference, signed)
+        return f"{head}: {MEASURES[self.measure]} {shown}, p {format_p(self.p)}"
 
 
 def fault_costs(rows: pd.DataFrame) -> list[FaultCost]:

@@ -16,7 +16,8 @@ import numpy as np
 from ...core.numerics import pd, stats
 from ...studies.results import laws
 from ...studies.results.analysis import format_p
-from ...studies.results.statistics import LEVEL, Estimate, bootstrap, two_figures
+from ...studies.results.notation import bracketed, two_figures
+from ...studies.results.statistics import LEVEL, Estimate, bootstrap
 from .rows import COSTS, MEASURES, NO_FAULT, TeamKind, qualities, sample_of
 
 SMALL = 16
@@ -188,8 +189,7 @@ def coverage(checked: Sequence[Check]) -> list[str]:
         factor = np.median([np.sqrt(c.predicted.high / c.predicted.low) for c in own])
         text = f"{name}: {inside} of {len(own)} inside, {len(shares)} laws"
         if len(shares) > 1:
-            value, low, high = (two_figures(float(e)) for e in bootstrap(shares, bounds=(0.0, 1.0)))
-            text += f", share {value} [{low}, {high}]"
+            text += f", share {bracketed(bootstrap(shares, bounds=(0.0, 1.0)))}"
         lines.append(f"{text}; median factor {two_figures(float(factor))}")
     return lines
 

@@ -33,7 +33,7 @@ from ...core.evaluators.evaluator import Aggregation
 from ...core.numerics import pd
 from ...topologies.view import align, format_count
 from ..errors import WIDTH, SpecError
-from ..results.statistics import two_figures
+from ..results.notation import two_figures
 from ..spec.spec import Spec
 from ..spec.tables import label_but
 from ..trials.arrangement import Arrangement, arrange, check_conditions
