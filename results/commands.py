@@ -110,9 +110,9 @@ def atlas(
     Laws are fitted to teams of at most 16 agents, and of at most 8, and larger ones of the same
     rows are predicted. Without --out the rows are the committed ones.
     """
-    from .atlas.faults import fault_costs, thresholds
-    from .atlas.predictions import SMALL, checks, choices, coverage, shares_right
-    from .atlas.rows import ALREADY, COMMITTED, read_rows, run_tasks
+    from .atlas import ALREADY, COMMITTED, read_rows, run_tasks
+    from .atlas_faults import fault_costs, thresholds
+    from .atlas_predictions import SMALL, checks, choices, coverage, shares_right
 
     if out is None and (tasks or jobs is not None):
         raise SpecError(f"{'--task' if tasks else '--jobs'}: needs --out, where to run the tasks")
@@ -133,7 +133,7 @@ def atlas(
             print_lines([*map(str, costs), *thresholds(costs)])
     if figures is not None:
         from ..studies.presentation.figures import write
-        from .atlas.figures import FIGURES
+        from .atlas_figures import FIGURES
 
         figures.mkdir(parents=True, exist_ok=True)
         for name, draw in FIGURES.items():

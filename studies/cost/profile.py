@@ -15,7 +15,6 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -155,24 +154,24 @@ def _profile(names: tuple[str, str], own: Arrangement, steps: int, wanted: float
     for _ in control_loop(own.scenario, team, episodes=2, steps=min(BEGINNING, steps), seed=SEED):
         pass
     before = team.counts.joint_actions
-    reported = Counter[str]()
+    sensing = 0.0
+    reported = 0.0
     decisions = 0
     episodes = 0
     with Sampler() as sampler:
-        loop = control_loop(
+        for record in control_loop(
             own.scenario, team, episodes=10**9, steps=steps, seed=SEED, first_episode=2
-        )
-        for record in loop:
+        ):
             decisions += 1
             episodes += record.last
-            reported.update(record.transition.info.get("seconds", {}))
+            seconds = record.transition.info.get("seconds", {})
+            sensing += seconds.get("sensors", 0.0)
+            reported += sum(seconds.values())
             spent = sum(sampler.seconds.values())
             if spent > wanted and (episodes or spent > LONGEST * wanted):
                 break
-        loop.close()
     each = {part: sampler.seconds[part] / decisions for part in PARTS}
-    sensing = reported["sensors"] / (sum(reported.values()) or 1.0)
-    each["sense"] = each["world"] * sensing
+    each["sense"] = each["world"] * sensing / (reported or 1.0)
     each["world"] -= each["sense"]
     return Profile(
         *names,
@@ -207,7 +206,7 @@ class Sampler:
     """
 
     def __init__(self) -> None:
-        self.seconds = Counter[str]()
+        self.seconds = dict.fromkeys(PARTS, 0.0)
         self._parts: dict[CodeType, str] = {}
         self._last = 0.0
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from nested_agents.core.numerics import pd
-from nested_agents.results import SPECS
-from nested_agents.results.atlas import faults, predictions
-from nested_agents.results.atlas import rows as atlas
+from nested_agents.results import SPECS, atlas
+from nested_agents.results import atlas_faults as faults
+from nested_agents.results import atlas_predictions as predictions
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 

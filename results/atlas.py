@@ -12,19 +12,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from ...core.numerics import pd
-from ...core.plugins.words import closest
-from ...studies.api.loading import load
-from ...studies.api.running import run
-from ...studies.errors import SpecError
-from ...studies.presentation.progress import Terminal
-from ...studies.results import laws
-from ...studies.results.foreign import read_table
-from ...studies.results.results import Results
-from ...studies.spec.controls import LEARN_NOTHING
-from ...studies.spec.tables import label_but
-from ...studies.store import durable
-from .. import ROWS, SPECS
+from ..core.numerics import pd
+from ..core.plugins.words import closest
+from ..studies.api.loading import load
+from ..studies.api.running import run
+from ..studies.errors import SpecError
+from ..studies.presentation.progress import Terminal
+from ..studies.results import laws
+from ..studies.results.foreign import read_table
+from ..studies.results.results import Results
+from ..studies.spec.controls import LEARN_NOTHING
+from ..studies.spec.tables import label_but
+from ..studies.store import durable
+from . import ROWS, SPECS
 
 COMMITTED = ROWS / "atlas"
 """Where the rows are that have been published."""

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.numerics import pd, stats
-from ...studies.results.analysis import format_p
-from ...studies.results.notation import bracketed, signed, two_figures
-from ...studies.results.statistics import LEVEL, Estimate, bootstrap, holm
-from .rows import MEASURES, NO_FAULT, TeamKind, qualities
+from ..core.numerics import pd, stats
+from ..studies.results.analysis import format_p
+from ..studies.results.notation import bracketed, signed, two_figures
+from ..studies.results.statistics import LEVEL, Estimate, bootstrap, holm
+from .atlas import MEASURES, NO_FAULT, TeamKind, qualities
 
 DOSES = {"lost": "messages lost", "left": "members gone"}
 """With what the name of a fault begins that is a share of something."""

@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.numerics import pd, stats
-from ...studies.results import laws
-from ...studies.results.analysis import format_p
-from ...studies.results.notation import bracketed, two_figures
-from ...studies.results.statistics import LEVEL, Estimate, bootstrap
-from .rows import COSTS, MEASURES, NO_FAULT, TeamKind, qualities, sample_of
+from ..core.numerics import pd, stats
+from ..studies.results import laws
+from ..studies.results.analysis import format_p
+from ..studies.results.notation import bracketed, two_figures
+from ..studies.results.statistics import LEVEL, Estimate, bootstrap
+from .atlas import COSTS, MEASURES, NO_FAULT, TeamKind, qualities, sample_of
 
 SMALL = 16
 """Agents of the largest teams that laws are fitted to."""
@@ -76,8 +76,8 @@ class HierarchyChoice(NamedTuple):
     def __str__(self) -> str:
         names = " or ".join([self.predicted, *self.rivals])
         head = f"{self.task}, {self.learner}, {MEASURES[self.measure]}, {self.size} agents: "
-        found = f"{self.measured} was best (p {format_p(self.p)})"
-        return f"{head}{names} predicted, {found}"
+        outcome = f"{self.measured} was best (p {format_p(self.p)})"
+        return f"{head}{names} predicted, {outcome}"
 
 
 def checks(rows: pd.DataFrame, most: int = SMALL) -> list[Check]:
@@ -104,7 +104,7 @@ def checks(rows: pd.DataFrame, most: int = SMALL) -> list[Check]:
 def choices(rows: pd.DataFrame, most: int = SMALL) -> list[HierarchyChoice]:
     """Return for larger teams the best hierarchy as laws of at most `most` agents have it."""
     whole = rows[rows["fault"] == NO_FAULT]
-    chosen = []
+    chosen: list[HierarchyChoice] = []
     for (task, learner), own in whole.groupby(["task", "learner"], sort=False):
         small = min(most, SMALLER.get(str(task), most))
         for measure, sign in qualities(str(task)).items():

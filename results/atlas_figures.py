@@ -8,11 +8,11 @@ from itertools import groupby
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...core.numerics import pd
-from ...studies.presentation import figures
-from ...studies.results.statistics import Estimate, bootstrap, stack_estimates
-from .predictions import SMALL, Check, checks, exponents
-from .rows import MEASURES, NO_FAULT, TeamKind
+from ..core.numerics import pd
+from ..studies.presentation import figures
+from ..studies.results.statistics import Estimate, bootstrap, stack_estimates
+from .atlas import MEASURES, NO_FAULT, TeamKind
+from .atlas_predictions import SMALL, Check, checks, exponents
 
 PANEL = (5.0, 2.4)
 """Width and height of a panel [inch]."""

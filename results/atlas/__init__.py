@@ -1,1 +1,0 @@
-"""The atlas: who wins where, how it grows, and what small teams tell of large ones."""
