@@ -9,11 +9,13 @@ from types import BuiltinFunctionType, GenericAlias
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
+import archive  # noqa: E402
 import diagrams  # noqa: E402
 import reference  # noqa: E402
 from docutils import nodes  # noqa: E402
 
 reference.write(HERE / "reference")
+archive.write(HERE / "reference" / "archive.md")
 diagrams.draw(HERE / "diagrams")
 
 project = "nested-agents"

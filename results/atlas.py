@@ -27,8 +27,9 @@ from ..studies.presentation.progress import Terminal
 from ..studies.results import laws
 from ..studies.results.analysis import format_p
 from ..studies.results.foreign import read_table
+from ..studies.results.notation import bracketed, signed, two_figures
 from ..studies.results.results import Results
-from ..studies.results.statistics import Estimate, bootstrap, holm, two_figures
+from ..studies.results.statistics import Estimate, bootstrap, holm
 from ..studies.spec.controls import LEARN_NOTHING
 from ..studies.spec.tables import label_but
 from ..studies.store import durable
@@ -136,8 +137,7 @@ class MessageLoss(NamedTuple):
 
     def __str__(self) -> str:
         head = f"{self.task}, {self.hierarchy}, {self.size} agents, {self.probability:g} lost"
-        value, low, high = (f"{float(end):+.2f}" for end in self.difference)
-        return f"{head}: {value} [{low}, {high}], p {format_p(self.p)}"
+        return f"{head}: {bracketed(self.difference, signed)}, p {format_p(self.p)}"
 
 
 def run_tasks(out: Path, jobs: int | None, tasks: Sequence[str] = ()) -> Path:
@@ -341,8 +341,7 @@ def coverage(checked: Sequence[Check]) -> list[str]:
         factor = np.median([np.sqrt(c.predicted.high / c.predicted.low) for c in own])
         text = f"{MEASURES.get(name, name)}: {inside} of {len(own)} inside, {len(shares)} laws"
         if len(shares) > 1:
-            value, low, high = (two_figures(float(e)) for e in bootstrap(shares, bounds=(0.0, 1.0)))
-            text += f", share {value} [{low}, {high}]"
+            text += f", share {bracketed(bootstrap(shares, bounds=(0.0, 1.0)))}"
         lines.append(f"{text}; median factor {two_figures(float(factor))}")
     return lines
 

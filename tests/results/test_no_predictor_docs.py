@@ -21,7 +21,7 @@ def test_specs_can_be_run() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["fit", "fit-landmarks", "fit-three-actions", "fit-arms", "fit-games", "fit-boxes"]
+    "name", ["fit", "fit-landmarks", "fit-three-actions", "fit-arms", "fit-games"]
 )
 def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, COLUMNS, capsys)
