@@ -1,7 +1,8 @@
 """Joint decisions a second of learners in many worlds at once, updates included.
 
-``python -m benchmarks.many_worlds`` prints them for chains of PPO agents in spread and on arms, by
-processor time, with 64 worlds and with two, the least that NumPy learns in.
+``python -m benchmarks.many_worlds`` prints them for chains of PPO agents in spread, on arms and at
+boxes, by processor time, with 64 worlds and with two, the least that NumPy learns in. Linear
+algebra is to have one thread, as in studies: set ``OPENBLAS_NUM_THREADS=1``.
 """
 
 from itertools import pairwise
@@ -23,6 +24,10 @@ CASES = (
     ("arm of 4", "kinematic-chain", {"joints": 4}, 64, 5),
     ("arm of 4", "kinematic-chain", {"joints": 4}, 64, 10),
     ("arm of 16", "kinematic-chain", {"joints": 16}, 64, 5),
+    ("box, 2", "box-pushing", {"robots": 2}, 64, 5),
+    ("box, 2", "box-pushing", {"robots": 2}, 64, 10),
+    ("box, 4", "box-pushing", {"robots": 4}, 64, 5),
+    ("box, 8", "box-pushing", {"robots": 8, "state_space": "crowd"}, 64, 5),
 )
 """What acts where, in how many worlds, and how often an update passes over a rollout."""
 TRANSITIONS = 6400
@@ -30,7 +35,7 @@ TRANSITIONS = 6400
 
 
 def decisions_a_second(
-    kind: str, table: dict[str, int], worlds: int, epochs: int, *, updates: bool = True
+    kind: str, table: dict[str, int | str], worlds: int, epochs: int, *, updates: bool = True
 ) -> float:
     """Return joint decisions a second of processor time, over one rollout and its update."""
     world = SCENARIOS.parsed(kind, **table).build()
@@ -42,7 +47,10 @@ def decisions_a_second(
         worlds=worlds, rollout=rollout, batch_size=1200, epochs=epochs, discount=0.95
     )
     team = Team(settings, world, chain, policy_seed(10_000))
-    loop = ManyWorldsLoop(world.worlds(worlds), world, team, 150, 10_000)
+    many = world.worlds(worlds)
+    if many is None:
+        raise ValueError(f"{kind}: steps one world at a time")
+    loop = ManyWorldsLoop(many, world, team, 150, 10_000)
     if updates:
         for _ in range(size):  # the first rollout compiles and makes room
             loop.step()

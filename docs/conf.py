@@ -9,11 +9,13 @@ from types import BuiltinFunctionType, GenericAlias
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
+import archive  # noqa: E402
 import diagrams  # noqa: E402
 import reference  # noqa: E402
 from docutils import nodes  # noqa: E402
 
 reference.write(HERE / "reference")
+archive.write(HERE / "reference" / "archive.md")
 diagrams.draw(HERE / "diagrams")
 
 project = "nested-agents"
@@ -70,9 +72,8 @@ def escape_bars(app, what, name, thing, options, lines):
 
 
 def skip_signatures_of_c(app, what, name, thing, skip, options):
-    """Leave out aliases of tuples and functions of C, over whose signatures Sphinx 9.0 stumbles."""
-    is_alias = isinstance(thing, GenericAlias) and thing.__origin__ is tuple
-    return True if is_alias or isinstance(thing, BuiltinFunctionType) else None
+    """Leave out aliases of types and functions of C, over whose signatures Sphinx 9.0 stumbles."""
+    return True if isinstance(thing, GenericAlias | BuiltinFunctionType) else None
 
 
 def keep_intervals_whole(app, doctree):

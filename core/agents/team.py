@@ -202,7 +202,7 @@ class Team:
             self.spent = self._spent(inputs)
         return Decision(joint, inputs)
 
-    def _walk(self, seen: Observation, inputs: tuple[Any, ...]) -> IntArray:
+    def _walk(self, seen: Observation, inputs: tuple[object, ...]) -> IntArray:
         """Let the agents decide, turn by turn; each is told what those above it have decided."""
         worlds = seen.present.shape[:-2]
         joint = np.full((*worlds, len(self.hierarchy)), self.action_set.neutral)
@@ -242,14 +242,14 @@ class Team:
         for part in self.parts:
             part.rearrange(self._present, left, self._joint_of_left()[left])
 
-    def _contents(self, inputs: tuple[Any, ...]) -> Mapping[int, object]:
+    def _contents(self, inputs: tuple[object, ...]) -> Mapping[int, object]:
         """Return by agent what has been said beside actions so far."""
         contents: dict[int, object] = {}
         for part, own in zip(self.parts, inputs, strict=True):
             contents.update(part.contents(own))
         return contents
 
-    def _spent(self, inputs: tuple[Any, ...]) -> Mapping[str, float]:
+    def _spent(self, inputs: tuple[object, ...]) -> Mapping[str, float]:
         """Return what a decision has cost, by the names of `costs`."""
         total = {measure.name: 0.0 for measure in self.costs}
         total[MESSAGES.name] = float(self._messages)

@@ -15,7 +15,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from inspect import Parameter, iscoroutinefunction, signature
 from types import FrameType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -29,6 +29,7 @@ TAKES_MANY = ("observations", "told", "rngs", "agents", "actions", "step")
 SHARED = ("actions", "step")
 """Which of these are the same for all."""
 
+A = TypeVar("A")
 MEMORY = ("memory", "restore")
 """What an object must have whose answers are recorded."""
 
@@ -121,7 +122,7 @@ class Caller:
 
     def answers(
         self, queries: Sequence[Query], timeout: float, at_once: int
-    ) -> Iterator[tuple[Query, Any]]:
+    ) -> Iterator[tuple[Query, object]]:
         """Yield what each of some agents answers, as it arrives.
 
         Parameters
@@ -149,9 +150,9 @@ class Caller:
                         answer = self._call(query)
                     yield query, answer
 
-    def question(self, query: Query) -> dict[str, Any]:
+    def question(self, query: Query) -> dict[str, object]:
         """Return all that an answer may depend on, but for the function itself."""
-        given: dict[str, Any] = {}
+        given: dict[str, object] = {}
         for one, many in zip(TAKES, TAKES_MANY, strict=True):
             if one in self.takes or many in self.takes:
                 given[one] = query.seed if one == "rng" else vars(query)[one]
@@ -159,11 +160,11 @@ class Caller:
             given["memory"] = self.memory(query.agent)
         return given
 
-    def memory(self, agent: str) -> Any:
+    def memory(self, agent: str) -> object:
         """Return what the object of an agent remembers, if there are such."""
         return self._object(agent).memory() if self.is_class else None
 
-    def restore(self, agent: str, memory: Any) -> None:
+    def restore(self, agent: str, memory: object) -> None:
         """Let the object of an agent, if there is one, remember what it did."""
         if self.is_class:
             self._object(agent).restore(memory)
@@ -196,9 +197,9 @@ class Caller:
         given = {name: vars(query)[name] for name in self.takes}
         return self._function(query.agent)(**given, **({} if self.is_class else self._named))
 
-    def _batch(self, queries: Sequence[Query], timeout: float) -> Iterator[tuple[Query, Any]]:
+    def _batch(self, queries: Sequence[Query], timeout: float) -> Iterator[tuple[Query, object]]:
         first = queries[0]
-        given: dict[str, Any] = {}
+        given: dict[str, object] = {}
         for one, many in zip(TAKES, TAKES_MANY, strict=True):
             if many in self.takes:
                 each = [vars(query)[one] for query in queries]
@@ -218,13 +219,13 @@ class Caller:
 
     def _concurrent(
         self, queries: Sequence[Query], timeout: float, at_once: int
-    ) -> Iterator[tuple[Query, Any]]:
+    ) -> Iterator[tuple[Query, object]]:
         """Yield answers as they arrive; once one fails, those under way are still waited for."""
         loop = self._loop()
         free = asyncio.Semaphore(at_once)
         failed: dict[str, CallError] = {}
 
-        async def ask(query: Query) -> tuple[Query, Any] | None:
+        async def ask(query: Query) -> tuple[Query, object] | None:
             async with free:
                 if failed:
                     return None
@@ -235,10 +236,10 @@ class Caller:
                     failed[query.agent] = error
                     return None
 
-        async def begin() -> set[asyncio.Task[tuple[Query, Any] | None]]:
+        async def begin() -> set[asyncio.Task[tuple[Query, object] | None]]:
             return {asyncio.ensure_future(ask(query)) for query in queries}
 
-        async def wait(tasks: set[asyncio.Task[tuple[Query, Any] | None]]) -> Any:
+        async def wait(tasks: set[asyncio.Task[tuple[Query, object] | None]]) -> Any:
             return await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
 
         left = loop.run(begin())
@@ -279,7 +280,7 @@ class OutOfTimeError(BaseException):
     """The time of a call is over; no Exception, which functions may catch and try again."""
 
 
-async def limited(answer: Awaitable[Any], seconds: float) -> Any:
+async def limited(answer: Awaitable[A], seconds: float) -> A:
     """Return what is waited for.
 
     Raises

@@ -7,7 +7,7 @@ of bytes of its JSON text.
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,13 +22,13 @@ class Reply(NamedTuple):
 
     action: int
     """Index of its action."""
-    message: Any
+    message: object
     """What it says to others; none: nothing."""
     costs: Mapping[str, float]
     """What the answer has cost, by name."""
 
 
-def read_reply(answer: Any, actions: Sequence[str], costs: Mapping[str, str]) -> Reply:
+def read_reply(answer: object, actions: Sequence[str], costs: Mapping[str, str]) -> Reply:
     """Return what a function's answer means.
 
     Parameters
@@ -75,7 +75,7 @@ def _action(value: object, actions: Sequence[str]) -> int:
     )
 
 
-def _costs(answer: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, float]:
+def _costs(answer: Mapping[str, object], units: Mapping[str, str]) -> dict[str, float]:
     given = answer.get("costs") or {}
     if not isinstance(given, Mapping):
         raise ValueError(f"returns costs = {given!r:.60}, allowed: numbers by name")

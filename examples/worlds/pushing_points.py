@@ -41,7 +41,7 @@ from nested_agents.core.numerics import FloatArray, IntArray, wrap
 from nested_agents.core.plugins.settings import Positive
 from nested_agents.scenarios.box_pushing.config import BoxTaskSettings
 from nested_agents.scenarios.box_pushing.driving import Drivers
-from nested_agents.scenarios.box_pushing.scenario import MEASURES
+from nested_agents.scenarios.box_pushing.measurements import MEASURES
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.scenarios.box_pushing.world.geometry import surface
 

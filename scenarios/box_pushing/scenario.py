@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, NotRequired, TypedDict
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
-from ...core.numerics import BoolArray, FloatArray, IntArray, stream_of, wrap
+from ...core.interface.stacked import StackedWorlds
+from ...core.interface.worlds import Transitions
+from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from .config import BoxPushingSettings
+from .measurements import MEASURES, Measurements
 from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap
@@ -28,77 +30,15 @@ from .states.state_spaces import state_space_for
 from .world.boxes import box_for, growth
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD, Task, reward
-from .world.starts import place
-from .world.world import WheelFailures, World
+from .world.starts import GOAL, place
+from .world.stepping import step_address
+from .world.world import TOUCHING, WheelFailures, World
 
 if TYPE_CHECKING:
     from .pictures.policy import Policy
 
 SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
-
-MEASURES = (
-    SUCCESS,
-    Measure(
-        "stopped_at_goal",
-        "stopped at goal",
-        source="stopped_at_goal",
-        better="higher",
-        is_rate=True,
-    ),
-    Measure("final_distance_m", "final distance", "m", "distance_m", better="lower", least=0.0),
-    Measure(
-        "final_orientation_rad",
-        "final orientation error",
-        "rad",
-        "orientation_error_rad",
-        better="lower",
-        least=0.0,
-    ),
-    Measure(
-        "contact_fraction",
-        "time in contact",
-        source="contact_fraction",
-        gathering="mean",
-        better="higher",
-        least=0.0,
-        greatest=1.0,
-    ),
-)
-"""What is measured of an episode: whether the box came within the tolerance of the goal at whatever
-speed, whether it was there once the robots had stopped, ..."""
-
-
-class Measurements(TypedDict):
-    """Poses, speeds, contact and errors of a state; poses [m, m, rad]."""
-
-    robot_poses: FloatArray
-    """``(M, 3)``."""
-    box_pose: FloatArray
-    """``(3,)``."""
-    goal_pose: FloatArray
-    """``(3,)``."""
-    wheel_speeds: FloatArray
-    """``(n,)`` as commanded [m/s]."""
-    contact: BoolArray
-    """``(M,)`` whether each robot touches the box now."""
-    contact_time: FloatArray
-    """``(M,)`` for which fraction of the last decision period each did."""
-    contact_fraction: float
-    """The mean of it."""
-    failed: BoolArray
-    """``(n,)`` wheels under a failure."""
-    distance_m: float
-    """Of the box from the goal."""
-    orientation_rad: float
-    """Of the box from the goal pose."""
-    orientation_error_rad: float
-    """The size of it."""
-    stopped_at_goal: bool
-    """Whether the box stayed at the goal once the wheels had stopped: known after the step that
-    ends the episode."""
-    seconds: NotRequired[dict[str, float]]
-    """What physics and sensors took in a step."""
 
 
 class BoxPushing(Scenario, Embodiment):
@@ -134,6 +74,8 @@ class BoxPushing(Scenario, Embodiment):
         self.box = box_for(settings.box, settings.robots)
         similar = settings.scaling == "similar"
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
+        self.farthest = self._unit * settings.termination_radius
+        """Distance of the box from the goal beyond which an episode is broken off [m]."""
         robots = [self.robot] * settings.robots
         names = self.robot.wheel_names
         numbers = range(settings.robots)
@@ -141,12 +83,12 @@ class BoxPushing(Scenario, Embodiment):
         self.roles = names * settings.robots
         every = np.arange(len(self.agents)).reshape(-1, len(names))
         self.groups = tuple(map(tuple, every.tolist()))
-        self._body = np.repeat(numbers, len(names))
+        self.body = np.repeat(numbers, len(names))
         self.action_set = ActionSet()
         self.world = World(robots, self.box, infrared=settings.infrared)
-        self._space = state_space_for(settings.state_space, self.robot.max_speed)
+        self.space = state_space_for(settings.state_space, self.robot.max_speed)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
-        self.state_space = self._space.space
+        self.state_space = self.space.space
         self.nominal_effects = (nominal_effect(self.robot),) * settings.robots
         """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
         self.constants = CONSTANTS if settings.predictor == "push" else ()
@@ -158,17 +100,17 @@ class BoxPushing(Scenario, Embodiment):
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = WheelFailures(settings.failures, self.agents, self._limits)
         reward_settings = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
-        self._task = Task(
+        self.task = Task(
             reward_settings, self._unit * settings.tolerance, settings.orientation_tolerance
         )
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._premises = Premises(
             self._belief,
-            self._space,
+            self.space,
             self.action_set,
             settings.speed_increment,
             self._limits,
-            self._task,
+            self.task,
             settings.infrared,
             self.box.outline,
             settings.period,
@@ -213,10 +155,14 @@ class BoxPushing(Scenario, Embodiment):
         self._save()
         return self._observe(self.world.box_pose)
 
+    def commanded(self, speeds: FloatArray, joint_actions: IntArray) -> FloatArray:
+        """Return the wheel speeds ``(..., n)`` that joint actions command, given those before."""
+        unit = self.settings.speed_increment * self._limits
+        return self.action_set.apply(speeds, joint_actions, unit, self._limits)
+
     def step(self, joint_action: IntArray) -> Transition:
         """Command the wheels, let the world go on for one decision period, observe and reward."""
-        unit = self.settings.speed_increment * self._limits
-        self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
+        self._speeds = self.commanded(self._speeds, joint_action)
         before = self._distance()
         poses = self.world.robot_poses.copy()
         box = self.world.box_pose.copy()
@@ -237,8 +183,8 @@ class BoxPushing(Scenario, Embodiment):
         distance, way, turn = np.array([[away], [away - before], [measured["orientation_rad"]]])
         contact = self.world.contact[None]
         strongest = readings.max(axis=1)[None]
-        gained = reward(self._task, distance, way, turn, contact, strongest)[0]
-        received = gained[self._body] if self.settings.reward.of == "robot" else float(gained[0])
+        gained = reward(self.task, distance, way, turn, contact, strongest)[0]
+        received = gained[self.body] if self.settings.reward.of == "robot" else float(gained[0])
         sensed = perf_counter()
         if terminated:
             # Does the box come to rest within the tolerance when all wheels stop?
@@ -247,9 +193,16 @@ class BoxPushing(Scenario, Embodiment):
         self._step += 1
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
-        farthest = self._unit * self.settings.termination_radius
-        truncated = not terminated and away > farthest
+        truncated = not terminated and away > self.farthest
         return Transition(states, received, terminated, truncated, measured, twists)
+
+    def worlds(self, count: int) -> BoxWorlds | None:
+        """Return many such worlds in one call; None where something fails, is noisy or a user's."""
+        settings = self.settings
+        is_noisy = settings.failures or settings.infrared.noise or self._playground is not None
+        if is_noisy or not self.space.is_built_in or step_address() is None:
+            return None
+        return BoxWorlds(self, count)
 
     def embodiment(self) -> Embodiment:
         """Return itself: its robots are open to self-models."""
@@ -348,7 +301,7 @@ class BoxPushing(Scenario, Embodiment):
     def _reached(self) -> bool:
         distance = np.array([self._distance()])
         orientation = np.array([self._orientation()])
-        return bool(self._task.reached(distance, orientation)[0])
+        return bool(self.task.reached(distance, orientation)[0])
 
     def _observe(self, origin: FloatArray) -> FloatArray:
         """Return the states ``(n, d)`` of all agents: the error observation layer.
@@ -356,16 +309,74 @@ class BoxPushing(Scenario, Embodiment):
         `origin` is the pose ``(3,)`` of the box one decision period ago.
         """
         world = self.world
-        poses = self.world.robot_poses
+        poses = world.robot_poses[None]
+        here = world.box_pose[None]
+        return self.states_at(poses, here, world.gaps[None], origin, self._speeds[None])[0]
+
+    def states_at(
+        self, robots: FloatArray, box: FloatArray, gaps: FloatArray, origin: FloatArray,
+        speeds: FloatArray,
+    ) -> FloatArray:  # fmt: skip
+        """Return the states ``(m, n, d)`` of all agents in m situations, see `View`.
+
+        `speeds` are those commanded ``(m, n)`` [m/s].
+        """
         view = View(
-            poses[None],
-            world.box_pose[None],
-            world.gaps[None],
-            self._goal,
-            origin,
-            1.0,
-            self.box.outline,
-            self.box.friction_radius,
+            robots, box, gaps, self._goal, origin, 1.0, self.box.outline, self.box.friction_radius
         )
-        own = self._space.own(poses[self._body], self._speeds, self._goal)
-        return np.hstack([own, self._space.observe(view)[self._body]])
+        poses = robots[:, self.body].reshape(-1, 3)
+        own = self.space.own(poses, speeds.reshape(-1), self._goal).reshape(*speeds.shape, -1)
+        return np.concatenate([own, self.space.observe(view)[:, self.body]], axis=2)
+
+
+class BoxWorlds(StackedWorlds[BoxPushing]):
+    """Many worlds of as many robots, without failures and without noise of sensors.
+
+    Their physics is one compiled call. What each has is, bit by bit, what it has by itself.
+
+    Box2D keeps the bodies of a world where it likes, so that every place has a `World` of its own:
+    that in which the scenario has begun the episode.
+    """
+
+    def stack(self, world: BoxPushing, count: int) -> None:
+        """Make room."""
+        one = world.world
+        n_robots = len(one.robots)
+        self._worlds = [World(one.robots, one.box, infrared=one.sensor) for _ in range(count)]
+        self._addresses: IntArray = np.zeros((count, n_robots + 2), dtype=np.int64)
+        self._last: FloatArray = np.zeros((count, n_robots, 3))
+        self._wrenches: FloatArray = np.zeros((count, n_robots, 3))
+        self._speeds: FloatArray = np.zeros((count, len(world.agents)))
+        self._boxes: FloatArray = np.zeros((count, 3))
+
+    def take(self, place: int, world: BoxPushing) -> None:
+        """Keep the world that has begun in a place; the scenario has the former one of it."""
+        begun = world.world
+        world.world = self._worlds[place]
+        self._worlds[place] = begun
+        self._addresses[place] = begun.addresses
+        self._last[place] = 0.0
+        self._wrenches[place] = 0.0
+        self._speeds[place] = 0.0
+        self._boxes[place] = begun.box_pose
+
+    def step(self, joint_actions: IntArray) -> Transitions:
+        """Command the wheels of all worlds for one decision period, observe and reward."""
+        one = self.scenario
+        before = self._boxes
+        self._speeds = one.commanded(self._speeds, joint_actions)
+        poses, gaps, readings = one.world.advance_many(
+            self._addresses, self._speeds, one.settings.action_repeat, self._last, self._wrenches
+        )
+        boxes = np.ascontiguousarray(poses[:, 0])
+        self._boxes = boxes
+        states = one.states_at(poses[:, 1:], boxes, gaps, before, self._speeds)
+        away = np.hypot(*(GOAL[:2] - boxes[:, :2]).T)
+        way = away - np.hypot(*(GOAL[:2] - before[:, :2]).T)
+        turn = wrap(boxes[:, 2] - GOAL[2])
+        reached = one.task.reached(away, turn)
+        paid = reward(one.task, away, way, turn, gaps < TOUCHING, readings)
+        if one.settings.reward.of == "robot":
+            paid = paid[:, one.body]
+        rewards = np.broadcast_to(paid, joint_actions.shape)
+        return Transitions(states, rewards, reached, ~reached & (away > one.farthest))

@@ -59,6 +59,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "check": (".commands.checking", "Check that scenarios keep their promises."),
     "combine": (".commands.describing", "Try every learner with every part of a condition."),
     "cost": (".commands.describing", "Print what hierarchies cost, by formula and measured."),
+    "profile": (".commands.describing", "Tell what the time of decisions goes to, part by part."),
     "atlas": (PUBLISHED, "Print what small teams tell of large ones, task by task."),
     "benchmark": (PUBLISHED, "Enter a learner in the benchmark push-n, and compare entries."),
     "claims": (PUBLISHED, "Print the claims of the paper and the verdict on each."),

@@ -16,38 +16,38 @@ from ...core.learners import LEARNERS, LearnerSettings
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.spec import Spec
+from ..spec.tables import SpecTable
 from ..store.durable import TEAM
 from ..trials.arrangement import check_conditions
 from ..trials.session import Session, run_trial
 from ..trials.trial import trials_of
 
-Table = Mapping[str, Any]
 """A spec, or what is laid over it."""
 
 
 class Setting(NamedTuple):
     """Where the cells of a learner are run."""
 
-    scenario: Table
+    scenario: SpecTable
     """Three agents, none of which has others in its body."""
     size: str
     """The key of their number."""
     first: str
     """The name of the first."""
-    bodies: Table
+    bodies: SpecTable
     """One whose bodies have several actuators."""
 
 
-BOX: Table = {"kind": "box-pushing", "robots": 2}
+BOX: SpecTable = {"kind": "box-pushing", "robots": 2}
 LINE = Setting({"kind": "line-up", "carts": 3}, "carts", "cart1", BOX)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "worlds"
-PLAYERS: Table = {"kind": f"{EXAMPLES / 'levers.py'}:Levers", "players": 3}
+PLAYERS: SpecTable = {"kind": f"{EXAMPLES / 'levers.py'}:Levers", "players": 3}
 LEVERS = Setting(PLAYERS, "players", "player1", PLAYERS)
 """For Q-learning: a state holds what was done. Every player is a body."""
-NETWORK: Table = {"hidden": [8], "batch_size": 4}
-POLICY: Table = {**NETWORK, "rollout": 4, "epochs": 1}
-BATCH: Table = {"kind": "batch-td", "weights": "role"}
-SHORT: dict[str, Table] = {
+NETWORK: SpecTable = {"hidden": [8], "batch_size": 4}
+POLICY: SpecTable = {**NETWORK, "rollout": 4, "epochs": 1}
+BATCH: SpecTable = {"kind": "batch-td", "weights": "role"}
+SHORT: dict[str, SpecTable] = {
     "ppo": POLICY,
     "ippo": POLICY,
     "hierarchy-ppo": POLICY,
@@ -58,20 +58,20 @@ SHORT: dict[str, Table] = {
 """What learners are set to in trials so short."""
 
 
-def failing(kind: str, agents: str, **more: str) -> Table:
+def failing(kind: str, agents: str, **more: str) -> SpecTable:
     """Return the table of a chain whose messages fail."""
     return _chain(failures=[{"kind": kind, "agents": agents, **more}])
 
 
-def _chain(**more: object) -> Table:
+def _chain(**more: object) -> SpecTable:
     return {"topology": {"kind": "chain", **more}}
 
 
-def _joined(kind: str, **more: object) -> Table:
+def _joined(kind: str, **more: object) -> SpecTable:
     return {"topology": {"kind": kind, **more}}
 
 
-def _predicted(kind: str) -> Table:
+def _predicted(kind: str) -> SpecTable:
     return {"learner": {"predictor": {"kind": kind}}}
 
 
@@ -83,7 +83,7 @@ WALKER = {
 }
 """A world that predicts nothing."""
 SEIZED = {"kind": "seized", "wheels": "robot1*"}
-AXES: dict[str, dict[str, Table]] = {
+AXES: dict[str, dict[str, SpecTable]] = {
     "topology": {
         "chain": _chain(order="reversed"),
         "tree": _joined("tree"),
@@ -162,7 +162,7 @@ class Combination(NamedTuple):
     outcome: Trying
 
 
-def spec_of(learner: str, changes: Table) -> dict[str, object]:
+def spec_of(learner: str, changes: SpecTable) -> dict[str, object]:
     """Return the spec of a cell, as a table.
 
     What is said of learners of a mixed team is said of the last of them. Words in capitals stand
@@ -195,7 +195,7 @@ def spec_of(learner: str, changes: Table) -> dict[str, object]:
     return {key: _filled(value, words) for key, value in table.items()}
 
 
-def _filled(value: object, words: Mapping[str, Any]) -> object:
+def _filled(value: object, words: SpecTable) -> object:
     if isinstance(value, Mapping):
         return {words.get(key, key): _filled(part, words) for key, part in value.items()}
     if isinstance(value, list):
@@ -203,7 +203,7 @@ def _filled(value: object, words: Mapping[str, Any]) -> object:
     return words.get(value, value) if isinstance(value, str) else value
 
 
-def attempt(table: Table) -> Trying:
+def attempt(table: SpecTable) -> Trying:
     """Run a cell.
 
     Raises

@@ -8,10 +8,10 @@ from ...core.interface.measures import SUCCESS
 from ..errors import WIDTH
 from ..results.analysis import EVALUATED, Difference, format_p
 from ..results.contrasts import contrasts
+from ..results.notation import bracketed
 from ..results.results import Results
 from ..results.statistics import LEVEL, rate
 from ..spec.controls import LEARN_NOTHING, control_of, is_drawn
-from .tables import Cell
 
 MOST = 3
 """Teams that learn of which sentences are made; of more, tables and verdicts tell."""
@@ -65,7 +65,7 @@ def _sentence(
 
 
 def _success(results: Results, condition: str) -> str:
-    return Cell.of(rate(results.success(condition, "evaluation"))).bracketed(" ")
+    return bracketed(rate(results.success(condition, "evaluation")))
 
 
 def _is_below(difference: Difference) -> bool:

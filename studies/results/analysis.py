@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
 from ..errors import WIDTH
+from .notation import bracketed, signed
 from .power import power_lines
 from .results import Results
 from .statistics import LEVEL, Array, Estimate, bootstrap, exactly, paired_tests, rate
@@ -75,17 +76,9 @@ class Difference:
     @property
     def shown(self) -> str:
         """Value, interval, p as it is and adjusted, as text."""
-        value, low, high = map(_format_difference, self.estimate)
-        interval = f"{value} [{low}, {high}]"
         raw = format_p(self.raw)
-        adjusted = format_p(self.p)
-        return f"{interval}, p {adjusted} ({raw.removeprefix('= ')} unadjusted)"
-
-
-def _format_difference(value: ArrayLike) -> str:
-    """Return a difference with its sign, which rounding errors about 0 have not."""
-    text = f"{float(np.asarray(value)):+.2f}"
-    return "0.00" if text in ("+0.00", "-0.00") else text
+        shown = f"{bracketed(self.estimate, signed)}, p {format_p(self.p)}"
+        return f"{shown} ({raw.removeprefix('= ')} unadjusted)"
 
 
 def format_p(p: float) -> str:

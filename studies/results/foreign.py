@@ -11,7 +11,7 @@ import json
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -84,7 +84,7 @@ class ScoreColumns(NamedTuple):
         )
 
 
-Labels = dict[str, dict[str, Any]]
+Labels = dict[str, dict[str, object]]
 """By condition, what tells it from the others."""
 
 

@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 
 from ...core.numerics import quadrature, special
 from ..errors import WIDTH
-from .statistics import EXACT, LEVEL, Array, two_figures
+from .notation import two_figures
+from .statistics import EXACT, LEVEL, Array
 
 WANTED = 0.8
 """The power that studies are planned for (Cohen 1988)."""

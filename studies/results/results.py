@@ -22,7 +22,7 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins import sources
 from ..errors import SpecError
-from ..spec.tables import flat, label
+from ..spec.tables import SpecTable, flat, label
 from ..store.database import EVALUATION
 from ..store.store import Store
 from ..trials.episodes import join_measures
@@ -47,7 +47,7 @@ class Results:
     numbers of `TrialResult.numbers` and `TrialResult.usage` by their names."""
     phases: tuple[str, ...] = ()
     """The phases of the episodes: training, evaluation, then others."""
-    columns: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    columns: Mapping[str, SpecTable] = field(default_factory=dict)
     """By condition, what tells it from the others, see
     `nested_agents.studies.spec.conditions.Condition`."""
     measures: tuple[Measure, ...] = (SUCCESS,)
@@ -220,7 +220,7 @@ def assemble(
     episodes: Sequence[pd.DataFrame],
     trials: Sequence[pd.DataFrame],
     phases: Iterable[str],
-    columns: Mapping[str, Mapping[str, Any]],
+    columns: Mapping[str, SpecTable],
     measures: tuple[Measure, ...],
     usage: Iterable[str],
 ) -> Results:
@@ -268,7 +268,7 @@ def from_arrays(
     seeds: Mapping[str, Sequence[int]],
     numbers: Mapping[str, Mapping[str, ArrayLike]],
     usage: Mapping[str, Mapping[str, ArrayLike]],
-    columns: Mapping[str, Mapping[str, Any]],
+    columns: Mapping[str, SpecTable],
     measures: tuple[Measure, ...],
 ) -> Results:
     """Return results as frames, given as arrays.
@@ -339,7 +339,7 @@ DIRECTORY = "directory"
 """Column that tells from which study a condition came, where there are several."""
 
 
-def choose_trials(results: Results, choice: str, settings: Mapping[str, Any]) -> Results:
+def choose_trials(results: Results, choice: str, settings: SpecTable) -> Results:
     """Return the results of the trials of a choice, such as ``robots == 8 and box == "circle"``.
 
     Parameters
@@ -382,7 +382,7 @@ def choose_trials(results: Results, choice: str, settings: Mapping[str, Any]) ->
     return replace(results, episodes=episodes, trials=trials, columns=columns)
 
 
-def _distinguish(name: str, tables: Sequence[Mapping[str, Any]]) -> list[str]:
+def _distinguish(name: str, tables: Sequence[SpecTable]) -> list[str]:
     """Return labels of conditions of one name, by one or two settings that tell all apart; or none.
 
     Examples
@@ -398,7 +398,7 @@ def _distinguish(name: str, tables: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def combine(
-    studies: Sequence[tuple[str, Results]], settings: Sequence[Mapping[str, Any]] = ()
+    studies: Sequence[tuple[str, Results]], settings: Sequence[SpecTable] = ()
 ) -> tuple[Results, list[dict[str, str]]]:
     """Return the results of several studies as those of one, and the new labels of each.
 

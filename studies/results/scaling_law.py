@@ -17,9 +17,10 @@ from ..spec.tables import label_but
 from . import laws
 from .analysis import Summary, format_p
 from .contrasts import values_of
+from .notation import bracketed, two_figures
 from .power import seeds_for
 from .results import Results
-from .statistics import LEVEL, Array, Estimate, holm, two_figures
+from .statistics import LEVEL, Array, holm
 
 WINDOW = 5
 """Episodes in a row whose mean success must reach a criterion."""
@@ -105,12 +106,6 @@ class ScalingLaw(NamedTuple):
                 f"probability .80 by about {seeds} seeds at these sizes."
             )
         return lines
-
-
-def bracketed(e: Estimate) -> str:
-    """Return an estimate with its interval, ``.39 [.21, .56]``."""
-    value, low, high = (two_figures(float(end)) for end in e)
-    return f"{value} [{low}, {high}]"
 
 
 def _wrapped(text: str, indent: str = "") -> list[str]:

@@ -20,12 +20,14 @@ from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
+from ...core.learners.written import WrittenSettings
 from ...core.plugins.registry import Plugged
 from ...core.plugins.settings import ScenarioSettings, Settings, check_team, unwritten
 from ...scenarios import DEFAULT, SCENARIOS
 from ...scenarios.faults.perception import perceived
 from ...topologies import build
 from ...topologies.config import Topology, parse
+from .tables import SpecTable
 
 SECONDS_PER_PAIR = 1e-8
 """What a decision takes at least for every pair of agents, of whatever scenario [s]."""
@@ -51,7 +53,7 @@ class StageSettings(Settings):
     """How its episodes are called."""
     episodes: Length
     """Training episodes in it."""
-    scenario: Mapping[str, Any] = Field(default_factory=dict)
+    scenario: SpecTable = Field(default_factory=dict)
     """Laid over the condition's scenario."""
 
 
@@ -133,8 +135,13 @@ class ConditionSettings(Settings):
         return (f"topology.considers: left out, {learner} considers nobody",) if ignored else ()
 
     def remarks(self) -> tuple[str, ...]:
-        """Return whose plans do not know whose weights, a line for each part of a mixed team."""
+        """Return whose plans do not know whose weights, a line for each part of a mixed team.
+
+        A written value of nothing is named as well.
+        """
         learner = self.learner
+        if isinstance(learner, WrittenSettings) and not learner.value:
+            return ("learner.value: nothing is worth anything, so that actions are random",)
         if not isinstance(learner, MixedSettings) or self.topology.considers == "none":
             return ()
         return tuple(
@@ -165,13 +172,13 @@ class Override(Settings):
     """How its conditions are called."""
     preset: str | None = None
     """The preset under its tables; none: the spec's."""
-    scenario: Mapping[str, Any] = Field(default_factory=dict)
+    scenario: SpecTable = Field(default_factory=dict)
     """Laid over the spec's scenario."""
     agents: Granularity | None = None
     """In place of the spec's; none: the spec's."""
-    topology: Mapping[str, Any] = Field(default_factory=dict)
+    topology: SpecTable = Field(default_factory=dict)
     """Laid over the spec's topology."""
-    learner: Mapping[str, Any] = Field(default_factory=dict)
+    learner: SpecTable = Field(default_factory=dict)
     """Laid over the spec's learner."""
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
     """Lists of values by dotted key, for this override alone."""
@@ -184,7 +191,7 @@ class Condition(NamedTuple):
 
     label: str
     """Short name, unique within its study."""
-    columns: Mapping[str, Any]
+    columns: SpecTable
     """What tells it from the others, as the columns of a result: `name` if there are overrides, the
     swept keys (empty where an override does not sweep), `preset` if there is neither."""
     settings: ConditionSettings
@@ -195,7 +202,7 @@ class Condition(NamedTuple):
     curriculum: tuple[Stage, ...] = ()
     """What its teams are trained on before."""
     left_out: tuple[str, ...] = ()
-    """Keys of its preset, or of what the scenario lays over that, which its kinds have not or
+    """SpecTable of its preset, or of what the scenario lays over that, which its kinds have not or
     refuse."""
     other_kinds: tuple[str, ...] = ()
     """Which kinds these are, as ``learner.kind = 'fitted-q'``; where nothing is left out, none."""

@@ -11,11 +11,11 @@ random, frozen weights and random actions are one control.
 
 from collections.abc import Mapping
 from textwrap import wrap
-from typing import Any
 
 from ...core.plugins.words import show
 from ...topologies.builders import join_names
 from ..errors import WIDTH
+from .tables import SpecTable
 
 LEARN_NOTHING = ("frozen", "written")
 """Kinds of learners that do not learn."""
@@ -24,7 +24,7 @@ WITH_REWARDS = ("reward", "reward-and-value")
 MOST_NAMES = 3
 """Conditions that a remark names."""
 
-Settings = Mapping[str, Any]
+Settings = SpecTable
 """The settings of a condition as a table."""
 
 

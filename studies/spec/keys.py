@@ -28,6 +28,7 @@ from ...core.plugins.words import near
 from .conditions import ConditionSettings, Override, StageSettings
 from .presets import PRESETS
 from .spec import Spec
+from .tables import SpecTable
 
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 """How the text beside a field names its unit."""
@@ -229,7 +230,7 @@ def _table(
     return Table(name, *kinds, " ".join(summary.split()), model, keys)
 
 
-def _laid_by_preset(name: str, kind: str) -> Mapping[str, Any]:
+def _laid_by_preset(name: str, kind: str) -> SpecTable:
     """Return the table of the preset `default` by name, if it is of this kind."""
     table: Any = PRESETS["default"].table
     for part in name.split("."):

@@ -14,7 +14,7 @@ import itertools
 import json
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from pydantic import ValidationError
 
@@ -34,11 +34,11 @@ from ..errors import SpecError, refused
 from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings
 from .controls import LEARN_NOTHING
 from .presets import PRESETS
-from .tables import TomlTable, flat, label, nested, overlay, scalar, without
+from .tables import SpecTable, TomlTable, flat, label, nested, overlay, scalar, without
 
 SECTIONS = ("scenario", "topology", "learner")
 
-Layer = Mapping[str, Any]
+Layer = SpecTable
 """A table, or a point of a sweep, that is laid over what is below it."""
 Layers = Sequence[Layer]
 """Tables, each over the one before."""

@@ -13,7 +13,7 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ...core.plugins.sources import ANSWERS, Answers, Sources, meaning
 from ...core.plugins.words import show
@@ -24,6 +24,7 @@ from ..store.store import Store
 
 if TYPE_CHECKING:
     from .spec import Spec
+    from .tables import SpecTable
 
 
 def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
@@ -58,9 +59,9 @@ class StudyOutline(NamedTuple):
     """As in `Spec`."""
     evaluation: int
     """As in `Spec`."""
-    columns: Mapping[str, Mapping[str, Any]]
+    columns: Mapping[str, SpecTable]
     """By condition, what tells it from the others."""
-    table: Mapping[str, Any]
+    table: SpecTable
     """The whole spec as a table."""
 
     @property
@@ -92,9 +93,7 @@ class StudyOutline(NamedTuple):
             ) from None
 
     @classmethod
-    def noted(
-        cls, table: Mapping[str, Any], columns: Mapping[str, Mapping[str, Any]]
-    ) -> StudyOutline:
+    def noted(cls, table: SpecTable, columns: Mapping[str, SpecTable]) -> StudyOutline:
         """Return the outline that `Spec.table` and the columns of its conditions tell.
 
         Raises

@@ -5,9 +5,10 @@ laid over it. `frozen`, `random` and `planner` are the controls of a learning cu
 """
 
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from .tables import SpecTable
 
 
 class Preset(NamedTuple):
@@ -15,9 +16,9 @@ class Preset(NamedTuple):
 
     summary: str
     """What it is, in one line."""
-    table: Mapping[str, Any]
+    table: SpecTable
     """The `scenario`, `topology` and `learner` tables as they would stand in a spec."""
-    other_scenarios: Mapping[str, Any]
+    other_scenarios: SpecTable
     """Laid over it where the scenario is of another kind than its own."""
 
 

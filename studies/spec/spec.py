@@ -45,7 +45,7 @@ from .controls import LEARN_NOTHING, planning_remark
 from .layers import below, expand, grid, section, tuning_keys
 from .presets import PRESETS
 from .studies import STUDIES
-from .tables import TomlTable, assignment, overlay
+from .tables import SpecTable, TomlTable, assignment, overlay
 
 REGISTRIES: dict[str, Registry] = {
     "study": STUDIES,
@@ -177,13 +177,13 @@ class Spec(Settings):
     keep_teams: bool = False
     """Whether trained teams are kept with their trials, to act, be explained and be re-evaluated
     without training anew."""
-    scenario: Mapping[str, Any] = Field(default_factory=dict)
+    scenario: SpecTable = Field(default_factory=dict)
     """Laid over the preset's scenario."""
     agents: Granularity | None = None
     """What there is one agent for: each actuator (the default), each body, the team."""
-    topology: Mapping[str, Any] = Field(default_factory=dict)
+    topology: SpecTable = Field(default_factory=dict)
     """Laid over the preset's topology; may be written as a string."""
-    learner: Mapping[str, Any] = Field(default_factory=dict)
+    learner: SpecTable = Field(default_factory=dict)
     """Laid over the preset's learner."""
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
     """Lists of values by dotted key; the conditions are all their combinations."""
@@ -193,7 +193,7 @@ class Spec(Settings):
     """Tables by name, each laid over those above and crossed with the sweep."""
     curriculum: Curriculum = ()
     """Stages in which teams are trained before `episodes`, in scenarios laid over their own."""
-    evaluations: Mapping[Name, Mapping[str, Any]] = Field(default_factory=dict)
+    evaluations: Mapping[Name, SpecTable] = Field(default_factory=dict)
     """By name, changes of the scenario in which the trained teams are evaluated too; under
     ``topology`` and ``learner.decision``, of how they decide."""
 
@@ -232,7 +232,7 @@ class Spec(Settings):
         return cls.of(table)
 
     @classmethod
-    def of(cls, table: Mapping[str, Any], sources: Sources | None = None) -> Spec:
+    def of(cls, table: SpecTable, sources: Sources | None = None) -> Spec:
         """Build a spec from a table as TOML reads it, or with objects in it.
 
         Parameters
@@ -259,7 +259,7 @@ class Spec(Settings):
             raise SpecError(f"spec: {error}") from None
 
     @classmethod
-    def _of(cls, table: Mapping[str, Any], sources: Sources) -> Spec:
+    def _of(cls, table: SpecTable, sources: Sources) -> Spec:
         table = expand(plain(table), "")
         if isinstance(table.get("overrides"), list | tuple):
             table["overrides"] = tuple(
@@ -313,9 +313,7 @@ class Spec(Settings):
                 )
 
     @classmethod
-    def read(
-        cls, spec: Spec | Mapping[str, Any] | str | PathLike[str], study: Path | None = None
-    ) -> Spec:
+    def read(cls, spec: Spec | SpecTable | str | PathLike[str], study: Path | None = None) -> Spec:
         """Return the spec that a table or the path of a TOML file stands for; see `of`, `load`."""
         if isinstance(spec, Spec):
             return spec
@@ -374,7 +372,7 @@ class Spec(Settings):
         """Return the conditions in the order of the overrides and sweeps."""
         return self._conditions
 
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Spec:
+    def model_copy(self, *, update: SpecTable | None = None, deep: bool = False) -> Spec:
         """Return a spec with some fields changed, and the conditions that then follow."""
         return Spec.of({**self.table(), **(update or {})}, self.sources)
 

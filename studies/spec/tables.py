@@ -20,9 +20,11 @@ from ...core.plugins.models import Slot, field_of, kinds_at, model_at
 from ...core.plugins.words import show
 
 TomlTable = dict[str, Any]
+SpecTable = Mapping[str, Any]
+"""A table of a spec, or a part of one, that is only read: its values are what TOML has."""
 
 
-def overlay(base: Mapping[str, Any], table: Mapping[str, Any], slot: Slot = None) -> TomlTable:
+def overlay(base: SpecTable, table: SpecTable, slot: Slot = None) -> TomlTable:
     """Return `base` with `table` laid over it; neither is modified.
 
     Parameters
@@ -74,7 +76,7 @@ def nested(key: str, value: object) -> TomlTable:
     return typing.cast(TomlTable, value)
 
 
-def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat(table: SpecTable, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Yield the dotted key and the value of every entry; tables are descended into, lists not.
 
     Examples
@@ -89,7 +91,7 @@ def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
             yield f"{prefix}{key}", value
 
 
-def without(table: Mapping[str, Any], keys: Collection[str], prefix: str = "") -> TomlTable:
+def without(table: SpecTable, keys: Collection[str], prefix: str = "") -> TomlTable:
     """Return a table without what stands at some dotted keys; it is not modified.
 
     Examples
@@ -131,7 +133,7 @@ def assignment(text: str) -> TomlTable:
         raise ValueError("the key is not valid TOML") from None
 
 
-def dumps(table: Mapping[str, Any]) -> str:
+def dumps(table: SpecTable) -> str:
     """Return a table as TOML text; entries that are None are left out, as TOML has no word for it.
 
     Raises
@@ -166,7 +168,7 @@ LONGEST_TABLE = 40
 """A longer table is not spelled out in labels [characters]."""
 
 
-def label(point: Mapping[str, Any], name: str = "") -> str:
+def label(point: SpecTable, name: str = "") -> str:
     """Return a short name for a point of the sweeps of an override.
 
     Examples
@@ -187,7 +189,7 @@ def label(point: Mapping[str, Any], name: str = "") -> str:
     return ", ".join(parts)
 
 
-def aliases(condition: str, columns: Mapping[str, Any]) -> set[str]:
+def aliases(condition: str, columns: SpecTable) -> set[str]:
     """Return all that a condition may be called by: its label, its columns with and without keys.
 
     Examples
@@ -216,7 +218,7 @@ def named(name: str, known: Mapping[str, Collection[str]]) -> str | None:
     return labels[0] if len(labels) == 1 else None
 
 
-def label_but(columns: Mapping[str, Any], keys: Collection[str]) -> str:
+def label_but(columns: SpecTable, keys: Collection[str]) -> str:
     """Return the label that a condition of these columns would have without some swept keys.
 
     Examples

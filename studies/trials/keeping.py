@@ -6,7 +6,6 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ...core.interface.measures import Measure
 from ...core.plugins.sources import FOLDER, Sources, kept_name
@@ -14,7 +13,7 @@ from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
-from ..spec.tables import aliases, dumps, flat, named
+from ..spec.tables import SpecTable, aliases, dumps, flat, named
 from ..store.connection import DamageError
 from ..store.database import DATABASE, SPEC_FILE, NoStudyError, Planned, StudyNotes
 from ..store.durable import read_text
@@ -287,7 +286,7 @@ def _seeds(written: int | Sequence[int]) -> Sequence[int]:
     return list(range(written)) if isinstance(written, int) else written
 
 
-def _written(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+def _written(old: SpecTable, new: SpecTable) -> Iterator[str]:
     """Yield which keys of two specs differ, besides seeds."""
     before, after = (dict(flat(spec)) for spec in (old, new))
     for key in sorted((before.keys() | after.keys()) - {"seeds"}):
@@ -300,7 +299,7 @@ def _unequal(name: str, there: object, here: object) -> Iterator[str]:
         yield f"{name} = {texts[0]} there, {texts[1]} here"
 
 
-def _curricula(notes: StudyNotes) -> list[Sequence[Mapping[str, Any]]]:
+def _curricula(notes: StudyNotes) -> list[Sequence[SpecTable]]:
     """Return the stages of the spec and of each of its overrides, as they are written."""
     own = notes.spec.get("curriculum", [])
     return [own, *(o.get("curriculum", own) for o in notes.spec.get("overrides", ()))]

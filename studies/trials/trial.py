@@ -19,6 +19,7 @@ from ...core.plugins.settings import Settings
 from ...core.plugins.sources import Sources, files_in
 from ..spec.conditions import ConditionSettings, Stage
 from ..spec.outline import lengths
+from ..spec.tables import SpecTable
 from ..store.database import RESULTS_VERSION, Planned
 from ..store.durable import Recording
 from .episodes import EpisodeRow
@@ -192,16 +193,15 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
     return tuple(trial.with_seed(seed) for seed in spec.seeds for trial in first)
 
 
-Table = Mapping[str, Any]
 """Settings, as plain values."""
 
 
 def revive(
     sources: Sources,
-    settings: Table,
-    evaluations: Sequence[tuple[str, Table]],
-    curriculum: Sequence[tuple[str, int, Table]],
-    plain: Mapping[str, Any],
+    settings: SpecTable,
+    evaluations: Sequence[tuple[str, SpecTable]],
+    curriculum: Sequence[tuple[str, int, SpecTable]],
+    plain: SpecTable,
 ) -> Trial:
     """Return a trial that was pickled, its settings made again by its files."""
     build = partial(ConditionSettings.model_validate, strict=True)

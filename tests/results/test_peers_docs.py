@@ -11,10 +11,10 @@ from nested_agents.studies.spec.spec import Spec
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
-COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions", "CPU [s]")
+COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions")
 PREDICTORS = ("success, 2", "success, 6", "evaluation success", "decisions")
 SAMPLED = "success, sampled actions"
-ARM = ("success, 4", "success, 12", "evaluation success", SAMPLED, "decisions", "CPU [s]")
+ARM = ("success, 4", "success, 12", "evaluation success", SAMPLED, "decisions")
 EDGES = ("evaluation success", "messages")
 LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
 
@@ -31,11 +31,7 @@ LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
         ("peers-four-robots", COLUMNS),
         ("peers-100", LONG),
         ("peers-arm-long", LONG),
-        ("peers-tuning", ("success, 12", "evaluation success")),
-        ("peers-tuning-arm", ("success, 12", "evaluation success", SAMPLED)),
-        ("peers-tuning-arm-ours", ("success, 12", "evaluation success")),
         ("peers-predictors", PREDICTORS),
-        ("peers-plans", PREDICTORS),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,16 +16,11 @@ LAST = "success last 5", "evaluation success"
     ("name", "columns"),
     [
         ("predictors", TRAINED),
-        ("predictors-controls", LAST),
         ("predictors-arm", TRAINED),
         ("predictors-midpoint", TRAINED),
         ("predictors-teams", TRAINED),
         ("predictors-teams-three", LAST),
         ("predictors-eight", TRAINED),
-        ("predictors-pendulum", TRAINED),
-        ("predictors-pendulum-midpoint", LAST),
-        ("predictors-cartpole", TRAINED),
-        ("predictors-cartpole-long", (*LAST, "total reward")),
         ("predictors-cartpole-fine", (*LAST, "evaluation steps")),
     ],
 )

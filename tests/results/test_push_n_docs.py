@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-import nested_agents as na
-from nested_agents.results import ROWS, push_n
+from nested_agents.results import push_n
 from nested_agents.studies.cli.main import main
 
 pytestmark = pytest.mark.usefixtures("entries_read_once")
@@ -36,10 +35,3 @@ def test_python(monkeypatch: pytest.MonkeyPatch) -> None:
     exec(script, names)
     assert set(names["success"]) <= {"0", "1"}
     assert names["steps"] == (2,) * 10
-
-
-def test_the_time_of_a_decision_of_ppo() -> None:
-    results = na.load(ROWS / "peers-100.json").results
-    seconds = results.numbers("PPO")["seconds.total"]
-    decisions = results.values("PPO", "steps").sum(axis=1)
-    assert f"took {1e3 * seconds.mean() / decisions.mean():.1f} ms of a core" in TEXT

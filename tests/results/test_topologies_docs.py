@@ -1,4 +1,4 @@
-"""docs/topologies.md holds the tables that the committed results give."""
+"""docs/edges.md holds the tables that the committed results give, topologies.md what is run."""
 
 import re
 from itertools import pairwise
@@ -13,26 +13,18 @@ from nested_agents.results import ROWS
 from nested_agents.studies.catalogue.chain_order import equivalence
 from nested_agents.studies.catalogue.edges import TRAINED, analyse
 from nested_agents.studies.catalogue.hierarchies.pooled import effects
-from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.notation import bracketed, two_decimals, two_figures
 from nested_agents.studies.results.results import Results
-from nested_agents.studies.results.statistics import bootstrap, paired_permutation, two_figures
+from nested_agents.studies.results.statistics import Estimate, bootstrap, paired_permutation
 from nested_agents.studies.store.database import EVALUATION
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "topologies.md"
-EDGES = ("evaluation success", "decisions to goal", "decision [ms]", "messages")
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "edges.md"
 
 
-@pytest.mark.parametrize(
-    ("name", "columns"),
-    [
-        ("hierarchies", ("evaluation success", "decision [ms]", "messages")),
-        ("edges", EDGES),
-    ],
-)
-def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    table = print_table(name, columns, capsys)
-    assert table in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: put in\n{table}"
+def test_the_table_of_hierarchies(capsys: pytest.CaptureFixture[str]) -> None:
+    table = print_table("hierarchies", ("evaluation success", "messages"), capsys)
+    assert table in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: put in\n{table}"
 
 
 SETTINGS = {
@@ -48,17 +40,11 @@ def test_what_telling_is_worth_over_all_settings() -> None:
     for name, whose in SETTINGS.items():
         lost, slower = pooled(results, whose, "considered only")
         line = f"| {name} | {shown(lost)} | {p_of(lost)} | {times(slower)} | {p_of(slower)} |"
-        assert line in page, f"docs/topologies.md: put in\n{line}"
+        assert line in page, f"docs/edges.md: put in\n{line}"
     lost, slower = pooled(results, ("own",), "considered only")
     own = f"lose {shown(-lost)} and take {times(slower)} times the decisions"
     assert own in " ".join((PAGE.parents[1] / "README.md").read_text(encoding="utf-8").split())
     assert f"{shown(-lost)}, which does not decide" in (PAGE.parent / "claims.md").read_text()
-    gained, as_many = pooled(results, ("own", "team"), "considered only, private plans")
-    text = " ".join(page.split())
-    assert f"it gains {shown(gained)} on the chain (p = {p_of(gained)})" in text
-    ratio = bootstrap(as_many)
-    value, low, high = np.exp([ratio.value, ratio.low, ratio.high])
-    assert f"({value:.2f} [{low:.2f}, {high:.2f}] times)" in text
 
 
 def pooled(results: Results, whose: tuple[str, ...], other: str) -> tuple[np.ndarray, np.ndarray]:
@@ -78,13 +64,11 @@ def pooled(results: Results, whose: tuple[str, ...], other: str) -> tuple[np.nda
 
 
 def shown(of_seeds: np.ndarray) -> str:
-    return Cell.of(bootstrap(of_seeds)).bracketed(" ")
+    return bracketed(bootstrap(of_seeds))
 
 
 def times(logarithms: np.ndarray) -> str:
-    e = bootstrap(logarithms)
-    value, low, high = np.exp([e.value, e.low, e.high])
-    return f"{value:.2f} [{low:.2f}, {high:.2f}]"
+    return bracketed(Estimate(*map(np.exp, bootstrap(logarithms))), two_decimals)
 
 
 def p_of(of_seeds: np.ndarray) -> str:
@@ -101,11 +85,10 @@ def test_what_is_equal_to_the_chain(name: str) -> None:
     results = na.load(ROWS / f"{name}.json").results
     page = PAGE.read_text(encoding="utf-8")
     for other, (success, decisions) in effects(results, analyse(results).cases, TRAINED).items():
-        gained = Cell.of(success.estimate).bracketed(" ")
-        value, low, high = map(float, decisions.estimate)
-        longer = f"{value:.2f} [{low:.2f}, {high:.2f}] times"
+        gained = bracketed(success.estimate)
+        longer = f"{bracketed(decisions.estimate, two_decimals)} times"
         line = f"| {other} | {gained} | {success.verdict} | {longer} | {decisions.verdict} |"
-        assert line in page, f"docs/topologies.md: put in\n{line}"
+        assert line in page, f"docs/edges.md: put in\n{line}"
 
 
 def test_the_table_of_equal_treatment(capsys: pytest.CaptureFixture[str]) -> None:
@@ -122,7 +105,7 @@ def test_the_table_of_equal_treatment(capsys: pytest.CaptureFixture[str]) -> Non
         ("neither", "neither", "neither, plans"),
     ):
         line = f"| {row} | {cells[maintain]} | {cells[plans]} |"
-        assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+        assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
 
 
 EVALUATED_AS = (
@@ -131,14 +114,14 @@ EVALUATED_AS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["edges-hierarchies", "edges-arms", "edges-games"])
+@pytest.mark.parametrize("name", ["edges", "edges-hierarchies", "edges-arms", "edges-games"])
 def test_tables_with_a_column_for_each_evaluation(name: str, capsys) -> None:
     lines = print_table(name, ["evaluation success"], capsys).splitlines()[2:]
     success = {label: value for label, _, value in (line[2:-2].split(" | ") for line in lines)}
     rows = [label.removesuffix(", neither") for label in success if label.endswith(", neither")]
     for row in rows:
         line = " | ".join([row, *(success[f"{row}, {how}"] for how in EVALUATED_AS)])
-        assert f"| {line} |" in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+        assert f"| {line} |" in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
 
 
 def test_the_table_of_classes_of_edges(capsys) -> None:
@@ -146,7 +129,7 @@ def test_the_table_of_classes_of_edges(capsys) -> None:
     for line in print_table("edges-classes", columns, capsys).splitlines()[2:]:
         label, _, *values = line[2:-2].split(" | ")
         row = " | ".join([label.removeprefix("default, "), *values])
-        assert f"| {row} |" in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {row}"
+        assert f"| {row} |" in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {row}"
 
 
 def test_the_tables_of_broken_hierarchies(capsys) -> None:
@@ -163,7 +146,7 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
             rows.append([f"{trained}, {read}", *lost])
         for row in rows:
             line = f"| {' | '.join(row)} |"
-            assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+            assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
 
 
 @pytest.mark.parametrize(
@@ -181,12 +164,12 @@ def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
         for group in contrasts(na.load(ROWS / f"{name}.json").results, by="topology").groups:
             rates = [line.estimates["success"].value for line in group.table]
             learner, orders, verdict, ends = re.findall(
-                r"(.+), (\d+) orders, within 0.1: (.+) \((.+)\)", equivalence(group)
+                r"(.+), (\d+) orders, within 0.1: (.+) (\[.+\])", equivalence(group)
             )[0]
             rates = f"{two_figures(min(rates))} to {two_figures(max(rates))}"
             cells = task, learner, orders, str(group.table[0].seeds), rates, ends, verdict
             line = f"| {' | '.join(cells)} |"
-            assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+            assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
 
 
 def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
@@ -198,16 +181,17 @@ def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
         order = re.findall(r"agent(\d)", own.condition) or "12345678"
         order = order[::-1] if own.condition.endswith("reversed") else order
         heard = sum(abs(int(a) - int(b)) == 1 for a, b in pairwise(order))
-        rates = [Cell.of(line.estimates["success"]).bracketed(" ") for line in (own, other)]
+        rates = [bracketed(line.estimates["success"]) for line in (own, other)]
         line = f"| {' '.join(order)} | {heard} | {' | '.join(rates)} |"
-        assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+        assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
 
 
 @pytest.mark.slow
 def test_kept_teams_are_evaluated_again_as_it_says(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     studies = PAGE.with_name("studies.md").read_text(encoding="utf-8")
-    pages = PAGE.read_text(encoding="utf-8") + studies.replace("out/mine", "out/kept")
+    topologies = PAGE.with_name("topologies.md").read_text(encoding="utf-8")
+    pages = topologies + studies.replace("out/mine", "out/kept")
     blocks = re.findall(r"```python\n(.*?)```", pages, re.DOTALL)
     (again,) = [block for block in blocks if "na.reevaluate" in block]
     (acting,) = [block for block in blocks if "study.team" in block]

@@ -58,7 +58,7 @@ class View(Situations):
     goal: FloatArray
     """``(3,)`` goal pose of the box."""
     origin: FloatArray
-    """``(3,)`` pose of the box before the motion that led here."""
+    """``(3,)``, or in many worlds ``(m, 3)``: pose of the box before the motion that led here."""
     periods: float
     """How many decision periods that motion took."""
     outline: Outline
@@ -79,9 +79,10 @@ class View(Situations):
         return freeze(np.hypot(*(self.goal[:2] - self.box[:, :2]).T))
 
     @cached_property
-    def before(self) -> float:
+    def before(self) -> FloatArray:
         """Distance of the box from the goal before the motion that led here [m]."""
-        return float(np.hypot(self.goal[0] - self.origin[0], self.goal[1] - self.origin[1]))
+        x, y = (self.goal[k] - self.origin[..., k] for k in range(2))
+        return np.hypot(x, y)
 
     @property
     def approach(self) -> FloatArray:
@@ -128,7 +129,7 @@ class View(Situations):
         push = self.box[:, :2] - self._contact
         depth = push[:, 0] * x + push[:, 1] * y
         lever = push[:, 1] * x - push[:, 0] * y
-        way = self.box[:, :2] - self.origin[:2]
+        way = self.box[:, :2] - self.origin[..., :2]
         along = way[:, 0] * x + way[:, 1] * y
         across = way[:, 1] * x - way[:, 0] * y
         drift = np.arctan2(across, np.abs(along) + STILL * self.periods)
@@ -142,13 +143,20 @@ class View(Situations):
         return freeze(wrap(self.box[:, 2] - self.goal[2]))
 
     def seen_by_each(self) -> View:
-        """Return the only situation ``M`` times: in the k-th one robot k is the first.
+        """Return every situation ``M`` times: in the k-th one robot k is the first.
 
         The other robots follow in their order.
         """
-        order = _each_first(self.gaps.shape[1])
-        boxes = np.repeat(self.box, len(order), axis=0)
-        return replace(self, robots=self.robots[0][order], box=boxes, gaps=self.gaps[0][order])
+        m, n_robots = self.gaps.shape
+        order = _each_first(n_robots)
+        origin = self.origin if self.origin.ndim == 1 else np.repeat(self.origin, n_robots, axis=0)
+        return replace(
+            self,
+            robots=np.take(self.robots, order, axis=1).reshape(m * n_robots, n_robots, 3),
+            box=np.repeat(self.box, n_robots, axis=0),
+            gaps=np.take(self.gaps, order, axis=1).reshape(m * n_robots, n_robots),
+            origin=origin,
+        )
 
     def azimuth(self, robot: int) -> FloatArray:
         """Direction ``(m,)`` from a robot to the box [rad]."""

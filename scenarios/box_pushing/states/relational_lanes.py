@@ -85,7 +85,7 @@ class Columns:
             np.ascontiguousarray(view.gaps.T),
             view.goal,
             view.origin,
-            view.before,
+            float(view.before),
             view.periods,
             view.outline.edges,
             view.friction_radius,

@@ -43,19 +43,25 @@ class BoxStateSpace:
         return sense(self.functions, view, robots)
 
     def observe(self, view: View) -> FloatArray:
-        """Return the shared blocks ``(M, d - n_own)`` of all robots in the view's only situation.
+        """Return the shared blocks ``(m, M, d - n_own)`` of all robots.
 
         The same as `sense`, each built-in function called once for all robots.
         """
-        robots = range(view.gaps.shape[1])
+        shape = view.gaps.shape
         at_once, others = self._columns
-        shared = np.empty((len(robots), len(self.functions)))
-        shared[:, others] = sense([self.functions[c] for c in others], view, robots)[:, 0]
+        shared = np.empty((*shape, len(self.functions)))
+        of_others = sense([self.functions[c] for c in others], view, range(shape[1]))
+        shared[:, :, others] = of_others.swapaxes(0, 1)
         if at_once:
             each = view.seen_by_each()
             for column in at_once:
-                shared[:, column] = self.functions[column](each, 0)
+                shared[:, :, column] = self.functions[column](each, 0).reshape(shape)
         return shared
+
+    @property
+    def is_built_in(self) -> bool:
+        """Whether no variable is a user's."""
+        return all(thing.trusted for thing in self.functions)
 
     @cached_property
     def _columns(self) -> tuple[list[int], list[int]]:

@@ -17,7 +17,7 @@ import numpy as np
 from Box2D import _Box2D
 
 from ....core.numerics import FloatArray, IntArray, njit
-from .geometry import gaps
+from .geometry import gaps, infrared_readings
 from .robots import WheelModel, wheel_wrenches
 
 if TYPE_CHECKING:
@@ -108,6 +108,53 @@ def advance(
         for r in range(n_robots):
             touched[r] += apart[r] < touching
     return poses, apart, touched / len(speeds)
+
+
+@njit(cache=True, names_of="memory")
+def advance_many(
+    function: int,
+    addresses: IntArray,
+    speeds: FloatArray,
+    periods: int,
+    substeps: int,
+    dt: float,
+    unit: float,
+    model: WheelModel,
+    last: FloatArray,
+    wrenches: FloatArray,
+    edges: FloatArray,
+    rounding: float,
+    radii: FloatArray,
+    touching: float,
+    sensors: FloatArray,
+    reach: float,
+    decay: float,
+    kind: int,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Let control periods pass in many worlds alike, see `advance` and `infrared_readings`.
+
+    Axes of worlds stand first: addresses ``(W, M + 2)`` of worlds, boxes and robots, speeds
+    ``(W, n)``, held for all periods. Returned are poses ``(W, M + 1, 3)``, gaps ``(W, M)``, and
+    what the infrared sensors of each robot read most of the box ``(W, M)``.
+    """
+    count = len(addresses)
+    n_bodies = addresses.shape[1] - 1
+    poses = np.empty((count, n_bodies, 3))
+    apart = np.empty((count, n_bodies - 1))
+    strongest = np.empty((count, n_bodies - 1))
+    held = np.empty((periods, speeds.shape[1]))
+    for w in range(count):
+        held[:] = speeds[w]
+        poses[w], apart[w], _ = advance(
+            function, addresses[w, 0], addresses[w, 1:], held, substeps, dt, unit, model,
+            last[w], wrenches[w], edges, rounding, radii, touching,
+        )  # fmt: skip
+        readings = infrared_readings(
+            poses[w, 1:], radii, sensors, poses[w, 0], edges, rounding, reach, decay, kind
+        )
+        for r in range(n_bodies - 1):
+            strongest[w, r] = readings[0, r].max()
+    return poses, apart, strongest
 
 
 @cache

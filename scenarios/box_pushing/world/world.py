@@ -32,7 +32,13 @@ from .boxes import BoxSpec
 from .geometry import gaps, infrared_readings
 from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
-from .stepping import POSITION_ITERATIONS, VELOCITY_ITERATIONS, advance, step_address
+from .stepping import (
+    POSITION_ITERATIONS,
+    VELOCITY_ITERATIONS,
+    advance,
+    advance_many,
+    step_address,
+)
 
 UNIT = 10.0
 """Box2D units per metre."""
@@ -232,6 +238,59 @@ class World:
             self._observe()
             touched += self.contact
         self.contact_time = touched / len(speeds)
+
+    @property
+    def addresses(self) -> IntArray:
+        """Where the world, the box and the robots lie in memory ``(M + 2,)``, till it begins anew.
+
+        What is changed there, see `advance_many`, the world does not know.
+        """
+        return np.array([int(self._world.this), *self._addresses])
+
+    def advance_many(
+        self, addresses: IntArray, wheel_speeds: FloatArray, periods: int,
+        last: FloatArray, wrenches: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
+        """Let control periods pass in many worlds alike, none of which fails, as in `advance`.
+
+        Parameters
+        ----------
+        addresses
+            ``(W, M + 2)`` of all worlds.
+        wheel_speeds
+            ``(W, n_wheels)`` [m/s], held.
+        periods
+            How many.
+        last, wrenches
+            ``(W, M, 3)`` as in `WorldState`; modified.
+
+        Returns
+        -------
+        poses, gaps, readings : FloatArray
+            ``(W, M + 1, 3)`` of boxes and robots [m, m, rad], ``(W, M)`` [m], and what the infrared
+            sensor of a robot reads most of the box ``(W, M)``.
+        """
+        outline = self.box.outline
+        return advance_many(
+            step_address() or 0,
+            addresses,
+            wheel_speeds * UNIT,
+            periods,
+            SUBSTEPS,
+            self.dt,
+            UNIT,
+            self._wheels,
+            last,
+            wrenches,
+            outline.edges,
+            outline.rounding,
+            self._radii,
+            TOUCHING,
+            self._sensors,
+            self.sensor.reach,
+            self.sensor.decay,
+            self.sensor.index,
+        )
 
     @property
     def twists(self) -> FloatArray:

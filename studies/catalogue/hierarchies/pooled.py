@@ -20,8 +20,9 @@ import numpy as np
 from ....core.numerics import pd
 from ...errors import WIDTH
 from ...results.analysis import format_p, select_shared
+from ...results.notation import bracketed, signed, two_decimals, two_figures
 from ...results.results import Results
-from ...results.statistics import LEVEL, Array, Estimate, bootstrap, paired_tests, two_figures
+from ...results.statistics import LEVEL, Array, Estimate, bootstrap, paired_tests
 from .cases import HierarchyCase
 
 MARGIN = 0.05
@@ -57,12 +58,9 @@ class Effect(NamedTuple):
     @property
     def shown(self) -> str:
         """Estimate, interval, p and verdict, as text."""
-        digits = [f"{float(part):.2f}" for part in self.estimate]
-        if not self.is_ratio:
-            digits = [f"{float(part):+.2f}" for part in self.estimate]
-        value, low, high = digits
         what = "decisions x" if self.is_ratio else "success "
-        return f"{what}{value} [{low}, {high}], p {format_p(self.p)}: {self.verdict}"
+        shown = bracketed(self.estimate, two_decimals if self.is_ratio else signed)
+        return f"{what}{shown}, p {format_p(self.p)}: {self.verdict}"
 
 
 def effects(

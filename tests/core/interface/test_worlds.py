@@ -18,6 +18,19 @@ TABLES = {
     "permutation": {"kind": "team-game", "game": "permutation", "players": 4},
     "landmarks": {"kind": "team-game", "game": "landmarks", "players": 4, "numbered": True},
     "signals": {"kind": "signals", "players": 4},
+    "box": {"kind": "box-pushing"},
+    "box, eight": {"kind": "box-pushing", "robots": 8, "state_space": "crowd"},
+    "box, pay by robot": {
+        "kind": "box-pushing",
+        "robots": 3,
+        "start": "easy",
+        "state_space": "paper",
+        "reward": {"of": "robot"},
+        "infrared": {"normalisation": "linear"},
+        "action_repeat": 3,
+    },
+    "box, wide": {"kind": "box-pushing", "robots": 4, "state_space": "wide", "box": "circle"},
+    "box, pose": {"kind": "box-pushing", "state_space": "pose", "orientation_tolerance": 0.3},
 }
 COUNT = 5
 

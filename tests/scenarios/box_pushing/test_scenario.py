@@ -150,8 +150,8 @@ def test_a_task_in_units_of_the_box() -> None:
     near, far = fixed.measure(), similar.measure()
     assert near["distance_m"] == pytest.approx(1.0)
     assert far["distance_m"] == pytest.approx(4.0)
-    assert similar._task.tolerance == pytest.approx(4 * fixed._task.tolerance)
-    assert similar._task.reward.r1 == pytest.approx(fixed._task.reward.r1 / 4)
+    assert similar.task.tolerance == pytest.approx(4 * fixed.task.tolerance)
+    assert similar.task.reward.r1 == pytest.approx(fixed.task.reward.r1 / 4)
     # 2 m further from the goal the fixed task is broken off, the similar one is not yet.
     for scenario, expected in ((fixed, True), (similar, False)):
         box = scenario.measure()["goal_pose"] - [3.0, 0.0, 0.0]

@@ -257,7 +257,7 @@ def test_observing_has_the_bits_of_sensing_robot_by_robot(
     gaps = 0.02 * np.abs(rng.normal(size=(1, robots)))
     seen = View(poses, poses[:, 0] + 0.3, gaps, GOAL, ORIGIN, 1.0, SQUARE, 0.08)
     expected = space.sense(seen, range(robots))[:, 0]
-    assert space.observe(seen).tobytes() == expected.tobytes()
+    assert space.observe(seen)[0].tobytes() == expected.tobytes()
 
 
 def test_what_is_common_is_sensed_once() -> None:

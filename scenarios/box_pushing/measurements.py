@@ -1,0 +1,69 @@
+"""What is measured of a step and of an episode of box pushing."""
+
+from typing import NotRequired, TypedDict
+
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.numerics import BoolArray, FloatArray
+
+MEASURES = (
+    SUCCESS,
+    Measure(
+        "stopped_at_goal",
+        "stopped at goal",
+        source="stopped_at_goal",
+        better="higher",
+        is_rate=True,
+    ),
+    Measure("final_distance_m", "final distance", "m", "distance_m", better="lower", least=0.0),
+    Measure(
+        "final_orientation_rad",
+        "final orientation error",
+        "rad",
+        "orientation_error_rad",
+        better="lower",
+        least=0.0,
+    ),
+    Measure(
+        "contact_fraction",
+        "time in contact",
+        source="contact_fraction",
+        gathering="mean",
+        better="higher",
+        least=0.0,
+        greatest=1.0,
+    ),
+)
+"""What is measured of an episode: whether the box came within the tolerance of the goal at whatever
+speed, whether it was there once the robots had stopped, ..."""
+
+
+class Measurements(TypedDict):
+    """Poses, speeds, contact and errors of a state; poses [m, m, rad]."""
+
+    robot_poses: FloatArray
+    """``(M, 3)``."""
+    box_pose: FloatArray
+    """``(3,)``."""
+    goal_pose: FloatArray
+    """``(3,)``."""
+    wheel_speeds: FloatArray
+    """``(n,)`` as commanded [m/s]."""
+    contact: BoolArray
+    """``(M,)`` whether each robot touches the box now."""
+    contact_time: FloatArray
+    """``(M,)`` for which fraction of the last decision period each did."""
+    contact_fraction: float
+    """The mean of it."""
+    failed: BoolArray
+    """``(n,)`` wheels under a failure."""
+    distance_m: float
+    """Of the box from the goal."""
+    orientation_rad: float
+    """Of the box from the goal pose."""
+    orientation_error_rad: float
+    """The size of it."""
+    stopped_at_goal: bool
+    """Whether the box stayed at the goal once the wheels had stopped: known after the step that
+    ends the episode."""
+    seconds: NotRequired[dict[str, float]]
+    """What physics and sensors took in a step."""
