@@ -120,3 +120,11 @@ def test_what_functions_cost_is_told_by_condition(tmp_path) -> None:
     assert "at most 60 messages, 120 calls, 0 message_bytes, 240 tokens." in " ".join(
         str(plan).split()
     )
+
+
+def test_a_plan_of_three_sizes_tells_which_exponents_can_be_told_apart() -> None:
+    spec = {"seeds": 12, "sweep": {"scenario.robots": [2, 4, 8], "topology": ["chain", "star"]}}
+    said = " ".join(str(planning.plan(spec, timed=False)).split())
+    assert "Exponents: with 12 seeds of sizes 2 to 8, those that differ by " in said
+    two = {**spec, "sweep": {"scenario.robots": [2, 4]}}
+    assert "Exponents" not in str(planning.plan(two, timed=False))
