@@ -154,7 +154,7 @@ class Plan:
             groups: dict[str, list[float]] = {}
             for own in columns.values():
                 groups.setdefault(label_but(own, [key]), []).append(float(own[key]))
-            fewest = sorted(min(groups.values(), key=len))
+            _, fewest = min((len(own), sorted(own)) for own in groups.values())
             if len(fewest) >= FEWEST and fewest[0] > 0.0:
                 yield ""
                 yield from exponent_text(fewest, len(self.outline.seeds), max(1, len(groups) - 1))
