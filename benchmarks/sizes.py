@@ -18,6 +18,7 @@ from rich.table import Table
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings
+from nested_agents.studies.results.notation import bracketed
 from nested_agents.studies.results.statistics import rate
 
 from .scripted.controller import decisions_to_goal
@@ -41,7 +42,7 @@ def solved(settings: BoxPushingSettings, seeds: int) -> str:
     success = rate([[steps is not None] for steps in taken])
     decisions = [steps for steps in taken if steps is not None]
     typical = f", {median(decisions):.0f}" if decisions else ""
-    return f"{success.value:.2f} ({success.low:.2f} to {success.high:.2f}){typical}"
+    return f"{bracketed(success)}{typical}"
 
 
 def main() -> None:

@@ -26,6 +26,7 @@ from nested_agents.core.numerics import FloatArray, IntArray, wrap
 from nested_agents.results import ROWS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.studies.results import published
+from nested_agents.studies.results.notation import bracketed
 from nested_agents.studies.results.statistics import rate
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 
@@ -79,10 +80,7 @@ def scripted(robots: int, seeds: int, episodes: int) -> tuple[list[str], str]:
     typical = ""
     if solved:
         typical = f", {median(solved):.0f} decisions in the median, {max(solved)} at most"
-    words = (
-        f"{robots} robots, scripted: {success.value:.2f} [{success.low:.2f}, {success.high:.2f}]"
-        f"{typical}; {seconds:.1f} s an episode"
-    )
+    words = f"{robots} robots, scripted: {bracketed(success)}{typical}; {seconds:.1f} s an episode"
     return counts(robots, range(seeds), successes.reshape(seeds, episodes)), words
 
 

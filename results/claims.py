@@ -20,6 +20,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from ..studies.results.notation import bracketed, two_decimals
 from ..studies.results.results import NOTHING, Results
 from .measures import MEASURES, Measured
 
@@ -135,10 +136,10 @@ class Finding:
         """The value with its interval and number of seeds, as text."""
         if self.measured is None:
             return "no results"
-        value, low, high = map(float, self.measured.estimate)
+        value = float(self.measured.estimate.value)
         text = f"{value:.2g}, computed"
         if self.measured.seeds:
-            text = f"{value:.2f} ({low:.2f} to {high:.2f}), {self.measured.seeds} seeds"
+            text = f"{bracketed(self.measured.estimate, two_decimals)}, {self.measured.seeds} seeds"
         if self.measured.p is not None:
             text += f", p = {self.measured.p:.2g}"
         return text + (f", {self.measured.note}" if self.measured.note else "")

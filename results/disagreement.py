@@ -8,6 +8,7 @@ that of resampled seeds.
 """
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,17 +17,16 @@ from matplotlib.figure import Figure
 
 from ..studies.cli.display import print_text
 from ..studies.presentation import figures
-from ..studies.presentation.tables import Cell
 from ..studies.results import published
 from ..studies.results.analysis import Difference, differences, format_p
+from ..studies.results.notation import bracketed, two_figures
 from ..studies.results.results import Results
 from ..studies.results.statistics import Array, Estimate, bootstrap, rate
 from ..studies.store.database import EVALUATION
 from . import ROWS
 
-ERRORS = (0.0, 0.2, 0.3, 0.4, 0.5)
-"""Standard deviations of the agents' own errors in weights."""
-NAMES = ("s = 0", "s = .2", "s = .3", "s = .4", "s = .5")
+SHOWN = "s = "
+"""Before the size of errors in the name of an evaluation."""
 RESAMPLES = 4000
 SIDES = ("told", "silent")
 
@@ -36,6 +36,8 @@ class Disagreement(NamedTuple):
 
     robots: int
     seeds: int
+    errors: dict[str, float]
+    """By name, standard deviations of the agents' own errors in weights, the least first."""
     success: dict[str, list[Estimate]]
     """Of those told and of the silent, by error."""
     decisions: dict[str, list[Estimate]]
@@ -47,18 +49,21 @@ class Disagreement(NamedTuple):
     longer: tuple[Difference, ...]
     """Logarithms of the decisions of the silent less those of the told, likewise."""
     threshold: Estimate
-    """The error beyond which telling succeeds more often; not a number where the line is flat."""
+    """The error beyond which telling succeeds more often, at most the greatest that was tried."""
 
 
 def disagreement(results: Results, robots: int) -> Disagreement:
     """Return what the rows of one study of disagreement say."""
     (condition,) = results.conditions
+    begin = f"{EVALUATION}{SIDES[0]}, {SHOWN}"
+    shown = [phase.removeprefix(begin) for phase in results.phases if phase.startswith(begin)]
+    errors = {f"{SHOWN}{size}": float(size) for size in sorted(shown, key=float)}
     success: dict[str, list[Estimate]] = {side: [] for side in SIDES}
     decisions: dict[str, list[Estimate]] = {side: [] for side in SIDES}
     agreement: dict[str, list[float]] = {side: [] for side in SIDES}
     means: dict[str, list[Array]] = {side: [] for side in SIDES}
     for side in SIDES:
-        for name in NAMES:
+        for name in errors:
             phase = f"{EVALUATION}{side}, {name}"
             success[side].append(rate(results.values(condition, "success", phase)))
             steps = results.means(condition, phase, "steps").to_numpy()
@@ -67,7 +72,7 @@ def disagreement(results: Results, robots: int) -> Disagreement:
             means[side].append(results.means(condition, phase).to_numpy())
     pairs = [
         (name, "success", *(results.means(condition, f"{EVALUATION}{s}, {name}") for s in SIDES))
-        for name in NAMES
+        for name in errors
     ]
     logs = [
         (
@@ -78,30 +83,43 @@ def disagreement(results: Results, robots: int) -> Disagreement:
                 for s in reversed(SIDES)
             ),
         )
-        for name in NAMES
+        for name in errors
     ]
     less = np.array(means["told"]) - np.array(means["silent"])
     return Disagreement(
         robots,
         less.shape[1],
+        errors,
         success,
         decisions,
         agreement,
         differences({"": pairs})[""],
         differences({"": logs}, of_rates=False)[""],
-        _threshold(less),
+        _threshold(less, list(errors.values())),
     )
 
 
-def _threshold(less: Array) -> Estimate:
-    """Return where the line through differences ``(errors, n_seeds)`` crosses zero."""
+def _threshold(less: Array, errors: Sequence[float]) -> Estimate:
+    """Return where the line through differences ``(n_errors, n_seeds)`` crosses zero, upwards.
+
+    Lines that do not, among the errors tried, cross at the greatest of them.
+    """
     rng = np.random.default_rng(0)
-    drawn = rng.integers(less.shape[1], size=(RESAMPLES, less.shape[1]))
-    slopes, begins = np.polyfit(ERRORS, less[:, drawn].mean(axis=2), 1)
-    slope, begin = np.polyfit(ERRORS, less.mean(axis=1), 1)
-    roots = np.where(slopes > 0.0, -begins / np.where(slopes > 0.0, slopes, 1.0), np.inf)
-    low, high = np.quantile(np.clip(roots, 0.0, None), [0.025, 0.975])
-    return Estimate(*map(np.asarray, (-begin / slope if slope > 0.0 else np.nan, low, high)))
+    every = np.arange(less.shape[1])
+    drawn = np.vstack([every, rng.integers(len(every), size=(RESAMPLES, len(every)))])
+    slopes, begins = np.polyfit(errors, less[:, drawn].mean(axis=2), 1)
+    rises = slopes > 0.0
+    crossed = np.where(rises, -begins / np.where(rises, slopes, 1.0), np.inf)
+    own, *others = np.clip(crossed, 0.0, max(errors))
+    return Estimate(own, *np.quantile(others, [0.025, 0.975]))
+
+
+def _brief(threshold: Estimate, greatest: float) -> str:
+    """Return a threshold and its interval, ends that were not reached as more than the greatest."""
+    value, low, high = (
+        f"> {greatest:.2g}" if end >= greatest else f"{end:.2g}" for end in map(float, threshold)
+    )
+    return f"{value} [{low}, {high}]".replace("0.", ".")
 
 
 def rows() -> list[Disagreement]:
@@ -118,22 +136,22 @@ def lines(every: list[Disagreement]) -> list[str]:
         "|---|---|---|---|---|---|---|---|",
     ]
     for own in every:
-        for k, name in enumerate(NAMES):
-            told, silent = (Cell.of(own.success[side][k]).bracketed(" ") for side in SIDES)
+        for k, name in enumerate(own.errors):
+            told, silent = (bracketed(own.success[side][k]) for side in SIDES)
             d = own.compared[k]
-            difference = f"{Cell.of(d.estimate).bracketed(' ')}, p {format_p(d.p)}"
+            difference = f"{bracketed(d.estimate)}, p {format_p(d.p)}"
             right = " and ".join(f"{own.agreement[side][k]:.2f}"[1:] for side in SIDES)
-            spent = " and ".join(Cell.of(own.decisions[side][k]).value for side in SIDES)
+            spent = " and ".join(two_figures(float(own.decisions[side][k].value)) for side in SIDES)
             longer = Estimate(*map(np.exp, own.longer[k].estimate))
-            times = f"{Cell.of(longer).bracketed(' ')}, p {format_p(own.longer[k].p)}"
-            shown = name.removeprefix("s = ")
+            times = f"{bracketed(longer)}, p {format_p(own.longer[k].p)}"
+            shown = name.removeprefix(SHOWN)
             table.append(
                 f"| {own.robots} | {shown} | {told} | {silent} | {difference} | {right} | {spent} "
                 f"| {times} |"
             )
     thresholds = [
         f"threshold, {own.robots} robots, {own.seeds} seeds: "
-        f"{Cell.of(own.threshold).bracketed(' ')}"
+        f"{_brief(own.threshold, max(own.errors.values()))}"
         for own in every
     ]
     return [*table, "", *thresholds]
@@ -151,8 +169,9 @@ def draw(every: list[Disagreement]) -> Figure:
                 [float(e.high - e.value) for e in values],
             ]
             style = figures.style(index)
-            axes.errorbar(ERRORS, middle, yerr=errors, capsize=2, **style)
-        axes.axvline(float(own.threshold.value), color="#888888", lw=0.8, ls=":")
+            axes.errorbar(list(own.errors.values()), middle, yerr=errors, capsize=2, **style)
+        if own.threshold.value < max(own.errors.values()):
+            axes.axvline(float(own.threshold.value), color="#888888", lw=0.8, ls=":")
         axes.set_title(f"{own.robots} robots", loc="left")
         axes.set_xlabel("error of each agent's weights [SD]")
         figures.as_rates(axes)

@@ -136,7 +136,7 @@ class Coordination(Aggregation):
         weights = deliberation.weights[agent]
         if not weights.any():
             return np.zeros(shape)
-        joint = np.tile(deliberation.joint_action, (len(tried), 1))
+        joint = deliberation.joint_action[None].repeat(len(tried), axis=0)
         joint[:, list(scope)] = tried
         states = deliberation.prediction.states(agent, joint)
         return self.rules.values(weights, states).reshape(shape)

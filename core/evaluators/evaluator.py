@@ -273,10 +273,12 @@ class Aggregation(Evaluator):
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
         agent, a = deliberation.agent, self.n_actions
-        joint = np.tile(deliberation.joint_action, (a * len(tried), 1))
-        joint[:, agent] = np.repeat(np.arange(a), len(tried))
-        joint[:, list(self.hierarchy.below(agent))] = np.tile(tried, (a, 1))
-        return self.worth(deliberation, joint).reshape(a, -1)
+        n = len(deliberation.joint_action)
+        joint = np.empty((a, len(tried), n), dtype=np.int64)
+        joint[:] = deliberation.joint_action
+        joint[:, :, agent] = np.arange(a)[:, None]
+        joint[:, :, list(self.hierarchy.below(agent))] = tried
+        return self.worth(deliberation, joint.reshape(-1, n)).reshape(a, -1)
 
     def drawn(self, probabilities: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:
         """Return actions ``(samples, ...)`` drawn by their probabilities ``(..., A)``."""

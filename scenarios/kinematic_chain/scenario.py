@@ -301,7 +301,7 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         self.groups = arm.groups
         self._joints = np.arange(len(angles))
         gains, offsets = np.array([effect[2] for effect in effects]).T
-        every = np.tile(np.arange(len(arm.action_set))[:, None], len(angles))
+        every = np.arange(len(arm.action_set))[:, None].repeat(len(angles), axis=1)
         unit = arm.settings.speed_increment * arm._limits
         commanded = arm.action_set.apply(speeds, every, unit, arm._limits)
         after = np.clip(angles + PERIOD * (gains * commanded + offsets), -arm._most, arm._most)

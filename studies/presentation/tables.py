@@ -27,7 +27,8 @@ from ...core.plugins.printing import printable
 from ...core.plugins.words import near
 from ..errors import SpecError
 from ..results.analysis import Summary
-from ..results.statistics import FEW, Estimate, between, exactly, stack_estimates, two_figures
+from ..results.notation import bracketed
+from ..results.statistics import FEW, Estimate, exactly, stack_estimates
 from .progress import count
 
 Format = Literal["table", "csv", "json"]
@@ -157,32 +158,40 @@ class SummaryTable:
         return "\n".join([*map(str.rstrip, file.getvalue().splitlines()), *self.legend])
 
     def print(self, console: Console) -> None:
-        """Print estimates by condition, each over its 95 % interval.
+        """Print a line of estimates for each condition, each with its 95 % interval.
 
         Columns that do not fit side by side without breaking a word follow below, as a further
-        table.
+        table. How many seeds there are is a column if conditions differ in it.
         """
-        for block in _blocks(self.titles, self.rows, console.width) if self.rows else ():
-            table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+        if not self.rows:
+            return
+        labels = [
+            _literal(condition if self.seeds else f"{condition} ({count(seeds, 'seed')})")
+            for condition, seeds, _ in self.rows
+        ]
+        for block in _blocks(self.titles, self.rows, max(map(len, labels)), console.width):
+            table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
             table.add_column("", overflow="fold")
-            for i, width in block.items():
-                heading = _literal(self.titles[i])
-                table.add_column(heading, justify="right", overflow="fold", width=width)
-            for condition, seeds, cells in self.rows:
-                shown = (cells[i] for i in block)
-                table.add_row(
-                    f"{_literal(condition)}\n[dim]{count(seeds, 'seed')}[/]",
-                    *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in shown),
-                )
+            for column in block:
+                table.add_column(escape(column.heading), width=column.width)
+            for label, (_, _, cells) in zip(labels, self.rows, strict=True):
+                table.add_row(label, *(column.padded(cells[column.place]) for column in block))
             console.print(table)
             console.print()
+
+    @property
+    def seeds(self) -> int:
+        """How many seeds all its lines have; 0 if they differ."""
+        (least, *more) = {seeds for _, seeds, _ in self.rows} or {0}
+        return 0 if more else least
 
     @property
     def legend(self) -> list[str]:
         """Lines that say what stands in the cells."""
         if not self.rows:
             return ["no trial has finished"]
-        return ["Means over seeds, and below them their 95 % intervals.", self.remark]
+        over = count(self.seeds, "seed") if self.seeds else "seeds"
+        return [f"Means over {over} with 95 % intervals.", self.remark]
 
     @property
     def remark(self) -> str:
@@ -216,14 +225,14 @@ class SummaryTable:
         """The whole table in Markdown."""
         lines = [["condition", "seeds", *self.titles], ["---"] * (2 + len(self.titles))]
         for condition, seeds, cells in self.rows:
-            lines.append([condition, str(seeds), *(c.bracketed(" ") if c else "" for c in cells)])
+            lines.append([condition, str(seeds), *(c.text() if c else "" for c in cells)])
         escaped = [[text.replace("|", r"\|") for text in line] for line in lines]
         return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
 
     @property
     def html(self) -> str:
         """The table as HTML."""
-        cells = [[c.bracketed(" ") if c else "" for c in row] for *_, row in self.rows]
+        cells = [[c.text() if c else "" for c in row] for *_, row in self.rows]
         index = [f"{condition}, {count(seeds, 'seed')}" for condition, seeds, _ in self.rows]
         table = pd.DataFrame(cells, index, self.titles).to_html(border=0)
         return f"{table}<p><small>{in_html(' '.join(self.legend))}</small></p>"
@@ -232,7 +241,7 @@ class SummaryTable:
     def latex(self) -> str:
         """The whole table in LaTeX."""
         rows = [
-            (name, seeds, *(f"${c.bracketed(MATHS_SPACE)}$" if c else "--" for c in cells))
+            (name, seeds, *(f"${c.text(MATHS_SPACE)}$" if c else "--" for c in cells))
             for name, seeds, cells in self.rows
         ]
         frame = pd.DataFrame(rows, columns=["condition", "seeds", *self.titles])
@@ -298,25 +307,21 @@ def _protected(text: str) -> str:
 
 
 class Cell(NamedTuple):
-    """An estimate as text: its value, and the bounds of its interval, if they are known."""
+    """An estimate as text."""
 
     value: str
-    bounds: tuple[str, str] | None
+    interval: str
+    """In brackets; nothing if it is not known."""
 
     @classmethod
     def of(cls, estimate: Estimate) -> Cell:
         """Return the cell of an estimate."""
-        value, low, high = map(two_figures, map(float, estimate))
-        return cls(value, None if np.isnan(estimate.low) else (low, high))
+        value, _, interval = bracketed(estimate).partition(" ")
+        return cls(value, interval)
 
-    @property
-    def interval(self) -> str:
-        """The interval; nothing if it is not known."""
-        return between(*self.bounds) if self.bounds else ""
-
-    def bracketed(self, space: str) -> str:
-        """Return the value and, if it is known, its interval in brackets."""
-        return f"{self.value}{space}[{', '.join(self.bounds)}]" if self.bounds else self.value
+    def text(self, space: str = " ") -> str:
+        """Return the value and, if it is known, its interval."""
+        return f"{self.value}{space}{self.interval}" if self.interval else self.value
 
 
 Row = tuple[str, int, tuple[Cell | None, ...]]
@@ -327,25 +332,58 @@ LABEL = 24
 """What a condition's label may be broken to, if there is no room for all of it [characters]."""
 
 
-def _blocks(titles: Sequence[str], rows: Sequence[Row], width: int) -> list[dict[int, int]]:
-    """Return which columns stand side by side, and how wide each is: in as few blocks as fit.
+class Column(NamedTuple):
+    """A column on a terminal: values end at one place, and their intervals begin at one."""
 
-    Where titles fit in one line there is one block; otherwise they are broken between words.
+    place: int
+    """Of its title among those of the table."""
+    heading: str
+    """Its title, in one line or two."""
+    value: int
+    """Width of its values [characters]."""
+    width: int
+    """Its width [characters]."""
+
+    def padded(self, cell: Cell | None) -> str:
+        """Return a cell of it."""
+        return f"{cell.value:>{self.value}} [dim]{escape(cell.interval)}[/]" if cell else ""
+
+
+def _columns(titles: Sequence[str], rows: Sequence[Row], lines: int) -> Iterator[Column]:
+    """Yield columns whose titles have so many lines at most, one or two."""
+    for i, title in enumerate(map(printable, titles)):
+        cells = [cell for _, _, row in rows if (cell := row[i])]
+        value = max((len(cell.value) for cell in cells), default=0)
+        interval = max((len(cell.interval) for cell in cells), default=0)
+        width = value + bool(interval) + interval
+        heading = title if lines == 1 or len(title) <= width else _in_two_lines(title)
+        yield Column(i, heading, value, max(width, *map(len, heading.splitlines())))
+
+
+def _in_two_lines(title: str) -> str:
+    """Return a title broken where its lines are shortest, rather after a comma."""
+    gaps = [i for i, letter in enumerate(title) if letter == " "]
+    if not gaps:
+        return title
+    gap = min(gaps, key=lambda i: (max(i, len(title) - i - 1), title[i - 1] != ","))
+    return f"{title[:gap]}\n{title[gap + 1 :]}"
+
+
+def _blocks(
+    titles: Sequence[str], rows: Sequence[Row], label: int, width: int
+) -> list[list[Column]]:
+    """Return which columns stand side by side: in one block if titles fit in a line, or in two.
+
+    Otherwise in as few blocks as fit.
     """
-    label = max(max(len(c), len(count(seeds, "seed"))) for c, seeds, _ in rows)
-    texts = [
-        [text for _, _, row in rows if (c := row[i]) for text in (c.value, c.interval)]
-        for i in range(len(titles))
-    ]
-    pairs = list(zip(titles, texts, strict=True))
-    whole = [max(map(len, [title, *of_cells])) for title, of_cells in pairs]
-    if label + sum(1 + wide for wide in whole) <= width:
-        return [dict(enumerate(whole))]
-    broken = [max(map(len, [*title.split(), *of_cells])) for title, of_cells in pairs]
-    n = len(broken)
+    for lines in (1, 2):
+        columns = [*_columns(titles, rows, lines)]
+        if label + sum(2 + column.width for column in columns) <= width:
+            return [columns]
+    n = len(columns)
     label = min(label, LABEL)
     for many in range(n, 0, -1):
-        blocks = [{i: broken[i] for i in range(k, min(k + many, n))} for k in range(0, n, many)]
-        if all(label + sum(1 + wide for wide in block.values()) <= width for block in blocks):
+        blocks = [columns[k : k + many] for k in range(0, n, many)]
+        if all(label + sum(2 + column.width for column in block) <= width for block in blocks):
             break
     return blocks

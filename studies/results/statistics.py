@@ -388,35 +388,3 @@ def paired_tests(pairs: Sequence[tuple[Array, Array]]) -> list[tuple[float, floa
     """Return p of each `paired_permutation`, as it is and adjusted over all of them by `holm`."""
     raw = [paired_permutation(own, base) for own, base in pairs]
     return list(zip(raw, map(float, holm(raw)), strict=True))
-
-
-MANY = 1e6
-"""From here on a number in a table has a power of ten."""
-
-
-def two_figures(value: float) -> str:
-    """Return a number in two figures and at most two decimals, without a leading zero.
-
-    From a million on it has a power of ten.
-
-    Examples
-    --------
-    >>> [two_figures(x) for x in (0.975, 0.998, -0.0312, 0.0021, 12.34, 240.0, 2.7e11)]
-    ['.97', '1.0', '-.03', '0', '12', '240', '2.7e11']
-    """
-    if np.isnan(value):
-        return "?"
-    if abs(value) < 0.005:
-        return "0"
-    value = float(f"{value:.2g}")
-    if abs(value) >= MANY:
-        mantissa, power = f"{value:.1e}".split("e")
-        return f"{mantissa}e{int(power)}"
-    digits = min(2, max(0, 1 - int(np.floor(np.log10(abs(value))))))
-    text = f"{value:.{digits}f}"
-    return text.replace("0.", ".", 1) if text.lstrip("-").startswith("0.") else text
-
-
-def between(low: str, high: str) -> str:
-    """Return the two bounds of an interval as one text, in which no dash meets a minus sign."""
-    return f"{low} to {high}" if "-" in (low[0], high[0]) else f"{low}–{high}"

@@ -20,6 +20,7 @@ from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
+from ...core.learners.written import WrittenSettings
 from ...core.plugins.registry import Plugged
 from ...core.plugins.settings import ScenarioSettings, Settings, check_team, unwritten
 from ...scenarios import DEFAULT, SCENARIOS
@@ -134,8 +135,13 @@ class ConditionSettings(Settings):
         return (f"topology.considers: left out, {learner} considers nobody",) if ignored else ()
 
     def remarks(self) -> tuple[str, ...]:
-        """Return whose plans do not know whose weights, a line for each part of a mixed team."""
+        """Return whose plans do not know whose weights, a line for each part of a mixed team.
+
+        A written value of nothing is named as well.
+        """
         learner = self.learner
+        if isinstance(learner, WrittenSettings) and not learner.value:
+            return ("learner.value: nothing is worth anything, so that actions are random",)
         if not isinstance(learner, MixedSettings) or self.topology.considers == "none":
             return ()
         return tuple(

@@ -141,6 +141,11 @@ def measures_from(tables: Iterable[Mapping[str, Any]]) -> tuple[Measure, ...]:
     return tuple(Measure(**table) for table in tables)
 
 
+def is_empty(db: sqlite3.Connection) -> bool:
+    """Tell whether a database has no tables."""
+    return db.execute("SELECT 1 FROM sqlite_master").fetchone() is None
+
+
 def prepare(db: sqlite3.Connection, notes: StudyNotes) -> None:
     """Make the tables, and note what the study is and what computes it; within a transaction."""
     swept = [quote(key) for key in next(iter(notes.columns.values()))]

@@ -276,7 +276,10 @@ class Store:
         with open_to_write(path) as connection:
             store = cls(directory, connection)
             with transaction(connection):
+                is_new = database.is_empty(connection)
                 database.prepare(connection, study)
+                if aside is None and is_new and (aside := integrity.last_aside(path)):
+                    reason = "was being made anew"
                 recovered = 0 if aside is None else integrity.recover(aside, connection)
             if aside is not None:
                 store.notes.append(

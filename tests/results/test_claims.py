@@ -280,6 +280,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "edges-games",
         "edges-broken",
         "edges-again",
+        "disagreement-2",
         "disagreement-4",
         "pendulum-written",
         "signals",

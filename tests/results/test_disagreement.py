@@ -6,7 +6,7 @@ import pytest
 
 import nested_agents as na
 from nested_agents.results import ROWS, disagreement
-from nested_agents.studies.presentation.tables import Cell
+from nested_agents.studies.results.notation import bracketed
 
 DOCS = ROWS.parents[1] / "docs"
 
@@ -14,17 +14,21 @@ DOCS = ROWS.parents[1] / "docs"
 def test_the_page_has_the_table_that_the_rows_give(tmp_path) -> None:
     every = disagreement.rows()
     page = (DOCS / "edges.md").read_text(encoding="utf-8")
-    *table, _, threshold = disagreement.lines(every)
-    assert all(line in page for line in table)
-    assert threshold.split(": ")[1] in page
+    lines = disagreement.lines(every)
+    thresholds = lines[-len(every) :]
+    assert all(line in page for line in lines[: -len(every) - 1])
+    assert all(line.split(": ")[1] in " ".join(page.split()) for line in thresholds)
     disagreement.draw(every).savefig(tmp_path / "figure.png")
 
 
 def test_the_threshold_is_where_the_line_crosses_zero() -> None:
-    line = np.tile(np.array(disagreement.ERRORS)[:, None] - 0.25, (1, 6))
-    e = disagreement._threshold(line)
+    errors = [0.0, 0.2, 0.4]
+    line = np.tile(np.array(errors)[:, None] - 0.25, (1, 6))
+    e = disagreement._threshold(line, errors)
     assert [float(end) for end in e] == pytest.approx([0.25] * 3)
-    assert np.isnan(disagreement._threshold(-line).value)
+    assert disagreement._brief(e, 0.4) == ".25 [.25, .25]"
+    never = disagreement._threshold(-line, errors)
+    assert disagreement._brief(never, 0.4) == "> .4 [> .4, > .4]"
 
 
 def test_the_table_of_simple_spread_is_that_of_the_rows() -> None:
@@ -32,7 +36,7 @@ def test_the_table_of_simple_spread_is_that_of_the_rows() -> None:
     page = (DOCS / "peers.md").read_text(encoding="utf-8")
     for condition, own in rows.groupby("condition"):
         cells = [
-            Cell.of(na.bootstrap(own[own["decisions"] == n]["return"].to_numpy())).bracketed(" ")
+            bracketed(na.bootstrap(own[own["decisions"] == n]["return"].to_numpy()))
             for n in (1000, 10_000, 100_000, 400_000)
         ]
         assert f"| {condition} | {' | '.join(cells)} |" in page

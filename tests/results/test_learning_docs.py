@@ -10,8 +10,8 @@ from published_tables import print_table
 import nested_agents as na
 from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.presentation.tables import Cell
-from nested_agents.studies.results.statistics import bootstrap, two_figures
+from nested_agents.studies.results.notation import bracketed, two_figures
+from nested_agents.studies.results.statistics import bootstrap
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "learning.md"
@@ -36,10 +36,8 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("from-eight", ("evaluation success", "success, sixty-four")),
         ("wide", ("evaluation success", "success, sixty-four")),
         ("large-team", LARGE_TEAM),
-        ("four-robots-hard", ("evaluation success", "evaluation steps")),
         ("own-value", ("evaluation success",)),
         ("transfer", ("evaluation success", "success, four", "success, eight")),
-        ("curriculum", ("evaluation success", "success, sixteen", "success, thirty-two")),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
@@ -76,7 +74,7 @@ def test_decisions_to_a_success_rate() -> None:
     page = " ".join(PAGE.read_text(encoding="utf-8").split())
     for counted in (to_first, to_last):
         slopes = np.polyfit(np.log(SIZES), np.log(counted), 1)[0]
-        assert f"n^{Cell.of(bootstrap(slopes)).bracketed(' ')}" in page
+        assert f"n^{bracketed(bootstrap(slopes))}" in page
     means = [f"{float(two_figures(float(d.mean()))):,.0f}" for d in to_first]
     assert f"16 robots: {', '.join(means[:-1])} and {means[-1]} in the mean over 20 seeds" in page
 

@@ -6,7 +6,7 @@ import pytest
 from published_tables import print_table
 
 from nested_agents.scenarios.signals.theory import cascade, majority
-from nested_agents.studies.results.statistics import two_figures
+from nested_agents.studies.results.notation import two_figures
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "signals.md").read_text(encoding="utf-8")
 

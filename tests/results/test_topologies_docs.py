@@ -13,10 +13,10 @@ from nested_agents.results import ROWS
 from nested_agents.studies.catalogue.chain_order import equivalence
 from nested_agents.studies.catalogue.edges import TRAINED, analyse
 from nested_agents.studies.catalogue.hierarchies.pooled import effects
-from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.notation import bracketed, two_decimals, two_figures
 from nested_agents.studies.results.results import Results
-from nested_agents.studies.results.statistics import bootstrap, paired_permutation, two_figures
+from nested_agents.studies.results.statistics import Estimate, bootstrap, paired_permutation
 from nested_agents.studies.store.database import EVALUATION
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "edges.md"
@@ -64,13 +64,11 @@ def pooled(results: Results, whose: tuple[str, ...], other: str) -> tuple[np.nda
 
 
 def shown(of_seeds: np.ndarray) -> str:
-    return Cell.of(bootstrap(of_seeds)).bracketed(" ")
+    return bracketed(bootstrap(of_seeds))
 
 
 def times(logarithms: np.ndarray) -> str:
-    e = bootstrap(logarithms)
-    value, low, high = np.exp([e.value, e.low, e.high])
-    return f"{value:.2f} [{low:.2f}, {high:.2f}]"
+    return bracketed(Estimate(*map(np.exp, bootstrap(logarithms))), two_decimals)
 
 
 def p_of(of_seeds: np.ndarray) -> str:
@@ -87,9 +85,8 @@ def test_what_is_equal_to_the_chain(name: str) -> None:
     results = na.load(ROWS / f"{name}.json").results
     page = PAGE.read_text(encoding="utf-8")
     for other, (success, decisions) in effects(results, analyse(results).cases, TRAINED).items():
-        gained = Cell.of(success.estimate).bracketed(" ")
-        value, low, high = map(float, decisions.estimate)
-        longer = f"{value:.2f} [{low:.2f}, {high:.2f}] times"
+        gained = bracketed(success.estimate)
+        longer = f"{bracketed(decisions.estimate, two_decimals)} times"
         line = f"| {other} | {gained} | {success.verdict} | {longer} | {decisions.verdict} |"
         assert line in page, f"docs/edges.md: put in\n{line}"
 
@@ -167,7 +164,7 @@ def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
         for group in contrasts(na.load(ROWS / f"{name}.json").results, by="topology").groups:
             rates = [line.estimates["success"].value for line in group.table]
             learner, orders, verdict, ends = re.findall(
-                r"(.+), (\d+) orders, within 0.1: (.+) \((.+)\)", equivalence(group)
+                r"(.+), (\d+) orders, within 0.1: (.+) (\[.+\])", equivalence(group)
             )[0]
             rates = f"{two_figures(min(rates))} to {two_figures(max(rates))}"
             cells = task, learner, orders, str(group.table[0].seeds), rates, ends, verdict
@@ -184,7 +181,7 @@ def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
         order = re.findall(r"agent(\d)", own.condition) or "12345678"
         order = order[::-1] if own.condition.endswith("reversed") else order
         heard = sum(abs(int(a) - int(b)) == 1 for a, b in pairwise(order))
-        rates = [Cell.of(line.estimates["success"]).bracketed(" ") for line in (own, other)]
+        rates = [bracketed(line.estimates["success"]) for line in (own, other)]
         line = f"| {' '.join(order)} | {heard} | {' | '.join(rates)} |"
         assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
 

@@ -18,8 +18,9 @@ import numpy as np
 
 from ...results.analysis import Analysis, Figures, phases_of, select_shared
 from ...results.contrasts import Group, contrasts
+from ...results.notation import two_figures
 from ...results.results import Results
-from ...results.statistics import LEVEL, Friedman, friedman, holm, two_figures
+from ...results.statistics import LEVEL, Friedman, friedman, holm
 from .. import ablation
 from ..study import measure as measure
 
@@ -52,8 +53,8 @@ def equivalence(group: Group) -> str:
     else:
         verdict = "equal" if max(-low, high) <= MARGIN else "not decided"
     orders = len(group.differences) + 1
-    ends = f"{two_figures(low)} to {two_figures(high)}"
-    return f"{group.setting}, {orders} orders, within {MARGIN:g}: {verdict} ({ends})"
+    ends = f"[{two_figures(low)}, {two_figures(high)}]"
+    return f"{group.setting}, {orders} orders, within {MARGIN:g}: {verdict} {ends}"
 
 
 class OrderTest(NamedTuple):

@@ -18,8 +18,8 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ...results.analysis import EVALUATED, Analysis, Figures
+from ...results.notation import two_figures
 from ...results.results import Results, Sizes
-from ...results.statistics import two_figures
 from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ...trials.session import Session
@@ -110,7 +110,7 @@ def _draw_parted(analysis: Analysis) -> Figures:
             colour = "white" if fields[row, column, 0] > 0.5 else "black"
             write = partial(axes.text, column, ha="center", color=colour)
             write(row, value, va="bottom", fontsize=15)
-            write(row + 0.08, f"{low} to {high}", va="top", fontsize=7)
+            write(row + 0.08, f"[{low}, {high}]", va="top", fontsize=7)
         axes.set_title(setting, loc="left")
         axes.set_xticks((0, 1), ("nobody\nconsidered", "those below\nconsidered"))
         axes.set_yticks((0, 1), ("not told", "told"))

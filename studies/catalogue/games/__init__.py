@@ -15,8 +15,9 @@ from textwrap import wrap
 from ....scenarios.matrix_games.plays import whole_episode
 from ...errors import WIDTH
 from ...results.analysis import Analysis, Case, Figures, Summary
+from ...results.notation import two_figures
 from ...results.results import Results
-from ...results.statistics import rate, two_figures
+from ...results.statistics import rate
 from ...store.database import EVALUATION
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult

@@ -19,6 +19,7 @@ import numpy as np
 from ....core.agents.loop import StepRecord
 from ....core.numerics import FloatArray, pd
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, select_shared
+from ...results.notation import bracketed, two_decimals
 from ...results.results import Results, Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
 from ...spec.tables import label_but
@@ -129,7 +130,7 @@ def analyse(results: Results) -> Analysis:
         table.append(Summary(label, len(results.seeds(condition)), point.values))
     notes = [
         f"\n{evaluator}, time with n agents:\n  "
-        + "\n  ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
+        + "\n  ".join(f"{what} n^{bracketed(e, two_decimals)}" for what, e in by_what.items())
         for evaluator, by_what in exponents_of(points).items()
     ]
     return Analysis(tuple(table), tuple(notes), points)
@@ -160,11 +161,6 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
         values,
         {title: pd.Series(costs[title], results.seeds(condition)) for title in TIMES.values()},
     )
-
-
-def _exponent_text(e: Estimate) -> str:
-    """Return an exponent with its interval, if there is one."""
-    return f"{e.value:.2f}" + (f" [{e.low:.2f}, {e.high:.2f}]" if np.isfinite(e.low) else "")
 
 
 def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:

@@ -312,6 +312,14 @@ def test_who_is_told_nothing_learns_nothing_of_what_others_decide(hierarchy, uns
         assert len({tuple(run[agent]) for run in runs}) == 1
 
 
+def test_a_common_plan_carries_nothing_from_who_is_told_to_who_is_not() -> None:
+    """The second answers what the first does; the others decide by the plan as it was made."""
+    runs = [decided(Hierarchy(NAMES, PAIRS[:1]), first, "common", "plan") for first in range(A)]
+    assert [int(run[1].argmax()) for run in runs] == list(range(A))
+    for agent in range(2, 6):
+        assert len({tuple(run[agent]) for run in runs}) == 1
+
+
 @pytest.mark.parametrize("plan", ["private", "common"])
 def test_who_is_told_answers(plan) -> None:
     for hierarchy in (Hierarchy(NAMES, PAIRS), Hierarchy(NAMES, PAIRS, told="parents")):

@@ -73,6 +73,28 @@ def test_an_unknown_variable_of_a_spec_is_one_line() -> None:
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.parametrize(
+    ("scenario", "own", "value"),
+    [
+        ("box-pushing", {}, {"box_distance", "contact_cross_track_error", "gap", "face_bearing"}),
+        ("kinematic-chain", {}, {"distance"}),
+        ("line-up", {"lead": -1.0}, {"lead"}),
+    ],
+)
+def test_the_preset_has_the_value_of_its_scenario(scenario, own, value) -> None:
+    table = {"scenario": {"kind": scenario}, "learner": {"value": own} if own else {}}
+    spec = Spec.of({"preset": "hand-written", "seeds": 1, **table})
+    (condition,) = spec.conditions()
+    assert set(condition.settings.learner.value) == value
+    check_conditions(spec)
+    assert not condition.settings.remarks()
+
+
+def test_a_value_of_nothing_is_said_to_be_one() -> None:
+    spec = Spec.of({"preset": "hand-written", "seeds": 1, "scenario": {"kind": "line-up"}})
+    assert any(line.startswith("learner.value: nothing is worth") for line in spec.warnings())
+
+
 @pytest.mark.slow
 def test_what_a_person_wrote_brings_the_box_to_its_goal(tmp_path) -> None:
     table = {"seeds": [10_000, 10_001], "episodes": 1, "steps": 450, "evaluation": 5}

@@ -31,13 +31,13 @@ LINES = [
 def test_a_table_of_any_width_breaks_no_word(width, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", str(width))
     print_table(tabulate(LINES))
-    table, _ = capsys.readouterr().out.split("\nMeans over seeds")
+    table, _ = capsys.readouterr().out.split("\nMeans over 30 seeds")
     lines = table.splitlines()
     assert max(map(len, lines)) <= width
-    words = " ".join(lines).split()
+    words = " ".join(lines)
     for title in TITLES:
-        assert set(title.split()) <= set(words)
-    assert words.count(".25–.75") == 7
+        assert all(word in words.split() for word in title.split())
+    assert words.count(".50 [.25, .75]") == 7
 
 
 def test_columns_without_room_follow_below(monkeypatch, capsys):
@@ -102,7 +102,7 @@ def test_no_label_orders_a_terminal(command, form, foreign, monkeypatch, capsys)
     assert main([command, str(foreign), "--format", form]) == 0
     out, err = capsys.readouterr()
     assert not set(out + err) & set("\x1b\x07\u202e\x9b")
-    assert form == "latex" or WRITTEN in out
+    assert form == "latex" or WRITTEN[:20] in out  # the rest is in the next line
 
 
 def test_what_is_written_to_a_file_is_as_it_was(foreign, capsys):

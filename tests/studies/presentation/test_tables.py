@@ -58,7 +58,7 @@ def test_cells_are_as_in_the_terminal():
     table = tabulate(LINES)
     assert table.titles == ("success", "x_1 [m]")
     (_, seeds, (success, _)), (_, _, (zero, nothing)) = table.rows
-    assert (seeds, success.value, success.interval) == (8, ".33", ".20–.50")
+    assert (seeds, success.value, success.interval) == (8, ".33", "[.20, .50]")
     assert (zero.value, zero.interval, nothing) == ("0", "", None)
 
 

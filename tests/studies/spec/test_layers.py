@@ -58,7 +58,7 @@ def test_a_learner_is_chosen_over_any_preset(preset: str, kind: str) -> None:
     assert spec.conditions()[0].settings.learner.kind == kind
 
 
-@pytest.mark.parametrize("preset", sorted({*PRESETS} - {"hand-written"}))
+@pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("kind", ["kinematic-chain", "line-up"])
 def test_every_preset_is_of_other_scenarios_too(preset: str, kind: str) -> None:
     spec = build({"preset": preset, "scenario": {"kind": kind}})
