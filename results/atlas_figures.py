@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from ..core.numerics import pd
 from ..studies.presentation import figures
 from ..studies.results.statistics import Estimate, bootstrap, stack_estimates
-from . import atlas
+from .atlas import MEASURES, NO_FAULT, TeamKind
+from .atlas_predictions import SMALL, Check, checks, exponents
 
 PANEL = (5.0, 2.4)
 """Width and height of a panel [inch]."""
@@ -25,7 +26,7 @@ def draw_success(rows: pd.DataFrame) -> Figure:
     figure, panels = figures.grid(len(tasks), 2, PANEL, MARGIN, sharey=True)
     for axes, task in zip(panels.flat, tasks, strict=False):
         own = known[known["task"] == task]
-        teams = list(own.groupby(list(atlas.TeamKind._fields), sort=False))
+        teams = list(own.groupby(list(TeamKind._fields), sort=False))
         handles = []
         for index, (team, of_team) in enumerate(teams):
             by_size = of_team.groupby("size")["success"]
@@ -44,7 +45,7 @@ def draw_success(rows: pd.DataFrame) -> Figure:
 def draw_exponents(rows: pd.DataFrame) -> Figure:
     """Return how time, memory and messages of a decision grow: exponents, 95 % intervals."""
     names = ("decision_median", "team_bytes", "messages", "steps")
-    by_measure = {name: atlas.exponents(rows, name) for name in names}
+    by_measure = {name: exponents(rows, name) for name in names}
     teams = list(dict.fromkeys(team for own in by_measure.values() for team in own))
     height = 1.0 + 0.2 * len(teams)
     figure, panels = figures.panels(1, len(names), (10.5, height), sharey=True)
@@ -54,7 +55,7 @@ def draw_exponents(rows: pd.DataFrame) -> Figure:
         axes.hlines(places, known.low, known.high, lw=1.2)
         axes.plot(known.value, places, "o", markersize=4)
         axes.axvline(1.0, color="#888888", lw=0.8, ls=":")
-        axes.set_title(atlas.MEASURES[name], loc="left", fontsize=8)
+        axes.set_title(MEASURES[name], loc="left", fontsize=8)
         axes.set_xlabel("exponent of n")
     labels = [f"{team.task}: {name_of(team)}" for team in teams]
     panels[0, 0].set_yticks(range(len(teams)), labels)
@@ -62,7 +63,7 @@ def draw_exponents(rows: pd.DataFrame) -> Figure:
     return figure
 
 
-def draw_checks(checked: Sequence[atlas.Check]) -> Figure:
+def draw_checks(checked: Sequence[Check]) -> Figure:
     """Return what laws of small teams predicted, over what larger ones measured."""
     by_measure = {k: list(own) for k, own in groupby(sorted(checked, key=_measure), key=_measure)}
     figure, panels = figures.grid(len(by_measure), 3, (3.0, 2.2), MARGIN)
@@ -76,27 +77,25 @@ def draw_checks(checked: Sequence[atlas.Check]) -> Figure:
         axes.axhline(1.0, color="#888888", lw=0.8, ls=":")
         figures.log_axis(axes)
         axes.set_xticks(places, [str(check.size) for check in own], fontsize=6)
-        axes.set_title(atlas.MEASURES[name], loc="left")
+        axes.set_title(MEASURES[name], loc="left")
     figure.supylabel("predicted / measured", fontsize=8)
     figure.supxlabel("number of agents; red: outside the 90 % interval", fontsize=8)
     return figure
 
 
-def _measure(check: atlas.Check) -> str:
+def _measure(check: Check) -> str:
     return check.measure
 
 
 def name_of(team: Sequence[str]) -> str:
     """Return what a team is called beside others of its task."""
     _, hierarchy, learner, fault = team
-    return ", ".join([hierarchy, learner, *([fault] if fault != atlas.NO_FAULT else [])])
+    return ", ".join([hierarchy, learner, *([fault] if fault != NO_FAULT else [])])
 
 
 FIGURES: Mapping[str, Callable[[pd.DataFrame], Figure]] = {
     "atlas-success": draw_success,
     "atlas-exponents": draw_exponents,
-    "atlas-predictions": lambda rows: draw_checks(
-        [*atlas.checks(rows), *atlas.checks(rows, atlas.SMALL // 2)]
-    ),
+    "atlas-predictions": lambda rows: draw_checks([*checks(rows), *checks(rows, SMALL // 2)]),
 }
 """By name of the file."""

@@ -110,21 +110,27 @@ def atlas(
     Laws are fitted to teams of at most 16 agents, and of at most 8, and larger ones of the same
     rows are predicted. Without --out the rows are the committed ones.
     """
-    from .atlas import COMMITTED, SMALL, checks, choices, coverage, losses, read_rows, run_tasks
+    from .atlas import ALREADY, COMMITTED, read_rows, run_tasks
+    from .atlas_faults import fault_costs, thresholds
+    from .atlas_predictions import SMALL, checks, choices, coverage, shares_right
 
     if out is None and (tasks or jobs is not None):
         raise SpecError(f"{'--task' if tasks else '--jobs'}: needs --out, where to run the tasks")
     folder = run_tasks(out, jobs, tasks) if out is not None else rows or COMMITTED
     frame = read_rows(folder)
     print_text(f"{len(frame):,} trials of {frame.groupby(TEAM_AND_SIZE).ngroups} conditions")
-    for small in (SMALL, SMALL // 2):
-        print_text("", f"From at most {small} agents: larger teams in 90 % intervals")
-        print_lines(coverage(checks(frame, small)))
-        print_lines(map(str, choices(frame, small)))
-    costs = losses(frame)
-    if costs:
-        print_text("", "What losing messages costs")
-        print_lines(map(str, costs))
+    for source, own in frame.groupby("source"):
+        is_known = source == ALREADY
+        print_text("", "Of published studies" if is_known else "Of tasks run after the rule")
+        for most in (SMALL, SMALL // 2) if is_known else (SMALL,):
+            print_text("", f"From at most {most} agents: larger teams in 90 % intervals")
+            print_lines(coverage(checks(own, most)))
+            chosen = choices(own, most)
+            print_lines([*shares_right(chosen), *map(str, chosen)])
+        costs = fault_costs(own)
+        if costs:
+            print_text("", "What faults cost")
+            print_lines([*map(str, costs), *thresholds(costs)])
     if figures is not None:
         from ..studies.presentation.figures import write
         from .atlas_figures import FIGURES
@@ -135,7 +141,7 @@ def atlas(
     return 0
 
 
-TEAM_AND_SIZE = ["task", "hierarchy", "learner", "fault", "size"]
+TEAM_AND_SIZE = ["source", "task", "hierarchy", "learner", "fault", "size"]
 
 
 entries = click.argument("entries", type=options.PATH, metavar="ENTRY.json...", nargs=-1)

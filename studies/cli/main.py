@@ -59,6 +59,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "check": (".commands.checking", "Check that scenarios keep their promises."),
     "combine": (".commands.describing", "Try every learner with every part of a condition."),
     "cost": (".commands.describing", "Print what hierarchies cost, by formula and measured."),
+    "profile": (".commands.describing", "Tell what the time of decisions goes to, part by part."),
     "atlas": (PUBLISHED, "Print what small teams tell of large ones, task by task."),
     "benchmark": (PUBLISHED, "Enter a learner in the benchmark push-n, and compare entries."),
     "claims": (PUBLISHED, "Print the claims of the paper and the verdict on each."),
@@ -121,6 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     # SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
+    warnings.filterwarnings("ignore", message=r".*joblib will operate in serial mode")  # never used
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors in REFUSING:
             stream.reconfigure(errors=IN_ASCII)

@@ -166,15 +166,18 @@ def _table(rows: Sequence[CostRow]) -> str:
 
 def _of_another_evaluator(rows: Sequence[CostRow]) -> list[str]:
     """Return for which rows the default evaluator does not try what the formulas count."""
-    most = AutoSettings().exact_up_to
-    own = dict.fromkeys(row.topology for row in rows if row.free > most)
+    auto = AutoSettings()
+    own = dict.fromkeys(row.topology for row in rows if row.free > auto.exact_up_to)
     if not own:
         return []
-    return [
-        f"They count the evaluator exact. The default one, auto, is that for {most} agents,",
-        "one and those below it; for more it tries fewer joint actions by another one,",
-        *wrap(f"see best-response. Rows: {', '.join(own)}.", WIDTH, break_on_hyphens=False),
-    ]
+    return wrap(
+        f"They count the evaluator exact. The default one, auto, is that up to {auto.exact_up_to} "
+        f"agents, one and those below it; up to {auto.sampling_up_to} it is sampling if agents "
+        "decide by their own value, else best-response, which try fewer joint actions: "
+        f"nested-agents profile counts and times them. Rows: {', '.join(own)}.",
+        WIDTH,
+        break_on_hyphens=False,
+    )
 
 
 def _measured_cells(row: CostRow) -> list[str]:

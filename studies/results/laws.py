@@ -222,19 +222,44 @@ class Law(NamedTuple):
     def distribution(self, size: float, seeds: int | None = None) -> tuple[float, float, float]:
         """Return mean, variance and degrees of freedom of a prediction, on the scale."""
         x = np.log([size])
-        value = float(self.curve.of(self.parameters, x)[0])
-        fits = np.array([self.curve.of(p, x)[0] for p in self.resampled])
         m = len(self.sample.sizes)
         parts = [
-            (self._spread(fits) ** 2, self.seeds - 1.0),
+            (self._spread(self._resampled_at(x)) ** 2, self.seeds - 1.0),
             (self.noise / (seeds or self.seeds), (self.seeds - 1.0) * m),
-            (self.misfit * (1.0 + self._leverage(x)), max(1.0, float(m - self.curve.n_parameters))),
+            self._deviation(x),
         ]
-        variance = sum(part for part, _ in parts)
-        if variance <= 0.0:
-            return value, FLAT**2, self.seeds - 1.0
-        freedom = variance**2 / sum(part**2 / own for part, own in parts)
-        return value, variance, freedom
+        return float(self.curve.of(self.parameters, x)[0]), *_sum(parts)
+
+    def _resampled_at(self, x: Array) -> Array:
+        """Return the laws of resampled seeds ``(RESAMPLES,)`` at ``x`` ``(1,)``."""
+        return np.array([self.curve.of(p, x)[0] for p in self.resampled])
+
+    def _deviation(self, x: Array) -> tuple[float, float]:
+        """Return variance and freedom of what sizes deviate from the law, at ``x`` ``(1,)``."""
+        spare = max(1.0, float(len(self.sample.sizes) - self.curve.n_parameters))
+        return self.misfit * (1.0 + self._leverage(x)), spare
+
+    def less(self, base: Law, size: float, level: float = 0.9) -> Estimate:
+        """Return by how much new means lie above those of another law at a size, on the scale.
+
+        Both laws are of the same seeds, which are resampled together.
+        """
+        x = np.log([size])
+        value = float((self.curve.of(self.parameters, x) - base.curve.of(base.parameters, x))[0])
+        both, own, others = np.intersect1d(
+            self.sample.sizes, base.sample.sizes, return_indices=True
+        )
+        apart = self.sample.values[:, own] - base.sample.values[:, others]
+        noise = float(apart.var(axis=0, ddof=1).mean())
+        parts = [
+            (self._spread(self._resampled_at(x) - base._resampled_at(x)) ** 2, self.seeds - 1.0),
+            (noise / self.seeds, (self.seeds - 1.0) * len(both)),
+            self._deviation(x),
+            base._deviation(x),
+        ]
+        variance, freedom = _sum(parts)
+        half = float(special.stdtrit(freedom, 0.5 + level / 2.0)) * math.sqrt(variance)
+        return Estimate(*map(np.asarray, (value, value - half, value + half)))
 
     def _leverage(self, x: Array) -> float:
         """Return how far deviations of the fitted sizes carry to one ``(1,)``: j (J'J)^-1 j'."""
@@ -252,6 +277,14 @@ class Law(NamedTuple):
     def curve_at(self, sizes: Array) -> Array:
         """Return the law's values ``(k,)`` at sizes."""
         return self.sample.scale.back(self.curve.of(self.parameters, np.log(sizes)))
+
+
+def _sum(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Return the sum of variances and its degrees of freedom (Satterthwaite 1946)."""
+    variance = sum(part for part, _ in parts)
+    if variance <= FLAT**2:
+        return FLAT**2, min(freedom for _, freedom in parts)
+    return variance, variance**2 / sum(part**2 / freedom for part, freedom in parts)
 
 
 def fit(curve: Curve, sample: Sample, resamples: int = RESAMPLES) -> Law:

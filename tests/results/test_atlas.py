@@ -8,6 +8,8 @@ import pytest
 
 from nested_agents.core.numerics import pd
 from nested_agents.results import SPECS, atlas
+from nested_agents.results import atlas_faults as faults
+from nested_agents.results import atlas_predictions as predictions
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 
@@ -28,34 +30,65 @@ def rows_of(of_star: float = 1.0, fault: str = "") -> pd.DataFrame:
 
 
 def test_laws_of_small_teams_meet_large_ones() -> None:
-    checked = [check for check in atlas.checks(rows_of()) if check.measure == "steps"]
+    checked = [check for check in predictions.checks(rows_of()) if check.measure == "steps"]
     assert [check.size for check in checked] == [32, 64, 32, 64]
     assert {check.law for check in checked} == {"power law"}
     inside = sum(check.is_inside for check in checked)
     assert inside >= 3
-    assert atlas.coverage(checked)[0].startswith(f"all: {inside} of 4 inside, 2 laws, share ")
+    assert predictions.coverage(checked)[0].startswith(f"all: {inside} of 4 inside, 2 laws, share ")
 
 
 def test_a_law_that_does_not_go_on_is_found_out() -> None:
     rows = rows_of()
     rows.loc[rows["size"] == 64, "steps"] *= 10.0
-    inside = {c.size: c.is_inside for c in atlas.checks(rows) if c.measure == "steps"}
+    inside = {c.size: c.is_inside for c in predictions.checks(rows) if c.measure == "steps"}
     assert inside == {32: True, 64: False}
 
 
-def test_the_best_hierarchy_is_chosen_by_small_teams() -> None:
-    choice = atlas.choices(rows_of())[0]
-    assert (choice.predicted, choice.measured) == ("chain", "chain")
+def test_the_best_hierarchy_is_predicted_by_laws_of_small_teams() -> None:
+    choice = predictions.choices(rows_of())[0]
+    assert (choice.predicted, choice.measured, choice.nearest) == ("chain", "chain", "chain")
     assert choice.p < 0.001
-    assert str(choice).startswith("boxes, batch-td, 32 agents: chain was predicted: best, less the")
+    assert (choice.rivals, choice.verdict) == ((), "right")
+    assert str(choice).startswith("boxes, batch-td, success, 32 agents: chain predicted, chain was")
+
+
+def test_equal_hierarchies_are_not_decided() -> None:
+    rows = rows_of()
+    rows["success"] = 0.5 + 0.1 * np.random.default_rng(1).uniform(size=len(rows))
+    chosen = predictions.choices(rows)
+    assert [choice.verdict for choice in chosen] == ["not decided", "not decided"]
+
+
+def test_laws_that_cross_are_seen_to_before_they_do() -> None:
+    """The star is worse up to 16 agents and better at 64: the largest small teams mislead."""
+    rows = rows_of()
+    star = rows["hierarchy"] == "star"
+    noise = np.random.default_rng(2).normal(0.0, 0.02, len(rows))
+    odds = np.where(star, 0.3 * rows["size"] ** 0.5, 8.0 / rows["size"] ** 0.6) * np.exp(noise)
+    rows["success"] = odds / (1.0 + odds)
+    last = predictions.choices(rows)[-1]
+    assert (last.size, last.nearest, last.predicted, last.measured) == (64, "chain", "star", "star")
+    assert last.verdict == "right"
 
 
 def test_what_losing_messages_costs_is_paired_by_seed() -> None:
     lost = rows_of(fault="lost 0.3")
     lost["success"] -= 0.2 + 0.01 * lost["seed"]
-    lines = atlas.losses(pd.concat([rows_of(), lost]))
+    lines = faults.fault_costs(pd.concat([rows_of(), lost]))
     assert len(lines) == 12
     assert all(float(one.difference.value) == pytest.approx(-0.22) for one in lines)
+    assert str(lines[0]).startswith("boxes, chain, 2 agents, lost 0.3: success -.22 [")
+
+
+def test_thresholds_are_between_shares_that_were_run() -> None:
+    frames = [rows_of()]
+    for share, cost in ((0.2, 0.0), (0.5, 0.3)):
+        failing = rows_of(fault=f"lost {share}")
+        failing["success"] -= cost - 0.02 * (failing["seed"] - 2.0)
+        frames.append(failing)
+    lines = faults.thresholds(faults.fault_costs(pd.concat(frames)))
+    assert lines[0] == "boxes, chain, 2 agents, messages lost: costs from .50 on, not up to .20"
 
 
 def test_committed_rows_are_made_again_from_published_ones() -> None:

@@ -36,6 +36,7 @@ REFERENCE = "chain"
 """The hierarchy that others are compared with, if it is there."""
 DECIDING = "decision [ms]"
 """Title of the time that a decision takes."""
+MESSAGES = "Messages: decisions told. States that are broadcast, to predict by, come on top."
 
 
 def check(spec: Spec) -> None:
@@ -90,8 +91,8 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
             pairs[case.setting].append((case.hierarchy, EVALUATED, own, bases[case.setting]))
     judgement, lines = judged(pairs, reference, "success, evaluation")
     compared = {setting: own for setting, own in judgement.items() if own}
-    notes = ["Rows: what else is swept, hierarchy.", ""] * any(case.value_of for case in cases)
-    return Analysis(tuple(table), (*notes, *(lines or [NOTHING])), cases, compared)
+    notes = ["Rows: what else is swept, hierarchy."] * any(case.value_of for case in cases)
+    return Analysis(tuple(table), (*notes, MESSAGES, "", *(lines or [NOTHING])), cases, compared)
 
 
 def estimates(

@@ -1,0 +1,88 @@
+"""What faults cost, and from which share of messages or members on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.numerics import pd, stats
+from ..studies.results.analysis import format_p
+from ..studies.results.notation import bracketed, signed, two_figures
+from ..studies.results.statistics import LEVEL, Estimate, bootstrap, holm
+from .atlas import MEASURES, NO_FAULT, TeamKind, qualities
+
+DOSES = {"lost": "messages lost", "left": "members gone"}
+"""With what the name of a fault begins that is a share of something."""
+
+
+class FaultCost(NamedTuple):
+    """What a fault costs."""
+
+    task: str
+    hierarchy: str
+    size: int
+    fault: str
+    measure: str
+    difference: Estimate
+    """Of quality, from no fault, with its 95 % interval over seeds."""
+    p: float
+    """Adjusted by Holm over a task's comparisons."""
+
+    def __str__(self) -> str:
+        head = f"{self.task}, {self.hierarchy}, {self.size} agents, {self.fault}"
+        shown = bracketed(self.difference, signed)
+        return f"{head}: {MEASURES[self.measure]} {shown}, p {format_p(self.p)}"
+
+
+def fault_costs(rows: pd.DataFrame) -> list[FaultCost]:
+    """Return what faults cost in the first quality of a task, by hierarchy and size."""
+    lines = []
+    for task, own in rows.groupby("task", sort=False):
+        measure, sign = next(iter(qualities(str(task)).items()))
+        if measure in own:
+            lines += _holm(list(_fault_costs(str(task), own, measure, sign)))
+    return lines
+
+
+def _fault_costs(task: str, rows: pd.DataFrame, measure: str, sign: int) -> Iterator[FaultCost]:
+    whole = rows[rows["fault"] == NO_FAULT]
+    failing = rows[rows["fault"] != NO_FAULT]
+    for (hierarchy, learner, fault, size), own in failing.groupby(
+        [*TeamKind._fields[1:], "size"], sort=False
+    ):
+        places = (whole["hierarchy"] == hierarchy) & (whole["size"] == size)
+        base = whole[places & (whole["learner"] == learner)].set_index("seed")[measure]
+        each = ((own.set_index("seed")[measure] - base) * sign).dropna().to_numpy(dtype=float)
+        if len(each) < 2:
+            continue
+        p = float(stats.ttest_1samp(each, 0.0).pvalue) if np.ptp(each) > 0.0 else 1.0
+        yield FaultCost(task, str(hierarchy), int(size), str(fault), measure, bootstrap(each), p)
+
+
+def _holm(lines: Sequence[FaultCost]) -> list[FaultCost]:
+    if not lines:
+        return []
+    adjusted = holm([line.p for line in lines])
+    return [line._replace(p=float(p)) for line, p in zip(lines, adjusted, strict=True)]
+
+
+def thresholds(costs: Sequence[FaultCost]) -> list[str]:
+    """Return from which share on a fault costs significantly, of those that were run."""
+    doses = dict[tuple[str, str, int, str], list[tuple[float, float]]]()
+    for cost in costs:
+        kind, _, share = cost.fault.partition(" ")
+        if kind in DOSES:
+            key = cost.task, cost.hierarchy, cost.size, kind
+            doses.setdefault(key, []).append((float(share), cost.p))
+    lines = []
+    for (task, hierarchy, size, kind), own in doses.items():
+        own.sort()
+        costly = [share for share, p in own if p < LEVEL]
+        free = [share for share, _ in own if not costly or share < costly[0]]
+        ends = f"not up to {two_figures(free[-1])}" if free else ""
+        begins = f"from {two_figures(costly[0])} on" if costly else ""
+        text = ", ".join(part for part in (begins, ends) if part)
+        lines.append(f"{task}, {hierarchy}, {size} agents, {DOSES[kind]}: costs {text}")
+    return lines
