@@ -72,9 +72,8 @@ def escape_bars(app, what, name, thing, options, lines):
 
 
 def skip_signatures_of_c(app, what, name, thing, skip, options):
-    """Leave out aliases of tuples and functions of C, over whose signatures Sphinx 9.0 stumbles."""
-    is_alias = isinstance(thing, GenericAlias) and thing.__origin__ is tuple
-    return True if is_alias or isinstance(thing, BuiltinFunctionType) else None
+    """Leave out aliases of types and functions of C, over whose signatures Sphinx 9.0 stumbles."""
+    return True if isinstance(thing, GenericAlias | BuiltinFunctionType) else None
 
 
 def keep_intervals_whole(app, doctree):

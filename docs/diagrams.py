@@ -67,45 +67,33 @@ def arrow(
 
 
 def idea() -> Figure:
-    """Draw who decides after whom, in a world: four wheels as a hierarchy, and on two robots."""
-    figure, axes = canvas(7.2, 3.1)
-    places = {1: (1.85, 2.25), 2: (1.15, 1.15), 3: (2.55, 1.15), 4: (2.55, 0.3)}
-    axes.text(1.85, 2.8, "who decides after whom", ha="center", weight="bold")
-    axes.text(5.6, 2.8, "in a world", ha="center", weight="bold")
+    """Draw who decides after whom: four wheels as a hierarchy, and on the robots of the film."""
+    figure, axes = canvas(4.4, 3.1)
+    places = {1: (1.75, 2.5), 2: (1.05, 1.4), 3: (2.45, 1.4), 4: (2.45, 0.5)}
     for above, below in ((1, 2), (1, 3), (3, 4)):
         start, end = np.array(places[above]), np.array(places[below])
         along = (end - start) / np.linalg.norm(end - start)
         beside = 0.07 * np.array([-along[1], along[0]])
         start, end = start + 0.27 * along, end - 0.27 * along
-        arrow(axes, start + beside, end + beside, colour=ORANGE)
+        arrow(axes, start + beside, end + beside, colour="black")
         arrow(axes, end - beside, start - beside, colour=GREEN)
-    axes.text(2.35, 1.85, "tells 3 what\nit decided", color=ORANGE, va="center", linespacing=1.1)
-    axes.text(1.35, 1.85, "considers what\n2 may do", color=GREEN, ha="right", va="center",
+    axes.text(1.2, 2.12, "considers\nwhat 2\nmay do", color=GREEN, ha="right", va="center",
               linespacing=1.1)  # fmt: skip
+    axes.text(2.3, 2.12, "tells 3 what\nit decided", va="center", linespacing=1.1)
     for name, place in places.items():
         agent(axes, place, name)
-
-    turn = np.array([[np.cos(0.2), -np.sin(0.2)], [np.sin(0.2), np.cos(0.2)]])
-    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.42
-    goal = np.array((6.6, 1.55))
-    axes.add_patch(Polygon(square @ turn.T + (5.4, 1.2), facecolor="#DDDDDD", edgecolor="black"))
-    axes.add_patch(Polygon(square + goal, fill=False, linestyle="--", edgecolor=GREY))
-    axes.text(*goal, "goal", ha="center", va="center", color=GREY)
-    for robot, (left, right) in zip(((4.45, 1.72), (4.5, 0.72)), ((1, 2), (3, 4)), strict=True):
-        axes.add_patch(Circle(robot, 0.27, facecolor="white", edgecolor="black", linewidth=1.5))
-        axes.plot(*zip(robot, np.add(robot, (0.27, 0.05)), strict=True), color="black")
-        for name, side in ((left, 0.3), (right, -0.3)):
+    for robot, (left, right) in zip(((3.75, 1.4), (3.75, 0.5)), ((1, 2), (3, 4)), strict=True):
+        axes.add_patch(Circle(robot, 0.26, facecolor="white", edgecolor="black", linewidth=1.5))
+        axes.plot(*zip(robot, np.add(robot, (0.26, 0)), strict=True), color="black")
+        for name, side in ((left, 0.24), (right, -0.24)):
             agent(axes, np.add(robot, (0, side)), name, 0.14)
-    arrow(axes, (3.15, 1.35), (4.0, 1.35))
-    axes.text(3.58, 1.43, "joint action", ha="center", color=GREY)
-    arrow(axes, (4.0, 0.95), (3.15, 0.95))
-    axes.text(3.58, 0.87, "states,\nrewards", ha="center", va="top", color=GREY, linespacing=1.1)
+    axes.text(3.75, 1.85, "two robots", ha="center", color=GREY)
     return figure
 
 
 def agent(axes: Axes, place: Sequence[float], name: int, radius: float = 0.22) -> None:
     """Draw an agent as a circle with its number in the order of decision; colours are robots."""
-    colour = BLUE if name <= 2 else "black"
+    colour = BLUE if name <= 2 else ORANGE
     axes.add_patch(Circle(tuple(place), radius, facecolor=colour, edgecolor="white", zorder=3))
     axes.text(*place, str(name), ha="center", va="center", color="white", weight="bold", zorder=4)
 

@@ -4,8 +4,10 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import nested_agents as na
 from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
@@ -67,6 +69,11 @@ def test_the_table_of_the_readme_is_published(capsys: pytest.CaptureFixture[str]
     for robots in (2, 4, 8):
         rates = [cells[f"{robots} robots, own, {entry}"] for entry in entries]
         assert f"| {robots} | {2 * robots} | {' | '.join(rates)} |" in PAGES["README.md"]
+    eight = na.load(edges).results.numbers("value_of=own, robots=8")
+    plans = eight["decision.considered only, private plans"]
+    ratio = np.median(plans / eight["decision.as trained"])
+    price = f"send none and take {ratio:.0f} times as long"
+    assert price in " ".join(PAGES["README.md"].split())
 
 
 def test_the_readme_is_short() -> None:

@@ -131,15 +131,23 @@ def running(command: Callable[..., int]) -> Callable[..., int]:
 
 
 class AnswerOptions(TypedDict):
-    """The options of recorded answers of functions, and of who is told of trials."""
+    """The options of what is kept of trials on the way, and of who is told of them."""
 
     track: tuple[str, ...]
     answers: Path | None
     calls: bool
+    checkpoint: float
 
 
 def recorded(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options of recorded answers, see `AnswerOptions`."""
+    """Add the options of recorded answers and checkpoints, see `AnswerOptions`."""
+    checkpoint = number(
+        "--checkpoint",
+        "SECONDS",
+        300.0,
+        "How often a trial puts down what it has come to, so that it goes on from there, to the "
+        "same rows, if it is killed; 0: never.",
+    )
     answers = click.option(
         "--answers",
         type=PATH,
@@ -159,7 +167,7 @@ def recorded(command: Callable[..., int]) -> Callable[..., int]:
         help="Also write every trial that finishes to tensorboard (below DIR/tensorboard), mlflow "
         "or wandb, which must be installed.",
     )
-    return track(answers(calls(command)))
+    return track(answers(calls(checkpoint(command))))
 
 
 trust = flag(

@@ -10,14 +10,12 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cache
 from itertools import combinations
-from textwrap import wrap
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.numerics import quadrature, special
-from ..errors import WIDTH
-from .notation import two_figures
+from .notation import two_figures, wrapped
 from .statistics import EXACT, LEVEL, Array
 
 WANTED = 0.8
@@ -281,7 +279,7 @@ def power_text(
         text = f"with {counted}{among}, a difference of {least} is found with probability "
         text += f"{two_figures(WANTED)}{within}."
         text += f" For a difference of {goal} it takes about {enough} seeds." if enough else ""
-    return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    return wrapped(f"Power: {text}")
 
 
 def exponent_text(

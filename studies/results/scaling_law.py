@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from textwrap import wrap
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +11,12 @@ import numpy as np
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
-from ..errors import WIDTH, SpecError
+from ..errors import SpecError
 from ..spec.tables import label_but
 from . import laws
 from .analysis import Summary, format_p
 from .contrasts import values_of
-from .notation import bracketed, two_figures
+from .notation import bracketed, two_figures, wrapped
 from .power import APART, seeds_for
 from .results import Results
 from .statistics import LEVEL, Array, bootstrap, holm
@@ -66,7 +65,7 @@ class ScalingLaw(NamedTuple):
     def legend(self) -> tuple[str, ...]:
         """How the table's intervals are made, in lines."""
         return tuple(
-            _wrapped(
+            wrapped(
                 "Intervals of parameters: 95 %, seeds resampled, Student's. Predictions: of the "
                 "mean of as many seeds."
             )
@@ -77,7 +76,7 @@ class ScalingLaw(NamedTuple):
         """What was chosen, how it predicted sizes that were left out, how groups differ."""
         lines: list[str] = []
         for fitted in self.fits:
-            lines += _wrapped(_sentence(fitted, self.size))
+            lines += wrapped(_sentence(fitted, self.size))
         lines += self._comparisons()
         return tuple(lines)
 
@@ -95,25 +94,15 @@ class ScalingLaw(NamedTuple):
         for (group, contrast), p in zip(pairs, ps, strict=True):
             word = "differs" if p < LEVEL else "no significant difference"
             shown = bracketed(contrast.difference)
-            lines += _wrapped(f"{word}: {group}, {shown}, p {format_p(p)}", "  ")
+            lines += wrapped(f"{word}: {group}, {shown}, p {format_p(p)}", "  ")
         spread = max(contrast.deviation for _, contrast in pairs)
         seeds = seeds_for(APART, spread, len(pairs)) if spread > 0.0 else None
         if seeds is not None:
-            lines += _wrapped(
+            lines += wrapped(
                 f"Power: exponents that differ by {two_figures(APART)} are told apart with "
                 f"probability .80 by about {seeds} seeds at these sizes."
             )
         return lines
-
-
-def _wrapped(text: str, indent: str = "") -> list[str]:
-    return wrap(
-        text,
-        WIDTH,
-        initial_indent=indent,
-        subsequent_indent=f"{indent}  ",
-        break_on_hyphens=False,
-    )
 
 
 def _is_line(law: laws.Law) -> bool:
