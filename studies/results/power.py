@@ -330,7 +330,7 @@ def exponent_text(
         if len(larger) > len(sizes) and takes:
             up_to = f", or sizes to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
             text += f" {takes}{up_to}."
-    return wrap(f"Exponents: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    return wrapped(f"Exponents: {text}")
 
 
 def _reach(sizes: Sequence[float]) -> float:
