@@ -201,7 +201,13 @@ def write(figure: Figure, path: Path) -> None:
 
 
 def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
-    """Let an axis be logarithmic, its ticks plain numbers: 0.5, 1, 2, 5."""
+    """Let an axis be logarithmic, its ticks plain numbers: 0.5, 1, 2, 5.
+
+    It stays linear where nothing is above zero.
+    """
+    extent = axes.dataLim.intervaly if which == "y" else axes.dataLim.intervalx
+    if not extent[1] > 0.0:
+        return
     axes.set(**{f"{which}scale": "log"})
     axis = axes.yaxis if which == "y" else axes.xaxis
     low, high = axis.get_view_interval()

@@ -20,6 +20,8 @@ DATABASE = "results.sqlite"
 """Name of the file, in the directory of a study."""
 SPEC_FILE = "study.toml"
 """Name of a study's own copy of its spec, beside it."""
+CHECKPOINTS = "checkpoints"
+"""Folder of what trials under way have come to, beside it."""
 
 
 class NoStudyError(SpecError):

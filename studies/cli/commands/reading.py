@@ -120,13 +120,8 @@ class Compared(TypedDict):
     help="Compare conditions that differ in this swept key alone, as robots or topology; "
     "directory compares studies. By default (condition) all conditions with the first.",
 )
-@click.option(
-    "--measure",
-    metavar="NAME",
-    help="A measure of episodes, steps, return, or a number of whole trials; by default success, "
-    "or the first score of a table.",
-)
-@click.option("--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one.")
+@options.measure
+@options.phase
 @click.option(
     "--reference", metavar="LABEL", help="What the others are compared with; by default the first."
 )
