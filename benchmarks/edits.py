@@ -22,11 +22,10 @@ from pathlib import Path
 from typing import Any
 
 from nested_agents.studies.api.loading import load
-from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.store.database import DATABASE
 
-from .victim import EXPLAIN, LINES, Adversary, mended, read
+from .victim import EXPLAIN, LINES, Adversary, mended, read, without_figures
 
 PAYLOAD = "payload_of_others"
 """A module that must not be imported."""
@@ -40,7 +39,7 @@ COMMANDS = ("table", "compare", "table --format json")
 
 def sql(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Edit a study's database again and again; return what happened."""
-    learning_curve.draw = lambda analysis: {}
+    without_figures()
     _offer_payload(folder)
     adversary, tally = Adversary(folder, rng, (*LINES, EXPLAIN)), Counter[str]()
     path = adversary.study / DATABASE

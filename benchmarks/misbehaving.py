@@ -13,14 +13,13 @@ import random
 import sys
 import traceback
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.trial import Trial
-from nested_agents.studies.workers.runner import Outcome, RunTrial, attempt
+
+from .victim import inline
 
 FIRED = "NESTED_AGENTS_FAULT"
 """Environment variable that a fault sets when it comes true."""
@@ -106,29 +105,8 @@ TOPOLOGIES = (
 )  # fmt: skip
 
 
-class Inline:
-    """Workers that are this process, which run trials as any worker does."""
-
-    processes = 1
-
-    def arrivals(
-        self,
-        trials: Sequence[Trial],
-        run_trial: RunTrial,
-        started: Callable[[str], None],
-        ended: Callable[[str], None],
-    ) -> Generator[Outcome]:
-        """See `nested_agents.studies.workers.runner.Workers.arrivals`."""
-        for trial in trials:
-            started(trial.identity)
-            outcome = attempt(run_trial, trial)
-            ended(trial.identity)
-            yield outcome
-
-
 def scenarios(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Run studies with a scenario that misbehaves; return what became of them."""
-    studies_run.start_workers = lambda *_: contextlib.nullcontext(Inline())
     tally = Counter[str]()
     for attempted in range(number):
         tally["scenarios"] += 1
@@ -138,7 +116,8 @@ def scenarios(number: int, rng: random.Random, folder: Path) -> Counter[str]:
         text = SCENARIO.format(method=method, act=act, after=rng.randrange(1, 9), fired=FIRED)
         (place / "bad.py").write_text(text)
         (place / "spec.toml").write_text(SPEC)
-        became = _scenario(place)
+        with inline():
+            became = _scenario(place)
         tally[f"scenarios: {became}"] += 1
         if became not in ("told", "refused in one line", "not reached"):
             print(f"{method}, {act}: {became}", file=sys.stderr)

@@ -9,12 +9,15 @@ import shutil
 import sys
 import time
 import traceback
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 
 from nested_agents.core.interface.measures import Measure
+from nested_agents.studies.api import explaining, running
 from nested_agents.studies.api.loading import load
+from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
@@ -23,23 +26,29 @@ from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
-from nested_agents.studies.workers.runner import Outcome, RunTrial, save
+from nested_agents.studies.workers.runner import Outcome, RunTrial, Workers, attempt, save
 
 SPEC = Spec.of(
-    {"seeds": 5, "episodes": 2, "steps": 10, "evaluation": 1, "keep_teams": True,
-     "sweep": {"preset": ["default", "frozen"]}}
+    {"seeds": 4, "episodes": 2, "steps": 10, "evaluation": 1, "keep_teams": True,
+     "sweep": {"scenario.robots": [1, 2, 3]}}
 )  # fmt: skip
 EXPLAIN = "explain"
 TEAM = "na.load(...).team()"
 """No command: what a user reads in Python."""
 LINES = (
     "results --format csv", "status", "table --format csv", "compare", "compare --statistics",
-    "report", "export", TEAM,
+    "fit --measure return", "report", "export", "export --format json", TEAM,
 )  # fmt: skip
 """The commands that read."""
 
 Answer = tuple[int, str, str]
 """Exit status, output and errors of a command."""
+
+
+def without_figures() -> None:
+    """Let `run` and `explain` draw nothing: figures are of what is verified, and take most time."""
+    learning_curve.draw = lambda analysis: {}
+    explaining.draw = lambda explanation: {}
 
 
 @cache
@@ -114,6 +123,11 @@ class Adversary:
             self.results[trial.identity] = run_trial(trial)
         return self.results[trial.identity]
 
+    def repeat(self, _: RunTrial, trial: Trial) -> Outcome:
+        """Return in a moment what came of a trial, for `inline`."""
+        time.sleep(0.08)
+        return Outcome(trial, None, 1.0, self.result(trial))
+
     def content(self, directory: Path) -> object:
         """Return all that a study has found."""
         with Store.open(directory) as store:
@@ -142,28 +156,43 @@ class Adversary:
         shutil.copytree(self.sound, self.study)
 
 
-class Here:
-    """Workers that are this process; trials are those that an adversary has run before."""
+class Inline(Workers[Future[Outcome]]):
+    """Workers that are a thread of this process.
+
+    Parameters
+    ----------
+    run
+        Runs a trial.
+    """
 
     processes = 1
 
-    def __init__(self, adversary: Adversary) -> None:
-        self.adversary = adversary
+    def __init__(self, run: Callable[[RunTrial, Trial], Outcome] = attempt) -> None:
+        self._run = run
+        self._thread = ThreadPoolExecutor(1)
 
-    def arrivals(
-        self,
-        trials: Sequence[Trial],
-        run_trial: RunTrial,
-        started: Callable[[str], None],
-        ended: Callable[[str], None],
-    ) -> Generator[Outcome]:
-        """See `nested_agents.studies.workers.runner.Workers.arrivals`."""
-        for trial in trials:
-            started(trial.identity)
-            time.sleep(0.08)
-            result = self.adversary.result(trial)
-            ended(trial.identity)
-            yield Outcome(trial, None, 1.0, result)
+    def submit(self, run_trial: RunTrial, trial: Trial) -> Future[Outcome]:
+        """See `Workers.submit`."""
+        return self._thread.submit(self._run, run_trial, trial)
+
+    def fetch(self, future: Future[Outcome], trial: Trial) -> Outcome:
+        """See `Workers.fetch`."""
+        return future.result()
+
+    def stop(self, futures: Sequence[Future[Outcome]]) -> None:
+        """See `Workers.stop`."""
+        self._thread.shutdown(cancel_futures=True)
+
+
+@contextlib.contextmanager
+def inline(run: Callable[[RunTrial, Trial], Outcome] = attempt) -> Iterator[None]:
+    """Let studies run by a thread of this process; in forked children, too."""
+    usual = running.start_workers
+    running.start_workers = lambda *_: contextlib.nullcontext(Inline(run))
+    try:
+        yield
+    finally:
+        running.start_workers = usual
 
 
 def read(adversary: Adversary, line: str, path: Path) -> str:

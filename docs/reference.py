@@ -88,7 +88,7 @@ MODULES = {
         "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
         "results.power", "results.contrasts", "results.aggregates", "results.published",
-        "catalogue.study", "cost.cost", "cost.table",
+        "catalogue.study", "cost.cost", "cost.profile", "cost.table",
     )),
     "results": ("What has been published, and what is said of it.", (
         "claims", "measures", "push_n",

@@ -11,6 +11,9 @@ from types import FrameType
 
 def main() -> int:
     """Run the command line and return its exit status; Ctrl-C ends even the imports in silence."""
+    # As in workers: arrays are small, and threads wait for each other.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     pressed: list[int] = []
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, partial(_interrupt, pressed))

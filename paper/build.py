@@ -17,7 +17,7 @@ from nested_agents.studies.catalogue.chain_order import order_tests
 from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results import published
 from nested_agents.studies.results.analysis import Summary
-from nested_agents.studies.results.statistics import two_figures
+from nested_agents.studies.results.notation import two_figures
 
 FOLDER = Path(__file__).parent
 
@@ -30,7 +30,7 @@ def rows(name: str) -> na.StudyResults:
 
 def cell(name: str, condition: str, column: str) -> str:
     """Return an estimate with its 95 % interval, as the table of its study has it."""
-    return _of_table(name, condition, column).bracketed(" ")
+    return _of_table(name, condition, column).text()
 
 
 def value(name: str, condition: str, column: str) -> str:
@@ -63,7 +63,7 @@ def entries() -> dict[str, Summary]:
 def entry(name: str, robots: int) -> str:
     """Return the success of an entry of push-n with so many robots; a dash if it has not run."""
     estimate = entries()[name].estimates.get(f"{robots} robots")
-    return "--" if estimate is None else Cell.of(estimate).bracketed(" ")
+    return "--" if estimate is None else Cell.of(estimate).text()
 
 
 def orders() -> dict[str, str]:

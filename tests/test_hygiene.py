@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import subprocess
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,25 @@ def test_the_container_is_not_root() -> None:
     lines = (ROOT / "Containerfile").read_text(encoding="utf-8").splitlines()
     assert lines.index("USER agent") < lines.index("RUN ./dev setup")
     assert lines[-1] == 'CMD ["./dev", "test"]'
+
+
+TOP = {
+    ".ci", ".github", "benchmarks", "core", "docs", "examples", "nested_agents", "paper",
+    "results", "scenarios", "studies", "tests", "topologies",
+    ".containerignore", ".gitignore", ".pre-commit-config.yaml", ".readthedocs.yaml",
+    "CHANGELOG.md", "CITATION.cff", "CODE_OF_CONDUCT.md", "CONTRIBUTING.md", "Containerfile",
+    "LICENSE", "README.md", "box2d.lock", "conftest.py", "dev", "pyproject.toml",
+    "requirements.lock", "setup.py",
+}  # fmt: skip
+"""What may stand at the top of the repository; the rest is what commands have left there."""
+
+
+def test_nothing_stray_is_at_the_top() -> None:
+    if not (ROOT / ".git").exists():
+        pytest.skip("no checkout")
+    command = ["git", "ls-files", "-z"]
+    kept = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert {path.partition("/")[0] for path in kept.split("\0") if path} == TOP
 
 
 @pytest.mark.slow

@@ -52,6 +52,21 @@ class Answers(NamedTuple):
     """Whether they may be called for answers that are missing."""
 
 
+class Checkpoints(NamedTuple):
+    """Where trials of a study put down what they have come to, so that a killed one goes on."""
+
+    folder: Path
+    """Of a file for each."""
+    seconds: float
+    """How often one does so."""
+    code: str
+    """Digest of what its bits depend on: with another one a trial begins anew."""
+
+    def file(self, identity: str) -> Path:
+        """Return the file of a trial."""
+        return self.folder / f"{identity}.npz"
+
+
 class Sources:
     """Files by the names under which a spec knows them.
 
@@ -72,6 +87,8 @@ class Sources:
     ----------
     answers
         Where functions' answers are kept; none: nowhere.
+    checkpoints
+        Where trials put down what they have come to; none: nowhere.
 
     Examples
     --------
@@ -91,6 +108,7 @@ class Sources:
     ) -> None:
         self.folder = folder
         self.answers: Answers | None = None
+        self.checkpoints: Checkpoints | None = None
         self._texts = dict(texts or {})
         self._studies = [place for place in (study, folder) if place is not None]
         self._brought = dict.fromkeys(self._texts, brought_by) if brought_by else {}
@@ -107,7 +125,7 @@ class Sources:
 
     def __getstate__(self) -> dict[str, Any]:
         # Of what was sent to a worker all that is known is that its sender has run it.
-        own = {"_was_sent": True, "answers": self.answers}
+        own = {"_was_sent": True, "answers": self.answers, "checkpoints": self.checkpoints}
         return {**vars(Sources(None, self._texts)), **own}
 
     @property

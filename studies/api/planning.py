@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from textwrap import wrap
@@ -21,16 +22,21 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.numerics import FloatArray, IntArray, optimize, pd
+from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
-from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
+from ..results.laws import FEWEST
+from ..results.power import SMALLEST, USUAL_DEVIATION, exponent_text, power_text
+from ..results.scaling_law import size_key
+from ..spec.controls import LEARN_NOTHING
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
+from ..spec.tables import label_but
 from ..trials.session import Session, run_trial
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import cores
 from ..workers.workers import check_jobs
-from .running import examine
+from .running import CHECKPOINT, examine
 from .study import Place
 
 SEED = 10_000
@@ -128,6 +134,10 @@ class Plan:
             yield f"         {quick} to {slow}, by how early they end and what else runs here"
         if self.memory is not None:
             yield f"memory   about {self.memory / 1e9:.1f} GB with {processes}"
+        if any(cost.seconds[1] > CHECKPOINT for cost in self.costs.values()):
+            most = max(cost.memory for cost in self.costs.values()) / 1e6
+            yield f"killed   a trial goes on from its checkpoint, every {duration(CHECKPOINT)}, of"
+            yield f"         about {most:.1f} MB, or starts anew where users' files learn"
         if any(cost.decision for cost in self.costs.values()):
             yield from self._decisions()
         if self.comparisons:
@@ -138,8 +148,22 @@ class Plan:
                 f"differences of single seeds are taken to deviate by {self.deviation:g}."
             )
             yield from wrap(text, WIDTH)
+        yield from self._exponents()
         for warning in self.warnings:
             yield from wrap(warning, WIDTH)
+
+    def _exponents(self) -> Iterator[str]:
+        """Yield which exponents of growth can be told apart, if sizes are swept."""
+        columns = self.outline.columns
+        with suppress(SpecError):
+            key = size_key(columns)
+            groups: dict[str, list[float]] = {}
+            for own in columns.values():
+                groups.setdefault(label_but(own, [key]), []).append(float(own[key]))
+            _, fewest = min((len(own), sorted(own)) for own in groups.values())
+            if len(fewest) >= FEWEST and fewest[0] > 0.0:
+                yield ""
+                yield from exponent_text(fewest, len(self.outline.seeds), max(1, len(groups) - 1))
 
     def _decisions(self) -> Iterator[str]:
         """Yield what a decision costs under every condition, and the study at most."""
@@ -258,6 +282,8 @@ def _peak() -> float:
 
 def try_out(trial: Trial, seeds: int = 1) -> ConditionCost:
     """Return what the trials of a condition take, all of its seeds where it says so."""
+    if trial.decisions is not None:
+        return try_out_decisions(trial, trial.decisions, seeds)
     alone = replace(trial, seed=SEED, curriculum=(), evaluation=min(trial.evaluation, EPISODES))
     brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
     loading = _seconds(partial(run_trial, brief))
@@ -301,6 +327,50 @@ def try_out(trial: Trial, seeds: int = 1) -> ConditionCost:
     return ConditionCost(whole_trial, loading, memory, _decision(session), seeds * decisions)
 
 
+def try_out_decisions(trial: Trial, budget: int, seeds: int = 1) -> ConditionCost:
+    """Return what the trials of a condition take that train for a budget of decisions.
+
+    Rollouts of many worlds, or episodes of one, are tried; then two episodes of evaluation, of
+    which there are as many more as there are stops on the way.
+    """
+    begin = time.process_time()
+    session = Session(replace(trial, seed=SEED, evaluation=min(trial.evaluation, EPISODES)))
+    held = _bytes(session)
+    worlds = trial.settings.learner.at_once
+    piece = max(1, worlds * trial.settings.learner.model_dump().get("rollout", 1))
+    learns = trial.settings.learner.kind not in LEARN_NOTHING
+    done = session.train_until(min(piece, budget)) if learns else 0
+    loading = time.process_time() - begin
+    taken = list[tuple[int, float]]()
+    while learns and done < budget and sum(seconds for _, seconds in taken) < TRIED:
+        spent = session.spent
+        reached = session.train_until(min(done + piece, budget))
+        taken.append((reached - done, session.spent - spent))
+        done = reached
+    training = np.zeros(3)
+    if taken:
+        counts, seconds = np.array(taken).T
+        if worlds > 1:  # what is kept between updates does not grow
+            training += budget * seconds.sum() / counts.sum()
+        else:
+            rounds = np.array([budget / counts.mean()])
+            training += learning_time(counts, seconds, np.array([counts.mean()]), rounds)
+    elif learns:
+        training += loading * budget / done
+    held += max(_bytes(session) - held, 0.0) if worlds > 1 else 0.0
+    evaluating = _seconds(session.finish)
+    rows = pd.DataFrame(session.result().rows)
+    lengths = rows[rows["phase"] != "training"].groupby("phase")["steps"]
+    longest = trial.evaluation_steps or trial.steps
+    each = [_mean_length(steps.to_numpy(float), longest, longest + 1) for _, steps in lengths]
+    per_step = evaluating / max(float(lengths.sum().sum()), 1.0)
+    evaluations = trial.evaluation * per_step * (sum(each) + len(stops(budget)) * each[0])
+    decisions = budget + trial.evaluation * longest * (len(each) + len(stops(budget)))
+    return ConditionCost(
+        training + evaluations, loading, held, _decision(session), seeds * decisions
+    )
+
+
 def _decision(session: Session) -> dict[str, float]:
     """Return what a decision has cost, and how many joint actions were tried, where it is told."""
     names = [measure.name for measure in session.team.costs]
@@ -321,7 +391,7 @@ def _seconds_of_episodes(session: Session, episodes: int) -> list[float]:
 
 
 def learning_time(
-    steps: FloatArray, seconds: FloatArray, mean: FloatArray, episodes: IntArray
+    steps: FloatArray, seconds: FloatArray, mean: FloatArray, episodes: FloatArray | IntArray
 ) -> FloatArray:
     """Return the processor time [s] to learn from all episodes of a trial.
 

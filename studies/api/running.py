@@ -3,26 +3,33 @@
 Who wants to see how it goes passes an `Observer`.
 """
 
+import json
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
+from math import inf
 from pathlib import Path
 
 from ...core.functions.recorded import AnswersError, RecordedAnswers
 from ...core.interface.measures import Measure
-from ...core.plugins.sources import ANSWERS, Answers, is_reference
+from ...core.plugins.sources import ANSWERS, Answers, Checkpoints, is_reference
 from ..catalogue.study import load_study, measure_by_name
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
+from ..spec.outline import fingerprint, present
 from ..spec.spec import Spec
+from ..store.database import CHECKPOINTS
 from ..store.store import Store
 from ..trials.arrangement import check_conditions
 from ..trials.keeping import open_to_run, pending
 from ..trials.trial import Trial, trials_of
-from ..workers.runner import Backend, Observer, Outcome, run_trials
+from ..workers.runner import Backend, Observer, Outcome, run_trials, versions
 from ..workers.workers import check_workers, start_workers
 from .study import Place, StudyResults
+
+CHECKPOINT = 300.0
+"""How often a trial puts down what it has come to, if nobody says otherwise [s]."""
 
 
 @contextmanager
@@ -39,6 +46,7 @@ def run_study(
     chosen: Sequence[Trial] = (),
     answers: Path | None = None,
     calls: bool = True,
+    checkpoint: float = CHECKPOINT,
 ) -> Iterator[Store]:
     """Run what is left of a study; then its store is open for as long as the context lasts.
 
@@ -63,6 +71,9 @@ def run_study(
         study's own.
     calls
         Whether functions whose answers are recorded may be called for those that are missing.
+    checkpoint
+        How often a trial puts down what it has come to, so that it goes on from there if it is
+        killed [s]; 0: never.
 
     Yields
     ------
@@ -81,6 +92,8 @@ def run_study(
     spec.sources.answers = Answers(directory.resolve() / ANSWERS, calls)
     trials = chosen or trials_of(spec)
     check_workers(backend, jobs, address)
+    if not 0.0 <= checkpoint < inf:
+        raise SpecError(f"--checkpoint {checkpoint:g}: must be 0 or more seconds")
     with ExitStack() as stack:
         start = partial(start_workers, backend, jobs, address)
         # A cluster that cannot be reached is told before anything is written.
@@ -91,6 +104,8 @@ def run_study(
             observer.note(merge_answers(directory, answers))
         if retry_failed:
             store.forget_failed()
+        if checkpoint:
+            spec.sources.checkpoints = stack.enter_context(_checkpoints(directory, checkpoint))
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
         with spec.sources.active():
@@ -114,6 +129,22 @@ def run_study(
             )
             raise
         yield store
+
+
+@contextmanager
+def _checkpoints(directory: Path, seconds: float) -> Iterator[Checkpoints]:
+    """Make a folder for checkpoints of trials, and remove it in the end if none is left."""
+    folder = directory.resolve() / CHECKPOINTS
+    with suppress(OSError):  # trials go on without
+        folder.mkdir(exist_ok=True)
+        for half_written in folder.glob(".*.new"):
+            half_written.unlink()
+    code = json.dumps([fingerprint(present()), versions()])
+    try:
+        yield Checkpoints(folder, seconds, code)
+    finally:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def merge_answers(directory: Path, other: Path) -> str:
@@ -162,6 +193,7 @@ def run(
     track: Sequence[str] = (),
     answers: Place | None = None,
     calls: bool = True,
+    checkpoint: float = CHECKPOINT,
 ) -> StudyResults:
     """Run what is left of a study and return its results; the same call again continues it.
 
@@ -172,7 +204,7 @@ def run(
     out
         Where the study is kept; made if it does not exist. Every trial is kept the moment it
         finishes.
-    jobs, backend, address, retry_failed, accept_code, answers, calls
+    jobs, backend, address, retry_failed, accept_code, answers, calls, checkpoint
         As those of `run_study`.
     progress
         Whether to show how it goes.
@@ -210,6 +242,7 @@ def run(
         observer=listener,
         answers=None if answers is None else Path(answers),
         calls=calls,
+        checkpoint=checkpoint,
     ) as store:
         study = StudyResults.of(store)
     if study.failed and observer is None:

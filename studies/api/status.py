@@ -33,6 +33,8 @@ class Progress:
     is left."""
     seconds: float | None
     """Estimate of the time left [s]; None if nothing has finished to go by."""
+    checkpoints: int
+    """How many trials that do not run would go on from a checkpoint."""
     damaged: tuple[str, ...]
     """What has finished but is not as it was written, one line each; counted as left."""
     refusal: str | None
@@ -54,7 +56,9 @@ def progress(store: Store) -> Progress:
     begun = {} if now is None else now[1]
     pending = [trial for trial in trials if trial.identity not in states]
     running = [(t.condition, t.seed, begun[t.identity]) for t in pending if t.identity in begun]
-    left = [trial.condition for trial in pending if trial.identity not in begun]
+    waiting = [trial for trial in pending if trial.identity not in begun]
+    left = [trial.condition for trial in waiting]
+    checkpoints = store.checkpoints()
     failed = [*states.values()].count("failed")
     usual = cores() if left and refusal is None else 0
     processes = usual if now is None else now[0]
@@ -67,6 +71,7 @@ def progress(store: Store) -> Progress:
         running=tuple(running),
         processes=processes,
         seconds=_estimate(store.mean_seconds(), left, spent, processes),
+        checkpoints=sum(trial.identity in checkpoints for trial in waiting),
         damaged=tuple(store.notes),
         refusal=refusal,
     )
@@ -109,7 +114,8 @@ def describe(store: Store, now: Progress) -> Iterator[str]:
     for condition, seed, seconds in now.running:
         yield f"         {condition}, seed {seed}, for {duration(seconds)}"
     yield f"failed   {now.failed}"
-    yield f"left     {now.left}"
+    begun = f", {now.checkpoints} of them from a checkpoint" if now.checkpoints else ""
+    yield f"left     {now.left}{begun}"
     if now.seconds:
         yield f"time     about {duration(now.seconds)} with {count(now.processes, 'process', 'es')}"
     if (remark := other_spec(store)) is not None:

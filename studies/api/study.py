@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +33,7 @@ from ..errors import SpecError
 from ..presentation.headlines import headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.contrasts import contrasts, power_with_first
+from ..results.notation import wrapped
 from ..results.results import Results, choose_trials, read
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, other_spec, sources_of
@@ -121,8 +123,8 @@ class StudyResults:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the study says of its results, verdicts and their power, line by line."""
-        sentences = headlines(self.results, self._settings)
-        return (*sentences, *notes_of(self.analysis), *self._of_controls)
+        sentences = map(wrapped, headlines(self.results, self._settings))
+        return (*chain.from_iterable(sentences), *notes_of(self.analysis), *self._of_controls)
 
     @property
     def _of_controls(self) -> tuple[str, ...]:

@@ -122,6 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     # SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
+    warnings.filterwarnings("ignore", message=r".*joblib will operate in serial mode")  # never used
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors in REFUSING:
             stream.reconfigure(errors=IN_ASCII)

@@ -131,15 +131,23 @@ def running(command: Callable[..., int]) -> Callable[..., int]:
 
 
 class AnswerOptions(TypedDict):
-    """The options of recorded answers of functions, and of who is told of trials."""
+    """The options of what is kept of trials on the way, and of who is told of them."""
 
     track: tuple[str, ...]
     answers: Path | None
     calls: bool
+    checkpoint: float
 
 
 def recorded(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options of recorded answers, see `AnswerOptions`."""
+    """Add the options of recorded answers and checkpoints, see `AnswerOptions`."""
+    checkpoint = number(
+        "--checkpoint",
+        "SECONDS",
+        300.0,
+        "How often a trial puts down what it has come to, so that it goes on from there, to the "
+        "same rows, if it is killed; 0: never.",
+    )
     answers = click.option(
         "--answers",
         type=PATH,
@@ -159,7 +167,7 @@ def recorded(command: Callable[..., int]) -> Callable[..., int]:
         help="Also write every trial that finishes to tensorboard (below DIR/tensorboard), mlflow "
         "or wandb, which must be installed.",
     )
-    return track(answers(calls(command)))
+    return track(answers(calls(checkpoint(command))))
 
 
 trust = flag(
@@ -207,6 +215,19 @@ where = click.option(
     help="Only the trials of a choice, a query of pandas: \"robots == 8 and box == 'circle'\".",
 )
 """A part of the trials, see `nested_agents.studies.results.results.chosen`."""
+
+measure = click.option(
+    "--measure",
+    metavar="NAME",
+    help="A measure of episodes, steps, return, or a number of whole trials, as messages; by "
+    "default the first, success, or the first score of a table.",
+)
+"""What is compared, or fitted."""
+
+phase = click.option(
+    "--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one."
+)
+"""Which episodes of a study count."""
 
 
 def formats(*choices: str, text: str = "How to print it.") -> Decorator:

@@ -29,12 +29,15 @@ from ...core.plugins.words import show
 from ...scenarios import SCENARIOS
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
+from ..presentation.growth import growth_figures
 from ..presentation.headlines import headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.analysis import identity_lines
+from ..results.analysis import Analysis, identity_lines
 from ..results.contrasts import contrasts
+from ..results.notation import bracketed, whole
 from ..results.results import Results, read
+from ..results.statistics import LEVEL
 from ..spec.controls import control_lines
 from ..spec.outline import StudyOutline, sources_of
 from ..spec.tables import dumps
@@ -48,10 +51,6 @@ from .pictures import hierarchy_pictures, pictures
 
 MOST_BYTES = 1_500_000
 """Of all packed episodes together."""
-MOST_LINES = 24
-"""Of what a study says, that are shown unfolded."""
-NOT_SIGNIFICANT = re.compile(r"(?:^  no significant difference: .*\n(?:    .*\n)*)+", re.MULTILINE)
-"""Lines of differences that are not significant, in what a study says."""
 
 
 Json = dict[str, Any]
@@ -230,21 +229,26 @@ def page(directory: Path) -> str:
         drawn = hierarchy_pictures(store)
     with sources.active():
         analysis = analyse_as(outline.study, results)
-        figures = draw_figures(load_study(outline.study), analysis)
+        figures = dict(draw_figures(load_study(outline.study), analysis))
+    if outline.study == "scaling":
+        figures |= growth_figures(results)
     notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included
     there = {label: own for label, own in settings.items() if label in results.conditions}
-    notes = (*headlines(results, there), *notes, *control_lines(there))
+    table = tabulate(analysis.table)
+    rate = rate_of(table)
     return _template("page").render(
         study=outline.study,
         extent=extent(outline),
         compared=", ".join(next(iter(outline.columns.values()))),
         standing=standing(len(trials), counts["done"], counts["failed"]),
         complete=counts["done"] == len(trials),
-        notes="\n".join(notes),
-        brief=brief("\n".join(notes)),
-        table=tabulate(analysis.table),
+        significant=significant(analysis),
+        leads=headlines(results, there) or extremes(table, rate),
+        rate=rate,
+        notes=unfolded((*notes, *control_lines(there))),
+        table=table,
         pictures=pictures(figures),
         replays=packed,
         topologies=topologies(outline),
@@ -283,7 +287,7 @@ def comparison_page(
     return _template("comparison").render(
         title=title,
         sources=sources,
-        notes="\n".join(notes),
+        notes=unfolded(notes),
         table=table,
         pictures=pictures(figures),
         versions=versions(),
@@ -326,15 +330,53 @@ def _template(name: str) -> jinja2.Template:
         lstrip_blocks=True,
     )
     environment.filters["count"] = count
+    environment.filters["whole"] = whole
     return environment.get_template(f"{name}.html.jinja")
 
 
-def brief(notes: str) -> str:
-    """Return what a study says; of more than `MOST_LINES`, how many are not significant."""
-    if notes.count("\n") < MOST_LINES:
-        return notes
-    counted = "  no significant difference: {} conditions\n"
-    return NOT_SIGNIFICANT.sub(lambda lines: counted.format(lines[0].count("  no ")), notes)
+def rate_of(table: SummaryTable) -> str:
+    """Return the heading of the success that a summary tells, in evaluation if it is there."""
+    rates = [t for t in table.titles if "success" in t and "difference" not in t]
+    return next((title for title in rates if "evaluation" in title), rates[0] if rates else "")
+
+
+def extremes(table: SummaryTable, title: str) -> tuple[str, ...]:
+    """Return the lowest and the highest of a column as a sentence; none of fewer than two lines."""
+    lines = [line for line in table.lines if title in line.estimates]
+    lines.sort(key=lambda line: float(line.estimates[title].value))
+    if len(lines) < 2:
+        return ()
+    ends = (lines[0], lines[-1])
+    low, high = (f"{bracketed(line.estimates[title])} ({line.condition})" for line in ends)
+    return (f"{title.capitalize()}: from {low} to {high}.",)
+
+
+def significant(analysis: Analysis) -> str:
+    """Return how many differences are significant, in words; empty if nothing was compared."""
+    compared = [d.p < LEVEL for group in analysis.differences.values() for d in group]
+    return (
+        f"{sum(compared)} of {count(len(compared), 'difference')} significant" if compared else ""
+    )
+
+
+class Note(NamedTuple):
+    """A line of what a study says, in one piece."""
+
+    indent: int
+    text: str
+
+
+def unfolded(lines: Iterable[str]) -> list[Note]:
+    """Return lines whose continuations, indented by two, are joined to what they continue."""
+    notes: list[Note] = []
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        is_further = notes and indent == notes[-1].indent + 2 and not notes[-1].text.endswith(":")
+        if is_further:
+            indent, text = notes.pop()
+            line = f"{text} {line.lstrip()}"
+        notes.append(Note(indent, line.strip()))
+    return notes
 
 
 def _read_own(name: str) -> Markup:

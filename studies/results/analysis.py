@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
 from ..errors import WIDTH
-from .notation import bracketed, signed
+from .notation import bracketed, signed, wrapped
 from .power import power_lines
 from .results import Results
 from .statistics import LEVEL, Array, Estimate, bootstrap, exactly, paired_tests, rate
@@ -260,8 +260,7 @@ def verdict_lines(
     for d in sorted(differences, key=lambda d: (d.p >= LEVEL, float(d.estimate.value))):
         is_higher = bool(d.estimate.value > 0)
         word = words[better][is_higher] if d.p < LEVEL else "no significant difference"
-        text = f"  {word}: {d.condition}, {d.shown}"
-        yield from wrap(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+        yield from wrapped(f"{word}: {d.condition}, {d.shown}", "  ")
 
 
 def verdicts(
@@ -280,13 +279,13 @@ def verdicts(
     lines = []
     for head, group in groups.items():
         if group:
-            lines += wrap(f"{head}:", WIDTH, break_on_hyphens=False)
+            lines += wrapped(f"{head}:")
             lines += verdict_lines(group, better)
     if compared:
         counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
         lines.append(f"p: permutation of signs over seeds, adjusted over {counted} (Holm).")
     if any(map(_seems_contradicted, compared)):
-        lines += wrap(TWO_TESTS, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+        lines += wrapped(TWO_TESTS)
     measure = measure or " or ".join(dict.fromkeys(d.measure for d in compared))
     return lines + power_lines([d.sample for d in compared], measure, of_rates=of_rates)
 

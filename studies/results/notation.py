@@ -1,9 +1,12 @@
 """Numbers and estimates as text: the one notation of intervals, ``.82 [.55, .95]``."""
 
+import re
 from collections.abc import Callable
+from textwrap import wrap
 
 import numpy as np
 
+from ..errors import WIDTH
 from .statistics import Estimate
 
 MANY = 1e6
@@ -64,6 +67,33 @@ def bracketed(estimate: Estimate, form: Callable[[float], str] = two_figures) ->
     """
     value, low, high = (form(float(part)) for part in estimate)
     return value if np.isnan(estimate.low) else f"{value} [{low}, {high}]"
+
+
+WHOLE = re.compile(r"[-+]?[.\d]\S* \[[^]]*\]|p [=<] \S+|\d+ seeds?")
+"""What stands in one line: an estimate and its interval, p, a count of seeds."""
+
+
+def whole(text: str) -> str:
+    """Return text with no-break spaces in what stands in one line."""
+    return WHOLE.sub(lambda part: part[0].replace(" ", "\N{NO-BREAK SPACE}"), text)
+
+
+def wrapped(text: str, indent: str = "") -> list[str]:
+    """Return text in lines that fit a terminal, of which none ends within a number.
+
+    Examples
+    --------
+    >>> wrapped(f"{'w' * 70} .82 [.55, .95]")[1]
+    '  .82 [.55, .95]'
+    """
+    lines = wrap(
+        whole(text),
+        WIDTH,
+        initial_indent=indent,
+        subsequent_indent=f"{indent}  ",
+        break_on_hyphens=False,
+    )
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]
 
 
 def _without_zero(text: str) -> str:

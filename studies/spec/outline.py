@@ -66,7 +66,9 @@ class StudyOutline(NamedTuple):
 
     @property
     def lengths(self) -> str:
-        """Episodes of training, stage by stage, in words."""
+        """Episodes of training, stage by stage, or decisions, in words."""
+        if (decisions := self.table.get("decisions")) is not None:
+            return f"{decisions:,} decisions in episodes"
         common = self.table.get("curriculum", ())
         curricula = [o.get("curriculum", common) for o in self.table.get("overrides", [{}])]
         return lengths(([s["episodes"] for s in stages] for stages in curricula), self.episodes)

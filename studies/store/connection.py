@@ -45,8 +45,8 @@ NO_SHARED_MEMORY = (
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 """What a file system answers that has no locks."""
 
-ILL = (UnicodeError, MemoryError, OverflowError)
-"""What Python itself raises when SQLite hands it damaged text or sizes."""
+ILL = (UnicodeError, OverflowError)
+"""What Python itself raises when SQLite hands it damaged text or sizes; no memory is no damage."""
 
 BESIDE = ("-wal", "-journal", "-shm")
 """With what the names of the files end that SQLite keeps beside a database."""
@@ -231,6 +231,14 @@ def _one_line(path: Path) -> Iterator[None]:
         yield
     except sqlite3.DatabaseError as error:
         raise _explain(path, error) from None
+
+
+def check_circumstance(path: Path, code: int) -> None:
+    """Raise what a code of SQLite stands for, if it is no fault of the database."""
+    if code == sqlite3.SQLITE_NOMEM:
+        raise MemoryError
+    if code & 0xFF in CIRCUMSTANCES and code != sqlite3.SQLITE_IOERR_SHORT_READ:
+        raise SpecError(f"{path}: cannot be read: error {code} of SQLite")
 
 
 def _explain(path: Path, error: sqlite3.DatabaseError) -> SpecError:

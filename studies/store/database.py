@@ -20,6 +20,8 @@ DATABASE = "results.sqlite"
 """Name of the file, in the directory of a study."""
 SPEC_FILE = "study.toml"
 """Name of a study's own copy of its spec, beside it."""
+CHECKPOINTS = "checkpoints"
+"""Folder of what trials under way have come to, beside it."""
 
 
 class NoStudyError(SpecError):
@@ -137,6 +139,11 @@ def measures_from(tables: Iterable[Mapping[str, Any]]) -> tuple[Measure, ...]:
         If the tables are of something else.
     """
     return tuple(Measure(**table) for table in tables)
+
+
+def is_empty(db: sqlite3.Connection) -> bool:
+    """Tell whether a database has no tables."""
+    return db.execute("SELECT 1 FROM sqlite_master").fetchone() is None
 
 
 def prepare(db: sqlite3.Connection, notes: StudyNotes) -> None:

@@ -6,16 +6,17 @@ aside under another name, and what can be trusted of it taken over.
 """
 
 import os
+import re
 import sqlite3
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from contextlib import suppress
-from itertools import count
+from itertools import count, takewhile
 from pathlib import Path
 
 from ..errors import SpecError
 from . import database
 from .checksums import study_checksum, trial_checksums
-from .connection import BESIDE, ILL, open_copy, open_to_read
+from .connection import BESIDE, ILL, check_circumstance, open_copy, open_to_read
 from .database import OF_A_TRIAL, NoStudyError, insert
 
 
@@ -58,7 +59,13 @@ def _fault_of_file(path: Path, db: sqlite3.Connection) -> str | None:
     (answer,) = db.execute("PRAGMA integrity_check(1)").fetchone()
     if answer == "ok":
         return None
+    if code := _CODE.search(str(answer)):
+        check_circumstance(path, int(code[1]))
     return " ".join(str(answer).replace("*** in database main ***", "").split())
+
+
+_CODE = re.compile(r"error code=(\d+)")
+"""Finds what SQLite could not do while it looked for damage."""
 
 
 def _fault_of_study(path: Path, db: sqlite3.Connection) -> str | None:
@@ -130,8 +137,7 @@ def find_superseded(path: Path, planned: Collection[str]) -> str | None:
 
 def set_aside(path: Path) -> Path:
     """Give a database, with its log, a name that nothing else has; return it."""
-    names = (path.with_name(f"{path.name}.damaged-{number}") for number in count(1))
-    aside = next(name for name in names if not name.exists())
+    aside = next(name for name in _asides(path) if not name.exists())
     # The database last: if this is interrupted, it is found damaged once more.
     for suffix in (*BESIDE, ""):
         old = path.with_name(path.name + suffix)
@@ -140,6 +146,20 @@ def set_aside(path: Path) -> Path:
         elif old.exists():
             os.replace(old, aside.with_name(aside.name + suffix))
     return aside
+
+
+def last_aside(path: Path) -> Path | None:
+    """Return the database that was set aside last, if any.
+
+    It is what a new one begins with if whoever set it aside was stopped before all was taken over.
+    """
+    asides = [*takewhile(Path.exists, _asides(path))]
+    return asides[-1] if asides else None
+
+
+def _asides(path: Path) -> Iterator[Path]:
+    """Yield the names of databases that are set aside, in their order."""
+    return (path.with_name(f"{path.name}.damaged-{number}") for number in count(1))
 
 
 def recover(damaged: Path, db: sqlite3.Connection) -> int:

@@ -1,10 +1,11 @@
 """The ledger of a study: a directory that loses nothing that was finished.
 
 ``results.sqlite`` holds the spec, the conditions, one row per trial and one per episode;
-``recordings/IDENTITY.npz`` the recorded episodes of a trial; ``study.toml`` the spec, to read and
-to run again. The database is written through (WAL, synchronous=FULL), and a recording is complete
-before its trial is noted as done: a crash at any moment costs the running trials only. Rows and
-recordings have checksums: what is not as it was written is named, and its trial run again.
+``recordings/IDENTITY.npz`` the recorded episodes of a trial; ``checkpoints/IDENTITY.npz`` what a
+trial under way has come to; ``study.toml`` the spec, to read and to run again. The database is
+written through (WAL, synchronous=FULL), and a recording is complete before its trial is noted as
+done: a crash at any moment costs the running trials only, or what they did since their checkpoints.
+Rows and recordings have checksums: what is not as it was written is named, and its trial run again.
 
 The view `results` is made for other tools::
 
@@ -16,8 +17,9 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -27,7 +29,7 @@ from ..errors import SpecError
 from . import database, durable, integrity
 from .checksums import trial_checksums
 from .connection import DamageError, has_log, open_to_read, open_to_write, transaction
-from .database import DATABASE, NoStudyError, Planned, StudyNotes
+from .database import CHECKPOINTS, DATABASE, NoStudyError, Planned, StudyNotes
 from .durable import Recording
 
 NO_LOG = (
@@ -274,7 +276,10 @@ class Store:
         with open_to_write(path) as connection:
             store = cls(directory, connection)
             with transaction(connection):
+                is_new = database.is_empty(connection)
                 database.prepare(connection, study)
+                if aside is None and is_new and (aside := integrity.last_aside(path)):
+                    reason = "was being made anew"
                 recovered = 0 if aside is None else integrity.recover(aside, connection)
             if aside is not None:
                 store.notes.append(
@@ -346,6 +351,17 @@ class Store:
             self._insert("episodes", [(identity, *row) for row in episodes])
             self._insert("seconds", [(identity, *(seconds[part] for part in database.SECONDS))])
             self._insert("numbers", [(identity, n, v, int(exact)) for n, v, exact in numbers])
+        with suppress(OSError):
+            (self.directory / CHECKPOINTS / f"{identity}.npz").unlink()
+
+    def checkpoints(self) -> dict[str, float]:
+        """Return by identity how old the checkpoints of trials are [s]."""
+        now = time.time()
+        ages = {}
+        for file in (self.directory / CHECKPOINTS).glob("*.npz"):
+            with suppress(OSError):  # its trial may be kept right now
+                ages[file.stem] = max(now - file.stat().st_mtime, 0.0)
+        return ages
 
     def fail(self, trial: Planned, error: str) -> None:
         """Keep the traceback of a trial that failed."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any, Protocol
 
 import numpy as np
@@ -30,6 +30,7 @@ from ..spec.controls import LEARN_NOTHING
 from ..store.database import EVALUATION, STAGE
 from ..store.durable import TEAM, Recording
 from .arrangement import Arrangement, arrange, teach, transfer
+from .checkpoints import Checkpoint, Reached
 from .episodes import EpisodeMeter, EpisodeRow, join_measures
 from .trial import Trial, TrialResult
 
@@ -112,6 +113,67 @@ class Session:
         self._decided = 0
         self.deciding = self._watch.decisions
         """Seconds of every decision in training."""
+        self.usage: dict[str, float] = {}
+        """What a study notes on the way of what it took beside time."""
+        self.spent = 0.0
+        """Processor time of `train_until` so far [s]."""
+        self._checkpoint: Checkpoint | None = None
+
+    @classmethod
+    def resumed(cls, trial: Trial) -> Session:
+        """Return a session that goes on from the checkpoint of a trial, or begins; it writes more.
+
+        Rows that there are already stay: who trains asks for what is left.
+        """
+        session = cls(trial)
+        checkpoint = Checkpoint(trial)
+        reached = checkpoint.read()
+        if reached is not None:
+            try:
+                session._go_on_from(reached)
+            except Exception:  # whatever may be wrong in a file
+                session = cls(trial)
+        session._checkpoint = checkpoint
+        return session
+
+    def _go_on_from(self, reached: Reached) -> None:
+        self.team.restore(reached.team)
+        if reached.worlds:
+            self._many.restore(reached.worlds)
+        self._rows = list(reached.rows)
+        self.spent = reached.spent
+        self._decided = sum(row.steps for row in self._rows_of_training)
+        self._recordings = dict(reached.recordings)
+        self._watch.seconds.update(reached.seconds)
+        self.usage = dict(reached.usage)
+        self._stages = ()
+
+    def put_down(self) -> None:
+        """Write a checkpoint if it is time; between episodes, or in many worlds at once."""
+        if self._checkpoint is None or not self._checkpoint.is_due:
+            return
+        is_many = self.trial.settings.learner.at_once > 1
+        self._checkpoint.write(
+            Reached(
+                self._rows,
+                self._watch.seconds,
+                self.usage,
+                self.spent,
+                self._recordings,
+                self.team.arrays(),
+                self._many.memory() if is_many else {},
+            )
+        )
+
+    @property
+    def phases(self) -> set[str]:
+        """The phases of which there are rows."""
+        return {row.phase for row in self._rows}
+
+    @property
+    def trained(self) -> int:
+        """How many episodes of training there have been."""
+        return len(self._rows_of_training)
 
     @classmethod
     def compiled(cls, trial: Trial) -> Session:
@@ -160,11 +222,13 @@ class Session:
         worlds = self.trial.settings.learner.at_once
         if self.trial.settings.learner.kind in LEARN_NOTHING:
             return decisions
+        begun = process_time() - self.spent
         while worlds == 1 and self._decided < decisions:
-            self.train(1, len(self._rows_of_training))
+            self.train(1, self.trained)
             self._decided = sum(row.steps for row in self._rows_of_training)
+            self.spent = process_time() - begun
         if worlds > 1:
-            self._train_in_worlds(decisions)
+            self._train_in_worlds(decisions, begun)
             self._decided = self._many.decisions
         return self._decided
 
@@ -182,10 +246,10 @@ class Session:
         )
         return ManyWorldsLoop(worlds, self.scenario, self.team, self.trial.steps, self.trial.seed)
 
-    def _train_in_worlds(self, decisions: int) -> None:
+    def _train_in_worlds(self, decisions: int, begun: float) -> None:
         begin = perf_counter()
         rates = [m.name for m in self._measures if m.source == "terminated"]
-        done = len(self._rows_of_training)
+        done = self.trained
         while self._many.decisions < decisions:
             ended = self._many.step()
             if ended is not None:
@@ -193,6 +257,8 @@ class Session:
                 row = EpisodeRow("training", done, ended.steps, measured, ended.return_)
                 self._rows.append(row)
                 done += 1
+            self.spent = process_time() - begun
+            self.put_down()
         self._watch.seconds["learning"] += perf_counter() - begin
 
     def _record(self, record: StepRecord) -> None:
@@ -299,6 +365,8 @@ class Session:
                 observe(record)
             if record.last:
                 self._rows.append(meter.row())
+                if phase == "training" and there.team is self.team:
+                    self.put_down()
 
     def _at_once(self, there: Arrangement, phase: str, counted_from: int, **loop: Any) -> bool:
         """Run whole episodes in one call each and keep their rows, or return that none can be."""
@@ -341,6 +409,6 @@ def run_trial(trial: Trial) -> TrialResult:
 
     World and policy draw from separate streams, so conditions of equal seed meet equal worlds.
     """
-    session = Session(trial)
-    session.train(trial.episodes)
+    session = Session.resumed(trial)
+    session.train(trial.episodes - session.trained, session.trained)
     return session.finish()

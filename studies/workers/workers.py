@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
+from multiprocessing import get_context
 from typing import Any, get_args
 
 from joblib.externals.loky import get_reusable_executor
@@ -38,6 +39,20 @@ def check_workers(backend: Backend, jobs: int | None, address: str | None) -> No
         raise SpecError(f"backend = {backend!r}: {closest(backend, known)}")
     if backend == "loky" and address is not None:
         raise SpecError(f"--address {address}: is for --backend dask only")
+    if address is None:
+        _check_semaphores()
+
+
+def _check_semaphores() -> None:
+    """Refuse a machine whose processes cannot wait for each other, as all local workers do."""
+    try:
+        get_context("spawn").Semaphore()
+    except (ImportError, OSError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise SpecError(
+            f"/dev/shm: {reason}: the processes that run trials need shared memory; mount it so "
+            "that they can write to it, with 1 MB free"
+        ) from None
 
 
 @contextmanager

@@ -36,10 +36,8 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("from-eight", ("evaluation success", "success, sixty-four")),
         ("wide", ("evaluation success", "success, sixty-four")),
         ("large-team", LARGE_TEAM),
-        ("four-robots-hard", ("evaluation success", "evaluation steps")),
         ("own-value", ("evaluation success",)),
         ("transfer", ("evaluation success", "success, four", "success, eight")),
-        ("curriculum", ("evaluation success", "success, sixteen", "success, thirty-two")),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

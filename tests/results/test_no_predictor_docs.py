@@ -20,9 +20,7 @@ def test_specs_can_be_run() -> None:
         check_conditions(Spec.parse(spec))
 
 
-@pytest.mark.parametrize(
-    "name", ["fit", "fit-landmarks", "fit-three-actions", "fit-arms", "fit-games"]
-)
+@pytest.mark.parametrize("name", ["fit", "fit-landmarks", "fit-arms", "fit-games"])
 def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, COLUMNS, capsys)
     assert table in TEXT, f"docs/no_predictor.md: put in\n{table}"

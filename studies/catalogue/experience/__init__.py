@@ -63,22 +63,17 @@ def check(spec: Spec) -> None:
 
 def measure(trial: Trial) -> TrialResult:
     """Train, with evaluations on the way; imported by name in workers."""
-    from time import process_time
-
-    session = Session(trial)
+    session = Session.resumed(trial)
     budget = trial.decisions or 0
-    seconds = 0.0
-    usage = {}
     done = 0
     for stop in (*stops(budget), budget):
-        begin = process_time()
         done = session.train_until(stop)
-        seconds += process_time() - begin
-        usage[f"{CPU}{stop}"] = seconds
-        if stop < budget:
+        session.usage.setdefault(f"{CPU}{stop}", session.spent)
+        if stop < budget and f"{AFTER}{stop}" not in session.phases:
             with session.team.drawing_apart():
                 session.evaluate(phase=f"{AFTER}{stop}")
-    return session.finish({DECISIONS: float(done)}, usage)
+            session.put_down()
+    return session.finish({DECISIONS: float(done)}, session.usage)
 
 
 class ReturnCourse(NamedTuple):

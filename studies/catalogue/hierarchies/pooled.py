@@ -11,16 +11,13 @@ of decisions, which were named before the comparisons that rest on them (two one
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
-from textwrap import wrap
 from typing import NamedTuple
 
 import numpy as np
 
 from ....core.numerics import pd
-from ...errors import WIDTH
 from ...results.analysis import format_p, select_shared
-from ...results.notation import bracketed, signed, two_decimals, two_figures
+from ...results.notation import bracketed, signed, two_decimals, two_figures, wrapped
 from ...results.results import Results
 from ...results.statistics import LEVEL, Array, Estimate, bootstrap, paired_tests
 from .cases import HierarchyCase
@@ -118,9 +115,7 @@ def lines_of(compared: Mapping[str, tuple[Effect, Effect]], reference: str) -> I
         f"All settings together, seed by seed, beside {reference}; equal: the interval lies within "
         f"{two_figures(MARGIN)} of success, {SLOWER:.0%} of decisions to the goal:"
     )
-    fold = partial(wrap, width=WIDTH, break_on_hyphens=False)
-    yield from fold(head)
+    yield from wrapped(head)
     for hierarchy, both in compared.items():
         settings = f"{both[0].settings} setting{'s' * (both[0].settings > 1)}"
-        text = f"  {hierarchy} ({settings}): {both[0].shown}; {both[1].shown}"
-        yield from fold(text, subsequent_indent="    ")
+        yield from wrapped(f"{hierarchy} ({settings}): {both[0].shown}; {both[1].shown}", "  ")

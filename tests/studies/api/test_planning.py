@@ -120,3 +120,44 @@ def test_what_functions_cost_is_told_by_condition(tmp_path) -> None:
     assert "at most 60 messages, 120 calls, 0 message_bytes, 240 tokens." in " ".join(
         str(plan).split()
     )
+
+
+def test_a_plan_of_three_sizes_tells_which_exponents_can_be_told_apart() -> None:
+    spec = {"seeds": 12, "sweep": {"scenario.robots": [2, 4, 8], "topology": ["chain", "star"]}}
+    said = " ".join(str(planning.plan(spec, timed=False)).split())
+    assert "Exponents: with 12 seeds of sizes 2 to 8, those that differ by " in said
+    two = {**spec, "sweep": {"scenario.robots": [2, 4]}}
+    assert "Exponents" not in str(planning.plan(two, timed=False))
+
+
+PPO = {"kind": "ippo", "worlds": 8, "rollout": 20, "epochs": 1, "hidden": [8]}
+EXPERIENCE = {"study": "experience", "seeds": 3, "steps": 10, "evaluation": 1}
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        {"learner": PPO, "scenario": {"kind": "spread"}, "decisions": 20_000},
+        {"scenario": {"kind": "line-up", "carts": 2}, "decisions": 2000},
+        {"scenario": {"kind": "line-up", "carts": 2}, "decisions": 2000, "preset": "random"},
+    ],
+)
+def test_what_decisions_take_is_tried_out(own):
+    tables = [{**EXPERIENCE, **own}, {**EXPERIENCE, **own, "decisions": 10 * own["decisions"]}]
+    few, many = (na.Spec.of(table) for table in tables)
+    less, more = (try_out(trials_of(spec)[0], 3) for spec in (few, many))
+    assert 0.0 < less.seconds[0] <= less.seconds[1] <= less.seconds[2]
+    # 20,000 decisions, and an evaluation of 10 at the end, and after 1,000, 3,000 and 10,000.
+    stops = 1 + {2000: 1, 20_000: 3}[own["decisions"]]
+    sampled = "learner" in own
+    assert less.decisions == 3 * (own["decisions"] + 10 * (stops + sampled))
+    if own.get("preset") != "random":
+        assert more.seconds[1] > 4 * less.seconds[1]
+
+
+def test_a_plan_counts_decisions_and_tells_of_checkpoints():
+    table = {**EXPERIENCE, "learner": PPO, "scenario": {"kind": "spread"}, "decisions": 10**9}
+    text = str(na.plan(table))
+    assert "each 1,000,000,000 decisions in episodes of up to 10 steps" in text
+    assert "killed   a trial goes on from its checkpoint, every 5 min" in text
+    assert max(map(len, text.splitlines())) <= 80

@@ -19,20 +19,22 @@ def lines_of(rates: dict[str, int], seeds: int = 8) -> str:
     columns = {c: {"preset": c} for c in rates}
     results = from_arrays({"evaluation": arrays}, of_seeds, {}, {}, columns, (SUCCESS,))
     settings = {c.label: c.settings.model_dump() for c in spec.conditions()}
-    return " ".join(line.strip() for line in headlines(results, settings))
+    return " ".join(headlines(results, settings))
 
 
 def test_a_team_has_learned_if_it_is_better_than_its_untrained_weights() -> None:
     text = lines_of(RATES)
-    assert text.startswith("default: learned (8 seeds). Evaluation success .90 [")
-    assert "untrained (frozen) 0 [0, .32] (p = 0.023)" in text
+    assert text.startswith("default learned (8 seeds): evaluation success .90 [")
+    assert "untrained (frozen) 0 [0, .32];" in text
     assert "planner 1.0 [.68, 1.0], better." in text
     assert "random" not in text, "it is the control by ties"
 
 
 def test_what_few_seeds_leave_open_is_not_called_learned() -> None:
-    assert lines_of(RATES, seeds=4).startswith("default: not seen to learn (4 seeds).")
-    assert lines_of({"default": 0, "frozen": 0}).startswith("default: not seen to learn (8 seeds).")
+    assert lines_of(RATES, seeds=4).startswith("default is not seen to learn with 4 seeds:")
+    assert lines_of({"default": 0, "frozen": 0}).startswith(
+        "default is not seen to learn with 8 seeds:"
+    )
 
 
 @pytest.mark.parametrize("presets", [("frozen", "random"), ("default", "planner"), ("default",)])

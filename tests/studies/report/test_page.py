@@ -8,7 +8,10 @@ import pytest
 from nested_agents import studies
 from nested_agents.results import SPECS
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.report.page import brief, page
+from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.report.page import extremes, page, rate_of, unfolded
+from nested_agents.studies.results.analysis import Summary
+from nested_agents.studies.results.statistics import exactly
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.trials.trial import trials_of
@@ -40,19 +43,24 @@ def test_a_finished_study_has_everything(html):
     found = dict(re.findall("<dt>(.*?)</dt><dd>(.*?) <small>", rates))
     assert list(found) == ["default", "frozen"]
     assert all(f"<td>{value}<small>" in html for value in found.values())
-    assert "success, evaluation, less that of default:" in html
+    assert "evaluation success, less that of default:" in html
     assert "preset = [\n    &#34;default&#34;,\n    &#34;frozen&#34;,\n]" in html
     assert len(html) < 500_000
 
 
-def test_a_summary_of_many_lines_counts_what_is_not_significant():
-    few = "success:\n  no significant difference: b, 0.00\n    [-0.1, +0.1]\nPower: none"
-    assert brief(few) == few
-    many = "success:\n  better: z, +0.50\n    [+0.3, +0.7]\n" + few[9:-11] * 12 + "Power: none"
-    assert brief(many) == (
-        "success:\n  better: z, +0.50\n    [+0.3, +0.7]\n"
-        "  no significant difference: 12 conditions\nPower: none"
-    )
+def test_lines_are_joined_to_what_they_continue():
+    lines = ["success, less than a:", "  worse: b, -.50 [-.70,", "    -.30]", "", "p: one", "  two"]
+    joined = [(0, "success, less than a:"), (2, "worse: b, -.50 [-.70, -.30]"), (0, "")]
+    assert unfolded(lines) == [*joined, (0, "p: one two")]
+
+
+def test_the_lowest_and_the_highest_success_are_a_sentence():
+    rates = {"b": 0.9, "a": 0.1, "c": 0.5}
+    lines = [Summary(c, 8, {"success": exactly(rate)}) for c, rate in rates.items()]
+    table = tabulate(lines)
+    assert rate_of(table) == "success"
+    assert extremes(table, "success") == ("Success: from .10 (a) to .90 (b).",)
+    assert extremes(tabulate(lines[:1]), "success") == ()
 
 
 def test_equal_results_give_equal_bytes_wherever_they_are(finished, html, tmp_path):
@@ -85,7 +93,7 @@ def test_an_empty_study(kept, tmp_path):
 def test_an_unfinished_study_with_failures(kept, tmp_path):
     html = page(kept(tmp_path, done=3, failed=2))
     assert "Unfinished: 3 of 6 trials are done, 2 failed, 1 left." in html
-    assert html.count("<details>") == 2
+    assert html.count("<details>") == 4
     assert "RuntimeError: &lt;off &amp; away&gt;" in html
     assert "…/core/team.py" in html
     assert "someone" not in html

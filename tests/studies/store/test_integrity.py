@@ -3,6 +3,8 @@ import random
 import re
 import shutil
 import sqlite3
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +15,7 @@ import nested_agents as na
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store import integrity
 from nested_agents.studies.store.checksums import trial_checksums
 from nested_agents.studies.store.database import DATABASE, SPEC_FILE
 from nested_agents.studies.store.store import Store
@@ -435,3 +438,46 @@ def test_a_study_of_version_0_3_0_is_read_as_before(tmp_path, capsys):
         "default,default,0,training,0,6,0,0.9644814481842697,0.8611634842064431,"
         "-0.009279672728450386"
     )
+
+
+WITH_LITTLE_MEMORY = """
+import sqlite3, sys
+from nested_agents.studies.cli.main import main
+of_all = sqlite3.connect(":memory:")
+try:
+    for limit in range(400_000, 0, -10_000):  # it cannot be raised again
+        of_all.execute(f"PRAGMA hard_heap_limit = {limit}")
+        print(main(sys.argv[1:]))
+except MemoryError:
+    pass  # for the limit itself
+"""
+
+
+@pytest.mark.parametrize("command", ["status", "retry"])
+def test_no_memory_is_no_damage(study, sound, command):
+    line = [sys.executable, "-c", WITH_LITTLE_MEMORY, command, str(study)]
+    done = subprocess.run(line, capture_output=True, text=True, check=True)
+    errors = {*done.stderr.splitlines()}
+    assert "2" in done.stdout.split()
+    assert {line for line in errors if "error" in line} == {
+        "nested-agents: error: not enough memory"
+    }
+    assert not [*study.glob("*damaged*")]
+    assert content(study) == content(sound)
+
+
+def test_what_was_set_aside_is_taken_over_even_by_the_next_run(study, sound, monkeypatch):
+    change(study, "UPDATE meta SET value = 'x' WHERE key = 'spec'")
+
+    def stop(*_):
+        raise MemoryError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(integrity, "recover", stop)
+        with pytest.raises(MemoryError):
+            finish(study)
+    notes, run = finish(study)
+    assert run == 0
+    assert re.search(r"was being made anew; kept as .*damaged-1, 6 trials taken over", notes[0])
+    assert content(study) == content(sound)
+    assert finish(study) == ([], 0)

@@ -1,5 +1,6 @@
 """Trials run on workers, whatever happens to them; a trial fails with its traceback."""
 
+import errno
 import os
 import signal
 import time
@@ -16,8 +17,15 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending
+from nested_agents.studies.workers import workers
 from nested_agents.studies.workers.runner import ATTEMPTS, MOST_ERROR, attempt, run_trials
-from nested_agents.studies.workers.workers import REPLACED, LokyWorkers, start_workers
+from nested_agents.studies.workers.workers import (
+    REPLACED,
+    Backend,
+    LokyWorkers,
+    check_workers,
+    start_workers,
+)
 
 
 def content(store):
@@ -177,6 +185,19 @@ def test_an_unknown_backend_is_refused() -> None:
     refused = pytest.raises(SpecError, match="backend = 'ray': known: dask, loky")
     with refused, start_workers("ray", 1, None, 1):  # type: ignore[arg-type]
         pass
+
+
+@pytest.mark.parametrize("backend", ["loky", "dask"])
+def test_a_machine_without_shared_memory_is_told_before_anything_is_written(
+    backend: Backend, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: str) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(workers, "get_context", refuse)
+    with pytest.raises(SpecError, match="/dev/shm: Read-only file system: the processes that"):
+        check_workers(backend, 1, None)
+    check_workers("dask", None, "tcp://elsewhere:8786")
 
 
 def test_what_loky_says_of_a_process_that_it_replaces_is_not_shown(recwarn) -> None:
