@@ -142,16 +142,6 @@ class Kernel:
             self._ready = compiled
         return result
 
-    def prepare(self, *args: object) -> None:
-        """Compile the function for arguments of these types, and do not call it."""
-        with _threads:
-            compiled = self.compiled
-            file = _cache_file(compiled)
-            with _alone(file):
-                if file is not None:
-                    self._compile_apart(compiled, args)
-                    compiled.compile(tuple(map(compiled.typeof_pyval, args)))
-
     def _compile_apart(self, compiled: Any, args: tuple[object, ...]) -> None:
         """See to it that the cache has the function for arguments of these types, if it can be."""
         types = tuple(map(compiled.typeof_pyval, args))

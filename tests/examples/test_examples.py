@@ -2,6 +2,7 @@
 
 import json
 import runpy
+import warnings
 from functools import partial
 from pathlib import Path
 
@@ -34,6 +35,18 @@ def test_ppo(
     runpy.run_path(str(path), run_name="__main__")
     lines = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in lines] == ["before training", "after 1024 steps"]
+
+
+def test_torchrl(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    path = EXAMPLES / "train_torchrl.py"
+    compile(path.read_text(encoding="utf-8"), str(path), "exec")
+    pytest.importorskip("torchrl", reason="pip install torchrl")
+    monkeypatch.setattr("sys.argv", ["train_torchrl.py", "1000"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the version of PettingZoo that TorchRL tests with
+        runpy.run_path(str(path), run_name="__main__")
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in lines] == ["before training", "after 1000 joint steps"]
 
 
 def test_fault_recovery_is_read() -> None:
@@ -77,7 +90,7 @@ def test_contact_sheet(
     path = tmp_path / "boxes.png"
     monkeypatch.setattr("sys.argv", ["contact_sheet.py", str(path)])
     runpy.run_path(str(EXAMPLES / "contact_sheet.py"), run_name="__main__")
-    assert path.stat().st_size > 100_000
+    assert path.stat().st_size > 50_000
     documented = (EXAMPLES.parent / "docs" / "worlds.md").read_text(encoding="utf-8")
     assert capsys.readouterr().out.strip() in documented
 

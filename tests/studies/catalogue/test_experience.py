@@ -2,6 +2,7 @@
 
 import pytest
 
+import nested_agents as na
 from nested_agents import SpecError
 from nested_agents.studies.catalogue.experience import analyse, check, measure, stops
 from nested_agents.studies.spec.spec import Spec
@@ -57,6 +58,15 @@ def test_networks_learn(kind, seed):
     learner = {"kind": kind, "worlds": 64, "rollout": 32, "batch_size": 512, "epochs": 5}
     assert success({"seeds": [seed], "decisions": 60_000, "learner": learner}) >= 0.75
     assert success({"seeds": [seed], "decisions": 1, "preset": "random"}) <= 0.25
+
+
+def test_a_report_does_without_the_success_of_episodes_in_many_worlds(tmp_path):
+    cart = {"kind": "gymnasium", "id": "CartPole-v1", "predictor": "none", "success": "terminated"}
+    table = {**TABLE, "decisions": 400, "scenario": cart}
+    study = na.run(table, tmp_path / "out", jobs=1, progress=False)
+    successes = study.episodes.query("phase == 'training'")["success"]
+    assert len(successes) and successes.isna().all()
+    assert study.report(tmp_path / "report.html").exists()
 
 
 @pytest.mark.parametrize(
