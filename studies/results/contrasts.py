@@ -64,7 +64,7 @@ class Contrasts(NamedTuple):
     @property
     def title(self) -> str:
         """What is compared, as columns of tables are called."""
-        return _title(self.measure, self.phase)
+        return title_of(self.measure, self.phase)
 
     @property
     def table(self) -> tuple[Summary, ...]:
@@ -83,7 +83,7 @@ class Contrasts(NamedTuple):
         return (*(lines or [NOTHING]), *identity_lines(self.identical))
 
 
-def _title(measure: Measure, phase: str) -> str:
+def title_of(measure: Measure, phase: str) -> str:
     """Return what a measure of a phase is called, ``evaluation success``, ``success, eight``."""
     kind, _, name = phase.partition(":")
     return f"{measure.heading}, {name}" if name else f"{kind} {measure.heading}".lstrip()
@@ -129,7 +129,7 @@ def contrasts(
         less = {d.condition: {"difference": d.estimate} for d in compared[setting]}
         lines = []
         for name, c in members:
-            own = {_title(shown_as, phase): _estimate(results, shown_as, phase, c, values[c])}
+            own = {title_of(shown_as, phase): _estimate(results, shown_as, phase, c, values[c])}
             whose = ", ".join(filter(None, (setting, name)))
             lines.append(Summary(whose, len(values[c]), own | less.get(name, {})))
         compared_groups.append(
@@ -158,7 +158,7 @@ def power_with_first(results: Results) -> tuple[str, ...]:
     base, *others = (values[c] for c in results.columns if c in values)
     pairs = [select_shared([own, base]) for own in others]
     samples = [own - reference for own, reference in pairs if len(own) >= 2]
-    return tuple(power_lines(samples, _title(measure, phase), of_rates=measure.is_rate))
+    return tuple(power_lines(samples, title_of(measure, phase), of_rates=measure.is_rate))
 
 
 def _usual_phase(results: Results) -> str:

@@ -15,7 +15,7 @@ from ..errors import SpecError
 from ..spec.tables import label_but
 from . import laws
 from .analysis import Summary, format_p
-from .contrasts import values_of
+from .contrasts import title_of, values_of
 from .notation import bracketed, two_figures, wrapped
 from .power import APART, seeds_for
 from .results import Results
@@ -174,7 +174,7 @@ def scaling_law(
         samples: Mapping[str, tuple[pd.Series, pd.Series | None]] = {
             c: (pd.Series(v), None) for c, v in values.items()
         }
-        title = f"{shown_as.heading}, {own}" if own else shown_as.heading
+        title = title_of(shown_as, own)
     else:
         samples = _decisions(results, measure, criterion)
         title = f"decisions to {two_figures(criterion)} of {measure}"
