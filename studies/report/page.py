@@ -192,10 +192,13 @@ def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
 
 
 def _reached(results: Results) -> Mapping[tuple[str, int, int], bool]:
-    """Return whether each training episode reached the goal, by condition, seed and number."""
+    """Return whether each training episode reached the goal, by condition, seed and number.
+
+    Of episodes in many worlds at once it is not known.
+    """
     training = results.episodes.query("phase == 'training'")
     success = training.set_index(["condition", "seed", "episode"])["success"]
-    reached: Mapping[tuple[str, int, int], bool] = success.astype(bool).to_dict()
+    reached: Mapping[tuple[str, int, int], bool] = success.fillna(False).astype(bool).to_dict()
     return reached
 
 
