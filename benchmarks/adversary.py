@@ -41,8 +41,8 @@ from . import circumstances, edits, environments, flips, hostile, kills, misbeha
 Campaign = Callable[[int, random.Random, Path], Counter[str]]
 """Attacks so many times, drawn from a generator, in a folder; returns what happened."""
 ATTEMPTS = (
-    "kills", "edits", "published files", "environments", "commands", "flips", "reads", "runs",
-    "studies", "specs", "topologies", "polygons", "functions", "scenarios",
+    "kills", "edits", "published files", "environments", "commands", "flips", "files", "reads",
+    "runs", "studies", "specs", "topologies", "polygons", "functions", "scenarios",
 )  # fmt: skip
 FINE = (
     "equal", "told", "run: equal", "studies: equal", "kills with trials kept, and others left",
@@ -59,6 +59,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.adversary", description=__doc__)
     parser.add_argument("--kills", type=int, default=100, metavar="N", help="0: none")
     parser.add_argument("--flips", type=int, default=2000, metavar="N", help="0: none")
+    parser.add_argument("--obstacles", type=int, default=100, metavar="N", help="0: none")
     parser.add_argument("--hostile", type=int, default=800, metavar="N", help="0: none")
     parser.add_argument("--others", type=int, default=60, metavar="N", help="kills; 0: none")
     parser.add_argument("--scenarios", type=int, default=100, metavar="N", help="0: none")
@@ -75,7 +76,7 @@ def main() -> int:
         "kill -9 of others that write": (options.others, kills.kills_of_others),
         "flipped bits": (options.flips, flips.flips),
         "files cut short, folders in their place": (
-            options.flips, lambda _, rng, folder: flips.obstacles(rng, folder)
+            options.obstacles, flips.obstacles
         ),
         "edits by SQL": (options.edits, edits.sql),
         "published files": (options.published, edits.published),

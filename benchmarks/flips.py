@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 from nested_agents.studies.store.database import DATABASE
@@ -47,22 +46,26 @@ def every_byte(rng: random.Random, folder: Path) -> Counter[str]:
     return tally
 
 
-def obstacles(rng: random.Random, folder: Path) -> Counter[str]:
-    """Put folders in place of files, and the other way round, and cut files short."""
+def obstacles(number: int, rng: random.Random, folder: Path) -> Counter[str]:
+    """Put folders in place of files, and cut files short; return what happened."""
+    without_figures()
     adversary, tally = Adversary(folder, rng), Counter[str]()
-
-    def attack(path: Path, how: Callable[[], object]) -> None:
-        how()
+    harms: list[tuple[Path, int | None]] = [
+        (adversary.study / name, None)
+        for name in (LOCK, DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm")
+    ]
+    for source in adversary.files:
+        path, size = adversary.study / source.relative_to(adversary.sound), source.stat().st_size
+        harms += [(path, left) for left in (size - 1, size // 2, 0)]
+    for path, left in rng.sample(harms, min(number, len(harms))):
+        tally["files"] += 1
+        if left is None:
+            path.unlink(missing_ok=True)
+            path.mkdir()
+        else:
+            path.write_bytes(path.read_bytes()[:left])
         for line in LINES:
             tally["reads"] += 1
             tally[read(adversary, line, path)] += 1
         adversary.restore()
-
-    for name in (LOCK, DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm"):
-        path = adversary.study / name
-        attack(path, lambda path=path: (path.unlink(missing_ok=True), path.mkdir()))
-    for source in adversary.files:
-        path, size = adversary.study / source.relative_to(adversary.sound), source.stat().st_size
-        for cut in (1, size // 2, size):
-            attack(path, lambda path=path, to=size - cut: path.write_bytes(path.read_bytes()[:to]))
     return tally

@@ -20,6 +20,7 @@ from nested_agents.studies.api.loading import load
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.report import page
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.arrangement import check_conditions
@@ -29,7 +30,7 @@ from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.runner import Outcome, RunTrial, Workers, attempt, save
 
 SPEC = Spec.of(
-    {"seeds": 4, "episodes": 2, "steps": 10, "evaluation": 1, "keep_teams": True,
+    {"seeds": 3, "episodes": 2, "steps": 10, "evaluation": 1, "keep_teams": True,
      "sweep": {"scenario.robots": [1, 2, 3]}}
 )  # fmt: skip
 EXPLAIN = "explain"
@@ -46,9 +47,10 @@ Answer = tuple[int, str, str]
 
 
 def without_figures() -> None:
-    """Let `run` and `explain` draw nothing: figures are of what is verified, and take most time."""
+    """Draw nothing: figures are of what has been verified, and take most time."""
     learning_curve.draw = lambda analysis: {}
     explaining.draw = lambda explanation: {}
+    page.hierarchy_pictures = lambda *_: []
 
 
 @cache

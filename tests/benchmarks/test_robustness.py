@@ -28,6 +28,7 @@ def test_killed_studies_end_with_the_bytes_of_undisturbed_ones() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_an_adversary_finds_neither_silence_nor_tracebacks() -> None:
     said = run(
         "benchmarks.adversary",
@@ -35,6 +36,8 @@ def test_an_adversary_finds_neither_silence_nor_tracebacks() -> None:
         "2",
         "--flips",
         "9",
+        "--obstacles",
+        "6",
         "--hostile",
         "12",
         "--others",
