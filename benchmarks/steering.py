@@ -2,7 +2,8 @@
 
 Reads the committed rows of the scaling studies, rebuilds the worlds of their evaluation episodes,
 and counts the successful ones by the *initial heading error*: the angle between the normal of the
-face that the team stands at and the direction from the box to the goal. No trial is run.
+face that the team stands at and the direction from the box to the goal. Below it stands how the
+others ended: the box was pushed too far away, or decisions ran out. No trial is run.
 
 With ``--scripted 64 128`` the scripted controller plays such worlds of teams of these sizes, in as
 many decisions as the trained teams had.
@@ -68,6 +69,18 @@ def trained(robots: int, name: str, phase: str, condition: str) -> list[str]:
     return counts(robots, results.seeds(condition), results.success(condition, phase))
 
 
+def failures(name: str, phase: str, condition: str) -> str:
+    """Return in words how episodes of published results ended that did not succeed."""
+    results = published.load(ROWS / f"{name}.json").results
+    steps = results.values(condition, "steps", phase)
+    failed = results.success(condition, phase) == 0
+    away = steps[failed & (steps < STEPS)]
+    words = f"{failed.sum()} failures, {len(away)} with the box too far from the goal"
+    if len(away):
+        words += f" (after {median(away.tolist()):.0f} decisions in the median)"
+    return f"{words}, {failed.sum() - len(away)} out of decisions"
+
+
 def scripted(robots: int, seeds: int, episodes: int) -> tuple[list[str], str]:
     """Return by bin how often the scripted controller succeeds, and in words what that took."""
     scenario, begun, taken = BoxPushingSettings(robots=robots).build(), process_time(), []
@@ -110,6 +123,8 @@ def main() -> None:
     for title, *of_results in TEAMS:
         table.add_row(title, *trained(*of_results))
     console.print(table)
+    for title, _, *of_results in TEAMS:
+        console.print(f"{title}: {failures(*of_results)}", highlight=False, soft_wrap=True)
 
 
 if __name__ == "__main__":

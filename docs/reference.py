@@ -17,6 +17,7 @@ from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLE
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
+from nested_agents.scenarios.vmas_tasks import VmasTask
 from nested_agents.studies.cli.main import COMMANDS, load_command
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.results.results import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
@@ -202,10 +203,11 @@ def columns() -> Iterator[str]:
     yield "## Measures of the scenarios\n"
     yield "A scenario declares its own measures ([](../extending.md#a-scenario)). These are those"
     yield "of the built-in scenarios.\n"
-    adapted = "gymnasium", "pettingzoo"  # alike, and built only of an environment
+    # Built only of an environment, or a task.
+    adapted = {"gymnasium": AdaptedWorld, "pettingzoo": AdaptedWorld, "vmas": VmasTask}
     for kind in SCENARIOS.built_in:
         yield f"### `{kind}`\n"
-        declared = AdaptedWorld if kind in adapted else SCENARIOS.parsed(kind).build()
+        declared = adapted.get(kind) or SCENARIOS.parsed(kind).build()
         yield from table(
             ("column", "heading", "unit", "of the steps of an episode", "better", "bounds"),
             (

@@ -1,9 +1,9 @@
 """
-All boxes, with two, four and eight robots
+All boxes, and where they are to be pushed
 ==========================================
 
 Writes the picture ``boxes.png``, or the one named as argument, and prints the boxes' mass
-properties. Boxes grow with the number of robots.
+properties.
 """
 
 # sphinx_gallery_thumbnail_path = "boxes.png"
@@ -21,8 +21,6 @@ from nested_agents.scenarios.box_pushing.pictures.rendering import AXES, SIDES, 
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
-ROBOTS = (2, 4, 8)
-
 print("| box | area [m2] | mass [kg] | inertia [g m2] | friction radius [m] | fixtures |")
 print("|---|---|---|---|---|---|")
 for name, box in BOXES.items():
@@ -35,14 +33,12 @@ for name, box in BOXES.items():
 left, bottom, width, height = AXES
 rows = slice(round((1 - bottom - height) * SIDES[1]) + 2, round((1 - bottom) * SIDES[1]))
 columns = slice(round(left * SIDES[0]) + 2, round((left + width) * SIDES[0]))
-figure, grid = plt.subplots(len(BOXES), len(ROBOTS), figsize=(9, 1.8 * len(BOXES)))
-for row, name in zip(grid, BOXES, strict=True):
-    for axes, robots in zip(row, ROBOTS, strict=True):
-        settings = BoxPushingSettings(box=name, robots=robots, start="hard")
-        scenario = BoxPushing(settings)
-        scenario.reset(1)
-        axes.imshow(picture(EpisodeRecorder(scenario).recording(), 0)[rows, columns])
-        axes.set_title(f"{name}, {robots} robots", fontsize=9, loc="left", pad=3)
-        axes.set_axis_off()
+figure, grid = plt.subplots(-(-len(BOXES) // 4), 4, figsize=(9, 4.2))
+for axes, name in zip(grid.flat, BOXES, strict=True):
+    scenario = BoxPushing(BoxPushingSettings(box=name, start="hard"))
+    scenario.reset(1)
+    axes.imshow(picture(EpisodeRecorder(scenario).recording(), 0)[rows, columns])
+    axes.set_title(name, fontsize=9, loc="left", pad=3)
+    axes.set_axis_off()
 figure.tight_layout(pad=0.3, h_pad=0.8)
-figure.savefig(Path(sys.argv[1] if len(sys.argv) > 1 else "boxes.png"), dpi=90)
+figure.savefig(Path(sys.argv[1] if len(sys.argv) > 1 else "boxes.png"), dpi=120)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ..core.numerics import pd
 from ..studies.presentation import figures
 from ..studies.results.statistics import Estimate, bootstrap, stack_estimates
-from .atlas import MEASURES, NO_FAULT, TeamKind
+from .atlas import ALREADY, MEASURES, NO_FAULT, TeamKind
 from .atlas_predictions import SMALL, Check, checks, exponents
 
 PANEL = (5.0, 2.4)
@@ -96,6 +96,8 @@ def name_of(team: Sequence[str]) -> str:
 FIGURES: Mapping[str, Callable[[pd.DataFrame], Figure]] = {
     "atlas-success": draw_success,
     "atlas-exponents": draw_exponents,
-    "atlas-predictions": lambda rows: draw_checks([*checks(rows), *checks(rows, SMALL // 2)]),
+    "atlas-predictions": lambda rows: draw_checks(
+        [*checks(rows), *checks(rows[rows["source"] == ALREADY], SMALL // 2)]
+    ),
 }
 """By name of the file."""

@@ -135,6 +135,8 @@ def atlas(
         from ..studies.presentation.figures import write
         from .atlas_figures import FIGURES
 
+        before = frame["source"] == ALREADY  # a task of both has two sets of seeds
+        frame["task"] = frame["task"].mask(before, frame["task"] + ", published")
         figures.mkdir(parents=True, exist_ok=True)
         for name, draw in FIGURES.items():
             write(draw(frame), figures / f"{name}.png")

@@ -24,6 +24,7 @@ SCENARIOS = SettingsRegistry(
         "kinematic-chain": f"{__name__}.kinematic_chain.config:KinematicChainSettings",
         "line-up": f"{__name__}.line_up:LineUpSettings",
         "spread": f"{__name__}.spread:SpreadSettings",
+        "vmas": f"{__name__}.vmas_tasks:VmasSettings",
         "gymnasium": f"{__name__}.adapters.settings:GymnasiumSettings",
         "pettingzoo": f"{__name__}.adapters.settings:PettingZooSettings",
     },

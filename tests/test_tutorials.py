@@ -35,6 +35,8 @@ def typed(line: str, page: str) -> list[str]:
     if page == "wheel_failures":
         failure = '{kind="reversed",wheels="robot1.front-left",episode=5}'
         changes = ["seeds=2", "episodes=10", "steps=4", f"scenario.failures=[{failure}]"]
+    if page == "pettingzoo":
+        changes = ["seeds=2", "decisions=4096", "steps=8", "evaluation=1"]
     shown = ["--set"] if "--set" not in arguments else []
     return [*arguments, *shown, *changes, "--jobs", "1"]
 

@@ -130,7 +130,7 @@ class ExactEnumeration(Aggregation):
         if self._means is None or any(a is not b for a, b in zip(self._means[0], of, strict=True)):
             indices, value = np.arange(self.n_actions ** len(weights)), self.rules.block_values
             each = [value(weights[i], tables.blocks(i), indices) for i in concerned]
-            self._means = of, np.mean(each, axis=0)
+            self._means = of, np.add.reduce(each) / len(each)
         return self._means[1]
 
 

@@ -225,11 +225,9 @@ class Aggregation(Evaluator):
         """Return whether every action must come to zero: nothing is learned yet, or ever."""
         if self.problem.rule != "value":
             return False
-        if len(self.concerned[deliberation.agent]) > 1:
-            weights = self._pooled(deliberation).weights[0].ravel()
-        else:
-            weights = deliberation.own_weights
-        return not (weights[:64].any() or weights.any())
+        weights = deliberation.weights
+        decide = (weights[i] for i in self.concerned[deliberation.agent].tolist())
+        return not any(own[:64].any() or own.any() for own in decide)
 
     def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
         """Return what joint actions ``(m, n)`` are worth to the deciding agent, ``(m,)``."""

@@ -36,6 +36,8 @@ class NetworkSettings(PeerSettings):
     """Transitions in a minibatch."""
     hidden: Annotated[tuple[Width, ...], Field(min_length=1)] = (64, 64)
     """Units of the hidden layers of every network."""
+    _without_extra: ClassVar[str] = ""
+    """What would do without the extra."""
 
     def agents(self, placement: Placement) -> Agents[Any]:
         """Return the agents that act in a scenario.
@@ -51,7 +53,7 @@ class NetworkSettings(PeerSettings):
             raise ValueError(
                 f"learner.kind = {self.kind!r}: needs the extra peers, pip install "
                 "'nested-agents[peers]', in a checkout ./dev exec pip install stable-baselines3 "
-                f"({error})"
+                f"({error}){self._without_extra}"
             ) from None
 
 
@@ -89,6 +91,7 @@ class MultiAgentPPOSettings(PolicyGradientSettings):
     """What the settings of PPO with a policy for every agent share."""
 
     kind_of_agents = f"{CORE}.networks.policies:HierarchyPPO"
+    _without_extra = "; learner.worlds = 16 in study = 'experience' does without"
     weights: Annotated[Literal["all", "role", "own"], unwritten("all")] = "all"
     """Whether all agents share the weights of one policy and one critic, those of a role do, or
     every agent has its own."""

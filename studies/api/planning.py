@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from textwrap import wrap
@@ -24,10 +25,13 @@ from ...core.numerics import FloatArray, IntArray, optimize, pd
 from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
-from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
+from ..results.laws import FEWEST
+from ..results.power import SMALLEST, USUAL_DEVIATION, exponent_text, power_text
+from ..results.scaling_law import size_key
 from ..spec.controls import LEARN_NOTHING
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
+from ..spec.tables import label_but
 from ..trials.session import Session, run_trial
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import cores
@@ -144,8 +148,22 @@ class Plan:
                 f"differences of single seeds are taken to deviate by {self.deviation:g}."
             )
             yield from wrap(text, WIDTH)
+        yield from self._exponents()
         for warning in self.warnings:
             yield from wrap(warning, WIDTH)
+
+    def _exponents(self) -> Iterator[str]:
+        """Yield which exponents of growth can be told apart, if sizes are swept."""
+        columns = self.outline.columns
+        with suppress(SpecError):
+            key = size_key(columns)
+            groups: dict[str, list[float]] = {}
+            for own in columns.values():
+                groups.setdefault(label_but(own, [key]), []).append(float(own[key]))
+            _, fewest = min((len(own), sorted(own)) for own in groups.values())
+            if len(fewest) >= FEWEST and fewest[0] > 0.0:
+                yield ""
+                yield from exponent_text(fewest, len(self.outline.seeds), max(1, len(groups) - 1))
 
     def _decisions(self) -> Iterator[str]:
         """Yield what a decision costs under every condition, and the study at most."""

@@ -216,6 +216,19 @@ where = click.option(
 )
 """A part of the trials, see `nested_agents.studies.results.results.chosen`."""
 
+measure = click.option(
+    "--measure",
+    metavar="NAME",
+    help="A measure of episodes, steps, return, or a number of whole trials, as messages; by "
+    "default the first, success, or the first score of a table.",
+)
+"""What is compared, or fitted."""
+
+phase = click.option(
+    "--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one."
+)
+"""Which episodes of a study count."""
+
 
 def formats(*choices: str, text: str = "How to print it.") -> Decorator:
     """Return the option ``--format``, whose default is the first choice."""

@@ -20,6 +20,8 @@ from ...core.numerics import pd
 from ...topologies.view import align, format_count
 from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex
+from ..results.notation import bracketed
+from ..results.statistics import Estimate
 from .cost import (
     LABELLED,
     PAPER,
@@ -152,7 +154,7 @@ def _table(rows: Sequence[CostRow]) -> str:
         lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
         most = max((len(row.measured.repeats) for row in rows if row.measured), default=1)
         if most > 1:
-            lines += [f"±: a 95 % interval of the mean of {most} repeats, each with a new team;"]
+            lines += [f"[]: 95 % interval of the mean of {most} repeats, each with a new team;"]
         lines += ["-: not measured, beyond a second or so a step."]
         lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
     if "network" in tables:
@@ -187,7 +189,7 @@ def _measured_cells(row: CostRow) -> list[str]:
     step = row.measured.step
     ms = _amount(1e3 * float(step.value))
     if len(row.measured.repeats) > 1:
-        ms += f"±{_amount(1e3 * float(step.high - step.value), 2)}"
+        ms = bracketed(Estimate(*(1e3 * end for end in step)))
     counts = joint, *astuple(row.measured.counted)
     return [*map(scientific, counts), ms, _amount(1e-6 * row.measured.memory)]
 
@@ -210,7 +212,7 @@ def _latex_cell(text: str) -> str:
     mantissa, e, power = text.partition("e")
     if e:
         return rf"${mantissa}\times 10^{{{int(power)}}}$"
-    return mantissa.replace(",", r"\,").replace("±", r"$\pm$")
+    return mantissa if "[" in mantissa else mantissa.replace(",", r"\,")
 
 
 MOST_REPEATS = 1000

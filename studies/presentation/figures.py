@@ -167,6 +167,12 @@ def name_curves(figure: Figure, labels: Sequence[str], title: str = "", **look_o
     add_legend(figure, handles, title, ncols=max(1, 90 // (max(map(len, labels)) + 8)))
 
 
+def name_points(figure: Figure, labels: Sequence[str], title: str = "") -> None:
+    """Name the points of `draw_row` above the panels."""
+    looks = [{"color": look(i)["color"], "marker": marker(i), "ls": ""} for i in range(len(labels))]
+    add_legend(figure, [handle(n, **own) for n, own in zip(labels, looks, strict=True)], title)
+
+
 def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = USUAL) -> list[Path]:
     """Write figures into an existing folder, by their names; return the paths.
 
@@ -195,7 +201,13 @@ def write(figure: Figure, path: Path) -> None:
 
 
 def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
-    """Let an axis be logarithmic, its ticks plain numbers: 0.5, 1, 2, 5."""
+    """Let an axis be logarithmic, its ticks plain numbers: 0.5, 1, 2, 5.
+
+    It stays linear where nothing is above zero.
+    """
+    extent = axes.dataLim.intervaly if which == "y" else axes.dataLim.intervalx
+    if not extent[1] > 0.0:
+        return
     axes.set(**{f"{which}scale": "log"})
     axis = axes.yaxis if which == "y" else axes.xaxis
     low, high = axis.get_view_interval()

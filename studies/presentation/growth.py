@@ -1,16 +1,34 @@
 """The figure of laws of growth: what was measured, the law, and what it predicts."""
 
+from contextlib import suppress
+
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..errors import SpecError
 from ..results.laws import LOGIT, Law
-from ..results.scaling_law import ScalingLaw
+from ..results.results import Results
+from ..results.scaling_law import ScalingLaw, scaling_law
 from . import figures
 
 POINTS = 60
 """Of a line."""
 BEYOND = 2.0
 """How far beyond the largest size a law is drawn if nothing else is predicted."""
+
+REPORTED = {"success": "growth of success", "decision_median": "growth of the time of a decision"}
+"""Measures whose laws are drawn in a report, and what the figures are called."""
+
+
+def growth_figures(results: Results) -> dict[str, Figure]:
+    """Return the laws of a study that sweeps a size, one figure a measure, as far as there are."""
+    drawn = {}
+    for measure, name in REPORTED.items():
+        with suppress(SpecError):
+            analysis = scaling_law(results, measure)
+            if any(fitted.law is not None for fitted in analysis.fits):
+                drawn[name] = draw_laws(analysis)
+    return drawn
 
 
 def draw_laws(analysis: ScalingLaw) -> Figure:

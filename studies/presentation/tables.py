@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ...core.interface.measures import Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.printing import printable
 from ...core.plugins.words import near
@@ -29,6 +29,7 @@ from ..errors import SpecError
 from ..results.analysis import Summary
 from ..results.notation import bracketed
 from ..results.statistics import FEW, Estimate, exactly, stack_estimates
+from .legend import meanings
 from .progress import count
 
 Format = Literal["table", "csv", "json"]
@@ -62,9 +63,15 @@ def write_rows(
 
 
 def _table(frame: pd.DataFrame, measures: dict[str, Measure]) -> Table:
-    """Return the rows of one condition; no word and no number is broken if there is any room."""
+    """Return the rows of one condition; no word and no number is broken if there is any room.
+
+    What equals success in every row, such as that the box stopped at the goal, is left out.
+    """
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="")
     shown = [name for name in frame.columns if name in FORMATS or name in measures]
+    if SUCCESS.name in shown:
+        same = {n for n in shown if n in measures and frame[n].equals(frame[SUCCESS.name])}
+        shown = [name for name in shown if name == SUCCESS.name or name not in same]
     cells = [_cells(frame[[name]], measures.get(name)) for name in shown]
     for name, texts in zip(shown, cells, strict=True):
         heading = measures[name].heading if name in measures else name
@@ -192,6 +199,11 @@ class SummaryTable:
             return ["no trial has finished"]
         over = count(self.seeds, "seed") if self.seeds else "seeds"
         return [f"Means over {over} with 95 % intervals.", self.remark]
+
+    @property
+    def meanings(self) -> dict[str, str]:
+        """What its columns are, by heading, as far as it is known."""
+        return meanings(self.titles)
 
     @property
     def remark(self) -> str:

@@ -29,6 +29,7 @@ from ...core.plugins.words import show
 from ...scenarios import SCENARIOS
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
+from ..presentation.growth import growth_figures
 from ..presentation.headlines import headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
@@ -191,10 +192,13 @@ def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
 
 
 def _reached(results: Results) -> Mapping[tuple[str, int, int], bool]:
-    """Return whether each training episode reached the goal, by condition, seed and number."""
+    """Return whether each training episode reached the goal, by condition, seed and number.
+
+    Of episodes in many worlds at once it is not known.
+    """
     training = results.episodes.query("phase == 'training'")
     success = training.set_index(["condition", "seed", "episode"])["success"]
-    reached: Mapping[tuple[str, int, int], bool] = success.astype(bool).to_dict()
+    reached: Mapping[tuple[str, int, int], bool] = success.fillna(False).astype(bool).to_dict()
     return reached
 
 
@@ -225,7 +229,9 @@ def page(directory: Path) -> str:
         drawn = hierarchy_pictures(store)
     with sources.active():
         analysis = analyse_as(outline.study, results)
-        figures = draw_figures(load_study(outline.study), analysis)
+        figures = dict(draw_figures(load_study(outline.study), analysis))
+    if outline.study == "scaling":
+        figures |= growth_figures(results)
     notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included

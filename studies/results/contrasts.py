@@ -63,8 +63,8 @@ class Contrasts(NamedTuple):
 
     @property
     def title(self) -> str:
-        """What is compared."""
-        return f"{self.measure.heading}, {self.phase}" if self.phase else self.measure.heading
+        """What is compared, as columns of tables are called."""
+        return title_of(self.measure, self.phase)
 
     @property
     def table(self) -> tuple[Summary, ...]:
@@ -79,13 +79,14 @@ class Contrasts(NamedTuple):
             head = ": ".join(filter(None, (group.setting, self.title)))
             groups[f"{head}, less that of {group.reference}"] = group.differences
         is_rate = self.measure.is_rate
-        lines = verdicts(groups, self.measure.better, self._of_phase, of_rates=is_rate)
+        lines = verdicts(groups, self.measure.better, self.title, of_rates=is_rate)
         return (*(lines or [NOTHING]), *identity_lines(self.identical))
 
-    @property
-    def _of_phase(self) -> str:
-        """What is compared, to be read in a sentence."""
-        return f"{self.phase} {self.measure.heading}".strip()
+
+def title_of(measure: Measure, phase: str) -> str:
+    """Return what a measure of a phase is called, ``evaluation success``, ``success, eight``."""
+    kind, _, name = phase.partition(":")
+    return f"{measure.heading}, {name}" if name else f"{kind} {measure.heading}".lstrip()
 
 
 def contrasts(
@@ -128,7 +129,7 @@ def contrasts(
         less = {d.condition: {"difference": d.estimate} for d in compared[setting]}
         lines = []
         for name, c in members:
-            own = {shown_as.heading: _estimate(results, shown_as, phase, c, values[c])}
+            own = {title_of(shown_as, phase): _estimate(results, shown_as, phase, c, values[c])}
             whose = ", ".join(filter(None, (setting, name)))
             lines.append(Summary(whose, len(values[c]), own | less.get(name, {})))
         compared_groups.append(
@@ -157,7 +158,7 @@ def power_with_first(results: Results) -> tuple[str, ...]:
     base, *others = (values[c] for c in results.columns if c in values)
     pairs = [select_shared([own, base]) for own in others]
     samples = [own - reference for own, reference in pairs if len(own) >= 2]
-    return tuple(power_lines(samples, f"{phase} {measure.heading}", of_rates=measure.is_rate))
+    return tuple(power_lines(samples, title_of(measure, phase), of_rates=measure.is_rate))
 
 
 def _usual_phase(results: Results) -> str:

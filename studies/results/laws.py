@@ -162,7 +162,10 @@ def of_numbers(sizes: Array, values: Array, censored: BoolArray | None = None) -
         raise ValueError("a power law is of positive numbers")
     unseen = np.zeros(values.shape, dtype=bool) if censored is None else censored
     if unseen.all():
-        raise ValueError("no run reached the criterion: all are censored")
+        least = values.min()
+        raise ValueError(
+            f"no run reached the criterion: all are censored, at {least:g} decisions or more"
+        )
     return Sample(sizes, np.log(values), unseen, LOG)
 
 

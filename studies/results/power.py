@@ -25,6 +25,13 @@ SMALLEST = 0.2
 USUAL_DEVIATION = 0.25
 """Standard deviation of the paired differences of success rates that is supposed before any are
 known. In the published studies of 20 and 30 seeds nine conditions in ten have less."""
+USUAL_LOG_DEVIATION = 0.5
+"""The same of logarithms, as of decisions to a criterion: three in four of 279 comparisons that are
+published have less."""
+APART = 0.2
+"""Difference of exponents of which it is told how many seeds find it."""
+LARGEST = 4096
+"""Agents of the largest teams that are proposed."""
 SUPPOSED = 4.0
 """Seeds of `USUAL_DEVIATION` that are supposed beside those seen: a few that agree tell little."""
 RATES = 1.07
@@ -273,6 +280,63 @@ def power_text(
         text += f"{two_figures(WANTED)}{within}."
         text += f" For a difference of {goal} it takes about {enough} seeds." if enough else ""
     return wrapped(f"Power: {text}")
+
+
+def exponent_text(
+    sizes: Sequence[float],
+    seeds: int,
+    comparisons: int = 1,
+    deviation: float = USUAL_LOG_DEVIATION,
+) -> list[str]:
+    r"""Return lines on which exponents paired seeds tell apart, and what it takes for `APART`.
+
+    The exponent of a seed is the slope of its logarithms over those of the sizes, so that exponents
+    deviate by what logarithms do, over the root of the sum of squares of those of the sizes.
+
+    Parameters
+    ----------
+    sizes
+        That are run, `seeds` times each.
+    seeds
+        How many.
+    comparisons
+        Of exponents, over which p is adjusted.
+    deviation
+        Of the differences of logarithms of single seeds at a size.
+
+    Examples
+    --------
+    >>> print(*exponent_text([2, 4, 8, 16], 20), sep="\n")
+    Exponents: with 20 seeds of sizes 2 to 16, those that differ by .21 are told
+      apart with probability .80. A difference of .20 takes about 23 seeds, or sizes
+      to 32.
+    """
+    goal = two_figures(APART)
+    counted = f"{seeds} seed{'s' * (seeds != 1)}"
+    enough = seeds_for(APART, deviation / _reach(sizes), comparisons)
+    larger = list(sizes)
+    while detectable(deviation / _reach(larger), seeds, comparisons) > APART:
+        larger.append(2.0 * larger[-1])
+        if larger[-1] > LARGEST:
+            break
+    takes = f"A difference of {goal} takes about {enough} seeds" if enough else ""
+    if seeds < seeds_needed(comparisons):
+        text = f"{counted} are too few to tell any apart, at least {seeds_needed(comparisons)} "
+        text += f"are needed. {takes}."
+    else:
+        least = two_figures(detectable(deviation / _reach(sizes), seeds, comparisons))
+        text = f"with {counted} of sizes {sizes[0]:g} to {sizes[-1]:g}, those that differ by "
+        text += f"{least} are told apart with probability {two_figures(WANTED)}."
+        if len(larger) > len(sizes) and takes:
+            up_to = f", or sizes to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
+            text += f" {takes}{up_to}."
+    return wrapped(f"Exponents: {text}")
+
+
+def _reach(sizes: Sequence[float]) -> float:
+    """Return the root of the sum of squares of the logarithms of sizes about their mean."""
+    logs = np.log(sizes)
+    return float(np.linalg.norm(logs - logs.mean()))
 
 
 def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool = True) -> list[str]:

@@ -15,16 +15,14 @@ from ..errors import SpecError
 from ..spec.tables import label_but
 from . import laws
 from .analysis import Summary, format_p
-from .contrasts import values_of
+from .contrasts import title_of, values_of
 from .notation import bracketed, two_figures, wrapped
-from .power import seeds_for
+from .power import APART, seeds_for
 from .results import Results
-from .statistics import LEVEL, Array, holm
+from .statistics import LEVEL, Array, bootstrap, holm
 
 WINDOW = 5
 """Episodes in a row whose mean success must reach a criterion."""
-APART = 0.2
-"""Difference of exponents of which it is told how many seeds find it."""
 
 
 class Fitted(NamedTuple):
@@ -130,6 +128,8 @@ def _sentence(fitted: Fitted, size: str) -> str:
         inside = "inside" if e.low <= measured <= e.high else "outside"
         text += f"; {n:g} left out: predicted {bracketed(e)}, measured {two_figures(measured)}, "
         text += inside
+    if law.noise <= laws.FLAT:
+        text += "; all seeds agree, so that intervals of parameters tell nothing of the law"
     return f"{text}."
 
 
@@ -166,7 +166,7 @@ def scaling_law(
     SpecError
         If there is no such measure, phase or key, the key is no number, or the criterion no share.
     """
-    key = _size_key(results, size)
+    key = size_key(results.columns, size)
     if criterion is None:
         phases = [phase] if phase else ["evaluation", "training"]
         own = next((p for p in phases if p in results.phases), phases[0])
@@ -174,7 +174,7 @@ def scaling_law(
         samples: Mapping[str, tuple[pd.Series, pd.Series | None]] = {
             c: (pd.Series(v), None) for c, v in values.items()
         }
-        title = f"{shown_as.heading}, {own}" if own else shown_as.heading
+        title = title_of(shown_as, own)
     else:
         samples = _decisions(results, measure, criterion)
         title = f"decisions to {two_figures(criterion)} of {measure}"
@@ -191,17 +191,23 @@ def scaling_law(
     return ScalingLaw(title, key.rpartition(".")[2], tuple(fits), tuple(predict))
 
 
-def _size_key(results: Results, size: str | None) -> str:
-    """Return the swept key that sizes are of."""
-    keys = list(dict.fromkeys(key for own in results.columns.values() for key in own))
+def size_key(columns: Mapping[str, Mapping[str, object]], size: str | None = None) -> str:
+    """Return the swept key that sizes are of, by the columns of conditions.
+
+    Raises
+    ------
+    SpecError
+        If there is none, or another than the one named; one line.
+    """
+    keys = list(dict.fromkeys(key for own in columns.values() for key in own))
     numbers = [
         key
         for key in keys
         if all(
             isinstance(own.get(key), int | float) and not isinstance(own.get(key), bool)
-            for own in results.columns.values()
+            for own in columns.values()
         )
-        and len({own.get(key) for own in results.columns.values()}) > 1
+        and len({own.get(key) for own in columns.values()}) > 1
     ]
     if size is not None:
         key = next((k for k in numbers if size in (k, k.rpartition(".")[2])), None)
@@ -264,6 +270,8 @@ def _fit(
     for k, (_, marked) in enumerate(samples):
         if marked is not None:
             censored[:, k] = marked.loc[frame.index].to_numpy()
+    if values.size and not censored.any() and np.ptp(values) == 0.0:
+        return Fitted(group, None, f"every run has {two_figures(values[0, 0])}")
     try:
         if episodes is not None:
             sample = laws.of_rates(sizes, values * episodes, episodes)
@@ -271,4 +279,9 @@ def _fit(
             sample = laws.of_numbers(sizes, values, censored)
         return Fitted(group, laws.choose(sample), censored=int(censored.sum()))
     except ValueError as error:
-        return Fitted(group, None, str(error))
+        is_pair = values.shape[1] == 2 and len(values) > 1 and not censored.any()
+        if not is_pair:
+            return Fitted(group, None, str(error))
+        most = np.inf if episodes is None else 1.0
+        less = bootstrap(values[:, 1] - values[:, 0], bounds=(-most, most))
+        return Fitted(group, None, f"{error}; the larger less the smaller: {bracketed(less)}")

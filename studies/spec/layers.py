@@ -342,7 +342,9 @@ def _left_out(
     """
     written = {key for layer in given for key, value in flat(layer) if value != {}}
     there = dict(flat(table))
-    keys = sorted(key for key in written if key in dropped or key not in there)
+    # A word that stands for a table, such as that of an evaluator, is there with all of its keys.
+    stands = {*there, *(key.rpartition(".")[0] for key in there)}
+    keys = sorted(key for key in written if key in dropped or key not in stands)
     usual = dict(flat(_lay(given))) if keys else {}
     changed = [k for k, v in there.items() if k.endswith(".kind") and usual.get(k, v) != v]
     causes = {key: _cause(key, changed) for key in keys}

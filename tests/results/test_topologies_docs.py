@@ -9,7 +9,7 @@ import pytest
 from published_tables import print_table
 
 import nested_agents as na
-from nested_agents.results import ROWS
+from nested_agents.results import ROWS, equal_treatment
 from nested_agents.studies.catalogue.chain_order import equivalence
 from nested_agents.studies.catalogue.edges import TRAINED, analyse
 from nested_agents.studies.catalogue.hierarchies.pooled import effects
@@ -78,13 +78,8 @@ def p_of(of_seeds: np.ndarray) -> str:
     return "< .001" if p < 0.001 else f"{p:.1g}".removeprefix("0") if p < 0.1 else f"{p:.2f}"[1:]
 
 
-EQUAL_TREATMENT = ("edges", "edges-again")
-"""Rows whose evaluations are compared with the chain over all settings."""
-
-
-@pytest.mark.parametrize("name", EQUAL_TREATMENT)
-def test_what_is_equal_to_the_chain(name: str) -> None:
-    results = na.load(ROWS / f"{name}.json").results
+def test_what_is_equal_to_the_chain() -> None:
+    results = na.load(ROWS / "edges.json").results
     page = PAGE.read_text(encoding="utf-8")
     for other, (success, decisions) in effects(results, analyse(results).cases, TRAINED).items():
         gained = bracketed(success.estimate)
@@ -93,21 +88,10 @@ def test_what_is_equal_to_the_chain(name: str) -> None:
         assert line in page, f"docs/edges.md: put in\n{line}"
 
 
-def test_the_table_of_equal_treatment(capsys: pytest.CaptureFixture[str]) -> None:
-    columns = ("evaluation success", "decisions to goal")
-    cells = {}
-    for name in EQUAL_TREATMENT:
-        for line in print_table(name, columns, capsys).splitlines()[2:]:
-            label, _, *values = line[2:-2].split(" | ")
-            cells[label.removeprefix("2 robots, ").removeprefix("own, ")] = " | ".join(values)
-    for row, maintain, plans in (
-        ("told and considering", "as trained", "told, own plans"),
-        ("told only", "told only", "told only, plans"),
-        ("considered only", "considered only", "considered only, private plans"),
-        ("neither", "neither", "neither, plans"),
-    ):
-        line = f"| {row} | {cells[maintain]} | {cells[plans]} |"
-        assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
+def test_the_tables_of_equal_treatment() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    for line in equal_treatment.lines():
+        assert line in page, f"docs/edges.md: put in\n{line}"
 
 
 EVALUATED_AS = (

@@ -14,6 +14,7 @@ hierarchy that succeeds only where it is easy looks quick.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +28,9 @@ from ..scaling import NUMBERS, measure
 from ..study import check_evaluated, distinct
 from .cases import HierarchyCase
 from .pooled import effects, lines_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -89,7 +93,7 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
     for case, own in zip(cases, success, strict=True):
         if case.setting in bases and case.hierarchy != reference:
             pairs[case.setting].append((case.hierarchy, EVALUATED, own, bases[case.setting]))
-    judgement, lines = judged(pairs, reference, "success, evaluation")
+    judgement, lines = judged(pairs, reference, EVALUATED)
     compared = {setting: own for setting, own in judgement.items() if own}
     notes = ["Rows: what else is swept, hierarchy."] * any(case.value_of for case in cases)
     return Analysis(tuple(table), (*notes, MESSAGES, "", *(lines or [NOTHING])), cases, compared)
@@ -121,16 +125,46 @@ def to_the_goal(success: Array, steps: Array) -> Array:
     return np.array([run[reached].mean() for reached, run in runs if reached.any()])
 
 
+def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
+    """Draw success and time of a decision of one size, a row for every hierarchy."""
+    from ...presentation import figures
+
+    rows = distinct(case.hierarchy for case in cases)
+    whose = distinct(case.value_of for case in cases)
+    offsets = figures.beside(len(whose))
+    figure, panels = figures.panels(1, 2, (7.2, 1.3 + 0.36 * len(rows)), sharey=True)
+    for axes, title in zip(panels[0], (EVALUATED, DECIDING), strict=True):
+        for case in cases:
+            i = whose.index(case.value_of)
+            row = rows.index(case.hierarchy) + offsets[i]
+            colour = figures.COLOURS[i]
+            figures.draw_row(
+                axes, row, case.values[title], color=colour, marker=figures.marker(i), markersize=5
+            )
+        axes.set_xlabel(title)
+        axes.grid(axis="x", alpha=0.25)
+    figures.as_rates(panels[0, 0], "x")
+    figures.log_axis(panels[0, 1], "x")
+    figures.name_rows(panels[0, 0], rows)
+    if len(whose) > 1:
+        names = [f"value of: {value_of}" for value_of in whose]
+        figures.name_points(figure, names, "means over seeds, bars: 95 % intervals")
+    return figure
+
+
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: success and time of a decision by number of robots.
 
-    There is a column of panels for each choice of whose value decides. Points are means over seeds,
+    Of one size it is a chart with a row for each hierarchy. Otherwise there is a column of panels
+    for each choice of whose value decides. Points are means over seeds,
     bars their 95 % intervals; hierarchies differ by colour and marker, and stand a little beside
     each other.
     """
     from ...presentation import figures  # matplotlib takes its time
 
     cases = analysis.cases
+    if len({case.robots for case in cases}) == 1:
+        return {"hierarchies": _draw_dots(cases)}
     hierarchies = distinct(case.hierarchy for case in cases)
     whose = distinct(case.value_of for case in cases)
     size = (max(5.6, 0.6 + 2.8 * len(whose)), 5.2)

@@ -24,7 +24,7 @@ BLOCK = 5
 """Episodes at each end of training that the table averages over."""
 BLOCKS = {"first": slice(BLOCK), "last": slice(-BLOCK, None), "evaluation": slice(None)}
 """The episodes that the table averages over, of training or of evaluation, by name."""
-COLUMNS = 2
+COLUMNS = 3
 """Panels of the figure that stand beside each other."""
 
 
@@ -136,14 +136,15 @@ def draw(analysis: Analysis) -> Figures:
     followed = analysis.cases
     if not followed:
         return {}
-    width = 3.6 * COLUMNS
-    figure, panels = f.grid(len(followed), COLUMNS, (3.6, 2.1), (0.0, 1.2), width, sharex=True)
+    figure, panels = f.grid(len(followed), COLUMNS, (2.8, 2.1), (0.0, 1.0), 7.2, sharex=True)
     seeds = {line.condition: line.seeds for line in analysis.table}
     for axes, (measured, training) in zip(panels.flat, followed, strict=False):
         for condition, curve in curves_of(measured, training).items():
             episodes = range(len(curve.value))  # counted from 0, as in rows and specs
             marker = "o" if len(curve.value) == 1 else None
-            f.draw_curve(axes, episodes, curve, list(seeds).index(condition), marker=marker)
+            band = 0.12 if curve.value.any() else 0.0  # those that never succeed share one band
+            index = list(seeds).index(condition)
+            f.draw_curve(axes, episodes, curve, index, alpha=band, marker=marker)
         axes.set_title(measured.heading, loc="left")
         if measured.is_rate:
             f.as_rates(axes)

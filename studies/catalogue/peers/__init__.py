@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, judged
+from ...results.notation import two_figures
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stack_estimates
 from ...trials.session import Session
@@ -109,23 +110,33 @@ def analyse(results: Results) -> Analysis:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: evaluation success against experience and against time.
+    """Return the figure: evaluation success against experience, a panel for each condition.
 
-    A line per condition, bands its 95 % intervals.
+    The condition's line has a colour, and a band for its 95 % intervals; those of the others are
+    grey. Beside its name stands the CPU time of training.
     """
+    from matplotlib.ticker import LogLocator
+
     from ...presentation import figures as f  # matplotlib takes its time
 
-    figure, panels = f.panels(1, 2, (7.2, 3.4), sharey=True)
-    for i, course in enumerate(analysis.cases):
-        for axes, spent in zip(panels[0], (course.decisions, course.seconds), strict=True):
-            f.draw_curve(axes, spent, course.success, i, alpha=0.08, marker="o", markersize=3.5)
-    for axes, title in zip(panels[0], ("decisions", "CPU time of training [s]"), strict=True):
+    courses = analysis.cases
+    figure, panels = f.grid(len(courses), 4, (2.3, 1.5), (0.2, 0.6), sharex=True, sharey=True)
+    for axes, own in zip(panels.flat, courses, strict=False):
+        for other in courses:
+            axes.plot(other.decisions, other.success.value, color="#c9ccd2", lw=0.8)
+        f.draw_curve(axes, own.decisions, own.success, 0, alpha=0.15, marker="o", markersize=3.5)
+        axes.set_title(own.condition, loc="left", fontsize=8)
+        if np.isfinite(own.seconds[-1]):
+            text = f"{two_figures(float(own.seconds[-1]))} s"
+            axes.set_title(text, loc="right", fontsize=7, color="#666666")
         f.log_axis(axes, "x")
-        axes.set_xlabel(title)
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
-    panels[0, 0].set_ylabel(EVALUATED)
-    f.name_curves(figure, [c.condition for c in analysis.cases], marker="o", markersize=3.5)
+    for axes in panels.flat[len(courses) - panels.shape[1] : len(courses)]:
+        axes.tick_params(labelbottom=True)
+    figure.supxlabel("decisions of training; right of a name: CPU time of training", fontsize=9)
+    figure.supylabel(EVALUATED, fontsize=9)
     return {"peers": figure}
 
 

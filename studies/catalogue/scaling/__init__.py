@@ -146,7 +146,8 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
     }
     if "process_bytes" in numbers:
         costs["process [MB]"] = 1e-6 * numbers["process_bytes"]
-    values = {"success": rate(results.success(condition)[:, -5:])} | evaluated(results, condition)
+    values = {"success last 5": rate(results.success(condition)[:, -5:])}
+    values |= evaluated(results, condition)
     if "all_touching" in numbers:
         values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
     values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}

@@ -8,7 +8,7 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 import numpy as np
 
-from ...results.analysis import Analysis, Difference, Figures, Summary, adjust, ratio
+from ...results.analysis import EVALUATED, Analysis, Difference, Figures, Summary, adjust, ratio
 from ...results.notation import bracketed, two_decimals
 from ...results.power import power_lines
 from ...results.results import Results
@@ -41,10 +41,7 @@ def analyse(results: Results) -> Analysis:
         for box, phase in ({TRAINED: "evaluation"} | results.other_evaluations(condition)).items():
             label = box if len(ratios) == 1 else f"{condition}: {box}"
             success = results.success(condition, phase)
-            estimates = {"success": rate(success), "ratio": by_box.get(box, bootstrap([own]))}
-            if results.has(condition, phase, "stopped_at_goal"):
-                stopped = results.values(condition, "stopped_at_goal", phase)
-                estimates["stopped"] = rate(stopped)
+            estimates = {EVALUATED: rate(success), "ratio": by_box.get(box, bootstrap([own]))}
             if results.has(condition, phase, "contact_fraction"):
                 shares = results.values(condition, "contact_fraction", phase).mean(axis=1)
                 estimates["contact"] = bootstrap(shares, bounds=(0, 1))

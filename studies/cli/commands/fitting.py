@@ -12,13 +12,8 @@ from ..loading import load_results
 
 @click.command()
 @options.sources
-@click.option(
-    "--measure",
-    metavar="NAME",
-    help="A measure of episodes, steps, return, or a number of whole trials, as decision_median or "
-    "messages; by default success.",
-)
-@click.option("--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one.")
+@options.measure
+@options.phase
 @click.option(
     "--size",
     metavar="KEY",

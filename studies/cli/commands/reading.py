@@ -17,7 +17,15 @@ from ...spec.outline import StudyOutline, sources_of
 from ...store import durable
 from ...store.store import Store
 from .. import options
-from ..display import Form, in_form, print_data, print_study, print_table, print_text
+from ..display import (
+    Form,
+    in_form,
+    print_data,
+    print_meanings,
+    print_study,
+    print_table,
+    print_text,
+)
 from ..loading import load_results, open_study, trust_files, untrusted
 
 PERIOD = 2.0
@@ -70,6 +78,7 @@ def _watch(directory: Path) -> None:
     metavar="TITLE...",
     help="Headings of the columns to print, in this order; by default all.",
 )
+@options.flag("--legend", "Say below the table what its columns are.")
 @options.form
 @options.trust
 def table(
@@ -77,6 +86,7 @@ def table(
     study: str | None,
     where: str | None,
     columns: tuple[str, ...],
+    legend: bool,
     form: Form,
     trust: bool,
 ) -> int:
@@ -87,7 +97,7 @@ def table(
     """
     results = load_results(sources, study=study, where=where, trust=trust)
     if form == "table":
-        print_study(results, columns)
+        print_study(results, columns, is_explained=legend)
     else:
         print_data(in_form(results.table(columns), form))
     return 0
@@ -110,13 +120,8 @@ class Compared(TypedDict):
     help="Compare conditions that differ in this swept key alone, as robots or topology; "
     "directory compares studies. By default (condition) all conditions with the first.",
 )
-@click.option(
-    "--measure",
-    metavar="NAME",
-    help="A measure of episodes, steps, return, or a number of whole trials; by default success, "
-    "or the first score of a table.",
-)
-@click.option("--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one.")
+@options.measure
+@options.phase
 @click.option(
     "--reference", metavar="LABEL", help="What the others are compared with; by default the first."
 )
@@ -140,6 +145,7 @@ class Compared(TypedDict):
     show_default=True,
     help="Which scores of a table are better.",
 )
+@options.flag("--legend", "Say below the table what its columns are.")
 @options.out("A page to write: verdicts, table, statistics and figure.", "FILE.html")
 @options.form
 @options.trust
@@ -149,6 +155,7 @@ def compare(
     better: Literal["higher", "lower"],
     out: Path | None,
     statistics: bool,
+    legend: bool,
     plot: Path | None,
     where: str | None,
     form: Form,
@@ -178,6 +185,8 @@ def compare(
             print_data(f"\n{in_form(comparison.aggregated, form)}")
         return 0
     print_table(comparison.table)
+    if legend:
+        print_meanings(comparison.table)
     print_text("", *comparison.verdicts)
     if statistics:
         print_text("")

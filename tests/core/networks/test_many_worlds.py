@@ -122,6 +122,31 @@ def test_many_worlds_decide_as_each_by_itself_and_in_any_order():
     assert np.array_equal(mixed, together[order])
 
 
+def test_permuting_agents_permutes_what_they_do():
+    team = team_of(IPPOSettings(**SMALL, numbered=False))
+    world = SpreadSettings().build()
+    states = np.stack([world.reset(seed) for seed in range(9)])
+    plain = team.act(Observation(states, world), explore=False).joint_action
+    order = np.array([2, 0, 1])
+    mixed = team.act(Observation(states[:, order], world), explore=False).joint_action
+    assert np.array_equal(mixed, plain[:, order])
+
+
+def test_what_is_learned_does_not_depend_on_the_order_of_worlds_and_agents():
+    policy = team_of(HierarchyPPOSettings(**SMALL)).parts[0].policies["all"]
+    rng = np.random.default_rng(0)
+    m = 3 * 50
+    width = policy.actor.sizes[0], policy.critic.sizes[0]
+    batch = Batch(
+        rng.normal(size=(m, width[0])), rng.normal(size=(m, width[1])), rng.integers(0, 5, m),
+        np.log(rng.uniform(0.1, 0.4, m)), rng.normal(size=m), rng.normal(size=m),
+    )  # fmt: skip
+    loss = policy.slope(batch, 0.01)
+    gradient = policy.gradient.copy()
+    assert policy.slope(batch.rows(rng.permutation(m)), 0.01) == pytest.approx(loss, abs=1e-6)
+    assert np.allclose(policy.gradient, gradient, rtol=0.0, atol=1e-6)
+
+
 def test_what_is_told_is_seen():
     team = team_of(HierarchyPPOSettings(**SMALL))
     world = SpreadSettings().build()

@@ -122,6 +122,14 @@ def test_what_functions_cost_is_told_by_condition(tmp_path) -> None:
     )
 
 
+def test_a_plan_of_three_sizes_tells_which_exponents_can_be_told_apart() -> None:
+    spec = {"seeds": 12, "sweep": {"scenario.robots": [2, 4, 8], "topology": ["chain", "star"]}}
+    said = " ".join(str(planning.plan(spec, timed=False)).split())
+    assert "Exponents: with 12 seeds of sizes 2 to 8, those that differ by " in said
+    two = {**spec, "sweep": {"scenario.robots": [2, 4]}}
+    assert "Exponents" not in str(planning.plan(two, timed=False))
+
+
 PPO = {"kind": "ippo", "worlds": 8, "rollout": 20, "epochs": 1, "hidden": [8]}
 EXPERIENCE = {"study": "experience", "seeds": 3, "steps": 10, "evaluation": 1}
 

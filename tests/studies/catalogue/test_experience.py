@@ -2,6 +2,7 @@
 
 import pytest
 
+import nested_agents as na
 from nested_agents import SpecError
 from nested_agents.studies.catalogue.experience import analyse, check, measure, stops
 from nested_agents.studies.spec.spec import Spec
@@ -41,6 +42,32 @@ def test_worlds_by_a_loop_and_learners_in_one_world_keep_the_budget():
     single = {"study": "experience", "seeds": 1, "decisions": 60, "steps": 25, "evaluation": 1}
     of_one = {**single, "scenario": {"kind": "line-up"}, "preset": "fitted-q"}
     assert 60 <= measure(trials_of(Spec.of(of_one))[0]).numbers["decisions"] < 85
+
+
+def success(table):
+    """Return the evaluation success of a trial on an arm of two joints."""
+    common = {"study": "experience", "evaluation": 20, "steps": 100}
+    arm = {"scenario": {"kind": "kinematic-chain", "joints": 2}}
+    (trial,) = trials_of(Spec.of({**common, **arm, **table}))
+    rows = [row for row in measure(trial).rows if row.phase == "evaluation"]
+    return sum(row.measures["success"] for row in rows) / len(rows)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("ippo", 10_000), ("hierarchy-ppo", 10_001)])
+def test_networks_learn(kind, seed):
+    learner = {"kind": kind, "worlds": 64, "rollout": 32, "batch_size": 512, "epochs": 5}
+    assert success({"seeds": [seed], "decisions": 60_000, "learner": learner}) >= 0.75
+    assert success({"seeds": [seed], "decisions": 1, "preset": "random"}) <= 0.25
+
+
+def test_a_report_does_without_the_success_of_episodes_in_many_worlds(tmp_path):
+    cart = {"kind": "gymnasium", "id": "CartPole-v1", "predictor": "none", "success": "terminated"}
+    table = {**TABLE, "decisions": 400, "scenario": cart}
+    study = na.run(table, tmp_path / "out", jobs=1, progress=False)
+    successes = study.episodes.query("phase == 'training'")["success"]
+    assert len(successes)
+    assert successes.isna().all()
+    assert study.report(tmp_path / "report.html").exists()
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
     assert star.p < 0.05 < tree.p
     assert star.estimate.low < -0.6 < star.estimate.high < -0.4
     text = "\n".join(analysis.notes)
-    of_team = "8 robots, team: success, evaluation, less that of chain:\n  worse: star, -."
+    of_team = "8 robots, team: evaluation success, less that of chain:\n  worse: star, -."
     assert of_team in text
     assert "adjusted over 8 comparisons (Holm)." in text
     assert max(map(len, text.splitlines())) <= 80
@@ -68,7 +68,7 @@ def test_the_seeds_needed_are_the_fewest_whose_least_p_is_small_enough(compariso
 
 def test_the_first_hierarchy_is_the_reference_where_there_is_no_chain() -> None:
     chances = {key: chance for key, chance in CHANCES.items() if key[0] != "chain"}
-    assert "2 robots, own: success, evaluation, less that of star:" in (
+    assert "2 robots, own: evaluation success, less that of star:" in (
         analyse(hierarchies(chances).frames()).notes
     )
 

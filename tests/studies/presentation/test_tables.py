@@ -2,8 +2,10 @@ import csv
 import io
 
 import numpy as np
+import pandas as pd
 
-from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.studies.presentation.tables import tabulate, write_rows
 from nested_agents.studies.results.analysis import Summary
 from nested_agents.studies.results.statistics import Estimate
 
@@ -65,3 +67,12 @@ def test_cells_are_as_in_the_terminal():
 def test_an_empty_table():
     table = tabulate([])
     assert (table.rows, table.csv) == ((), "condition,seeds\n")
+
+
+def test_what_equals_success_in_every_row_is_left_out():
+    frame = pd.DataFrame({"condition": "a", "phase": "training", "success": [True, False]})
+    measures = (SUCCESS, Measure("stopped", "stopped", is_rate=True))
+    for stopped, is_shown in (([True, False], False), ([True, True], True)):
+        file = io.StringIO()
+        write_rows(frame.assign(stopped=stopped), measures, "table", file)
+        assert ("stopped" in file.getvalue()) == is_shown

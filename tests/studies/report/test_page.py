@@ -43,7 +43,7 @@ def test_a_finished_study_has_everything(html):
     found = dict(re.findall("<dt>(.*?)</dt><dd>(.*?) <small>", rates))
     assert list(found) == ["default", "frozen"]
     assert all(f"<td>{value}<small>" in html for value in found.values())
-    assert "success, evaluation, less that of default:" in html
+    assert "evaluation success, less that of default:" in html
     assert "preset = [\n    &#34;default&#34;,\n    &#34;frozen&#34;,\n]" in html
     assert len(html) < 500_000
 
@@ -93,7 +93,7 @@ def test_an_empty_study(kept, tmp_path):
 def test_an_unfinished_study_with_failures(kept, tmp_path):
     html = page(kept(tmp_path, done=3, failed=2))
     assert "Unfinished: 3 of 6 trials are done, 2 failed, 1 left." in html
-    assert html.count("<details>") == 3
+    assert html.count("<details>") == 4
     assert "RuntimeError: &lt;off &amp; away&gt;" in html
     assert "…/core/team.py" in html
     assert "someone" not in html

@@ -24,7 +24,7 @@ def test_levels_are_compared_where_all_else_is_equal() -> None:
     assert [d.condition for d in found.differences if d.p < LEVEL] == ["star"]
     assert found.groups[1].differences[0].estimate.value == pytest.approx(-0.7, abs=0.15)
     text = "\n".join(found.notes)
-    assert "team, robots=8: success, evaluation, less that of chain:\n  worse: star" in text
+    assert "team, robots=8: evaluation success, less that of chain:\n  worse: star" in text
     assert "adjusted over 2 comparisons" in text
     assert "Power: with 20 seeds and 2 comparisons, a difference of" in text
 

@@ -8,6 +8,7 @@ from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.presentation.growth import growth_figures
 from nested_agents.studies.results.results import from_arrays
 from nested_agents.studies.results.scaling_law import scaling_law
 
@@ -67,8 +68,27 @@ def test_two_sizes_or_one_seed_give_no_number() -> None:
     two = scaling_law(made_up({"chain": 1.0}, sizes=(2, 4)), "success", criterion=1.0)
     assert not two.table
     assert "2 sizes and 6 seeds" in " ".join(two.notes)
+    # Two robots take 120 or 140 decisions, by seed, four 280 or 320.
+    assert "less the smaller: 170 [160, 180]" in " ".join(two.notes)
     one = scaling_law(made_up({"chain": 1.0}, seeds=1), "success", criterion=1.0)
     assert "3 sizes and 1 seed" in " ".join(one.notes)
+
+
+def test_equal_values_are_no_law() -> None:
+    never = scaling_law(made_up({"chain": 30.0}), "success")
+    assert not never.table
+    assert "no law: every run has 0" in " ".join(never.notes)
+
+
+def test_seeds_that_agree_do_not_make_a_law_certain() -> None:
+    law = scaling_law(made_up({"chain": 1.0}), "steps")
+    assert "all seeds agree, so that intervals" in " ".join(" ".join(law.notes).split())
+
+
+def test_figures_of_a_report_are_of_measures_with_a_law() -> None:
+    results = made_up({"chain": 3.0, "star": 5.0})
+    assert list(growth_figures(results)) == ["growth of success"]
+    assert growth_figures(made_up({"chain": 3.0}, sizes=(2, 4))) == {}
 
 
 def test_the_published_study_of_scaling_by_command_and_in_python(capsys, tmp_path) -> None:

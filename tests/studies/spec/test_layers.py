@@ -89,6 +89,8 @@ def test_what_the_user_did_not_write_gives_way_with_one_remark() -> None:
     (remark,) = swept.warnings()
     assert remark.endswith("for learner.kind = 'fitted-q', learner.kind = 'td-lambda'")
     assert not Spec.of({"preset": "fitted-q"}).warnings()
+    slow = {"kind": "gymnasium", "id": "CartPole-v1", "predictor": "copy", "success": "terminated"}
+    assert not Spec.of({"preset": "own-value", "scenario": slow}).warnings()
     assert not Spec.of({}).warnings()
 
 

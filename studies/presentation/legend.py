@@ -1,0 +1,30 @@
+"""What columns of tables mean, in words."""
+
+import tomllib
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+from functools import cache
+from pathlib import Path
+
+
+@cache
+def _known() -> dict[str, str]:
+    """Return meanings by title, without its unit; an asterisk is any name."""
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def meanings(titles: Iterable[str]) -> dict[str, str]:
+    """Return what columns are, by title; those that only their scenario knows are left out.
+
+    Examples
+    --------
+    >>> meanings(["decision [ms]", "humidity"])
+    {'decision [ms]': 'median time of a decision of the whole team'}
+    """
+    names = {title: title.partition(" [")[0] for title in titles}
+    matches = {
+        title: [text for pattern, text in _known().items() if fnmatchcase(name, pattern)]
+        for title, name in names.items()
+    }
+    return {title: texts[0] for title, texts in matches.items() if texts}
