@@ -100,17 +100,20 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=16, metavar="N")
     parser.add_argument("--rounds", type=int, default=3, metavar="N")
     parser.add_argument("--episodes", type=int, default=10, metavar="N")
+    parser.add_argument("--steps", type=int, default=450, metavar="N")
     options = parser.parse_args()
-    spec = Spec.of({"seeds": options.trials, "episodes": options.episodes, "evaluation": 0})
+    lengths = {"episodes": options.episodes, "steps": options.steps, "evaluation": 0}
+    spec = Spec.of({"seeds": options.trials, **lengths})
     load = os.getloadavg()[0]
     rounds = [(measure(spec, 1), measure(spec, 2)) for _ in range(options.rounds)]
     for i, jobs in enumerate((1, 2)):
         trial = median(pair[i].trials for pair in rounds) / options.trials
+        each = 1e3 * median(pair[i].outside for pair in rounds) / options.trials
         share = [100 * pair[i].outside / pair[i].trials for pair in rounds]
         busy = median(pair[i].busy for pair in rounds)
         print(
-            f"jobs {jobs}: {trial:.2f} processor seconds a trial, overhead {median(share):.2f} % "
-            f"({min(share):.2f} to {max(share):.2f}), busy {busy:.3f}"
+            f"jobs {jobs}: {trial:.3g} processor seconds a trial, overhead {each:.1f} ms or "
+            f"{median(share):.2f} % ({min(share):.2f} to {max(share):.2f}), busy {busy:.3f}"
         )
     efficiencies = [two.busy * one.trials / two.trials for one, two in rounds]
     print(
