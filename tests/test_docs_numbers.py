@@ -1,0 +1,63 @@
+"""Numbers of the documentation: times stand in one place, estimates within their intervals."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+MADE = {"reference", "gallery", "_build"}
+README = DOCS.parent / "README.md"
+PAGES = {
+    path.relative_to(DOCS.parent).as_posix(): re.sub(
+        r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
+    )
+    for path in [README, *DOCS.rglob("*.md")]
+    if not MADE & set(path.parts)
+}
+"""The pages that people write, without what is printed or typed."""
+NUMBER = r"[-+]?[\d,]*\.?\d+"
+ESTIMATE = re.compile(rf"(?<![\w.,])({NUMBER})\s\[({NUMBER}),\s({NUMBER})\]")
+TIME = re.compile(rf"{NUMBER} ?(?:ms|us|µs)\b")
+GIVEN = {"64 ms", "1 ms", "10 ms"}
+"""Times that nobody measured: the control period, and what a message is taken to take."""
+
+
+REPEATING = ("README.md", "docs/concepts.md", "docs/claims.md")
+"""Pages whose sentences repeat what stands elsewhere."""
+
+
+def estimates(text: str) -> set[tuple[float, float, float]]:
+    """Return the estimates of a text with their bounds."""
+    cells = (found.groups() for found in ESTIMATE.finditer(text))
+    return {(float(v), float(low), float(high)) for v, low, high in map(plain, cells)}
+
+
+def plain(cells: tuple[str, ...]) -> Iterator[str]:
+    return (cell.replace(",", "") for cell in cells)
+
+
+def test_times_of_decisions_stand_in_benchmarks_alone() -> None:
+    measured = {
+        (page, time)
+        for page, text in PAGES.items()
+        if page != "docs/benchmarks.md"
+        for time in TIME.findall(text)
+        if time not in GIVEN
+    }
+    assert measured == set(), "say a ratio, or link to docs/benchmarks.md"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_an_estimate_lies_within_its_interval(page: str) -> None:
+    outside = [one for one in estimates(PAGES[page]) if not one[1] <= one[0] <= one[2]]
+    assert outside == []
+
+
+@pytest.mark.parametrize("page", REPEATING)
+def test_an_estimate_that_is_repeated_is_that_of_the_results(page: str) -> None:
+    results = set().union(*(estimates(t) for name, t in PAGES.items() if name not in REPEATING))
+    results |= {(-value, -high, -low) for value, low, high in results}  # what is lost is not gained
+    prose = re.sub(r"^\|.*$", "", PAGES[page], flags=re.MULTILINE)
+    assert estimates(prose) - results == set()
