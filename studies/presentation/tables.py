@@ -74,9 +74,12 @@ def _table(frame: pd.DataFrame, measures: dict[str, Measure]) -> Table:
         shown = [name for name in shown if name == SUCCESS.name or name not in same]
     cells = [_cells(frame[[name]], measures.get(name)) for name in shown]
     for name, texts in zip(shown, cells, strict=True):
-        heading = measures[name].heading if name in measures else name
-        least = max(map(len, [*heading.split(), *texts]))
-        table.add_column(_literal(heading), justify="right", vertical="bottom", min_width=least)
+        heading = printable(measures[name].heading if name in measures else name)
+        width = max(map(len, texts), default=0)
+        if len(heading) > width:
+            heading = _in_two_lines(heading)
+        least = max(width, *map(len, heading.split()))
+        table.add_column(escape(heading), justify="right", vertical="bottom", min_width=least)
     for row in zip(*cells, strict=True):
         table.add_row(*row)
     return table

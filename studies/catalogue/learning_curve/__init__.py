@@ -25,7 +25,7 @@ BLOCK = 5
 BLOCKS = {"first": slice(BLOCK), "last": slice(-BLOCK, None), "evaluation": slice(None)}
 """The episodes that the table averages over, of training or of evaluation, by name."""
 COLUMNS = 3
-"""Panels of the figure that stand beside each other."""
+"""Panels of the figure that stand beside each other, but for four, which are a square."""
 
 
 def check(spec: Spec) -> None:
@@ -136,7 +136,8 @@ def draw(analysis: Analysis) -> Figures:
     followed = analysis.cases
     if not followed:
         return {}
-    figure, panels = f.grid(len(followed), COLUMNS, (2.8, 2.1), (0.0, 1.0), 7.2, sharex=True)
+    columns = 2 if len(followed) == 4 else COLUMNS
+    figure, panels = f.grid(len(followed), columns, (2.8, 2.1), (0.0, 1.0), 7.2, sharex=True)
     seeds = {line.condition: line.seeds for line in analysis.table}
     for axes, (measured, training) in zip(panels.flat, followed, strict=False):
         for condition, curve in curves_of(measured, training).items():
