@@ -43,3 +43,27 @@ def test_the_table_of_simple_spread_is_that_of_the_rows() -> None:
     last = rows.query("decisions == 400000")
     compared = na.compare_table(last, score="return", seed="seed", reference="random")
     assert [d.p < 0.05 for d in compared.differences] == [True] * 4
+
+
+def test_the_table_of_arms_is_that_of_the_rows() -> None:
+    rows = pd.read_csv(ROWS / "arm-experience.csv").sort_values("seed")
+    page = (DOCS / "peers.md").read_text(encoding="utf-8")
+    for line in arm_lines(rows):
+        assert line in page
+    wide = rows.pivot(index=["decisions", "seed"], columns="condition", values="success")
+    ahead = wide["hierarchy-ppo, chain"] - wide["hierarchy-ppo, no edges"]
+    for decisions, text in ((400_000, ".01 [0, .02]"), (100_000, ".07 [.01, .17]")):
+        assert bracketed(na.bootstrap(ahead.loc[decisions].to_numpy())) == text
+
+
+def arm_lines(rows: pd.DataFrame) -> list[str]:
+    """Return the rows of the table, by shares of 25 evaluation episodes."""
+    lines = []
+    for condition, own in rows.groupby("condition"):
+        cells = []
+        for n in (1000, 10_000, 30_000, 100_000, 400_000):
+            shares = own[own["decisions"] == n]["success"].to_numpy()
+            solved = np.arange(25) < np.rint(25 * shares)[:, None]
+            cells.append(bracketed(na.rate(solved)) if len(shares) else "")
+        lines.append(f"| {condition} | {' | '.join(cells)} |")
+    return lines
