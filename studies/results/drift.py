@@ -4,8 +4,8 @@ The exponent is taken for a random walk in ``x = log n``, so that values deviate
 integrated Wiener process (Wahba 1978) that is zero at the smallest size. What it wanders by, sigma
 for a growth by a factor of e, is not known: predictions are averaged over it, weighted by the
 restricted likelihood of the sizes that were measured and by half a Cauchy distribution of scale
-`WANDER` (Gelman 2006). Sizes that meet a law exactly leave nothing to wander; three sizes tell little
-of it, and their predictions are wide.
+`WANDER` (Gelman 2006). Sizes that meet a law exactly leave nothing to wander; three sizes tell
+little of it, and their predictions are wide.
 """
 
 from __future__ import annotations
