@@ -61,12 +61,11 @@ def sql(number: int, rng: random.Random, folder: Path) -> Counter[str]:
             if became in ("silence", "traceback"):
                 print(f"  by: {shown}", file=sys.stderr)
             tally[became] += 1
-        if tally["edits"] % 4 == 0:
-            tally["runs"] += 1
-            became = mended(adversary, path)
-            if became != "run: equal":
-                print(f"  {became}, by: {shown}", file=sys.stderr)
-            tally[became] += 1
+        tally["runs"] += 1
+        became = mended(adversary, path)
+        if became != "run: equal":
+            print(f"  {became}, by: {shown}", file=sys.stderr)
+        tally[became] += 1
         tally["not trusted and run"] += PAYLOAD in sys.modules
         adversary.restore()
     return tally
@@ -98,7 +97,7 @@ def _statement(database: sqlite3.Connection, rng: random.Random) -> tuple[str, t
         (f'INSERT OR REPLACE INTO "{table}" VALUES ({held})', tuple(changed)),
         (f'DROP TABLE "{table}"', ()),
         (f'ALTER TABLE "{table}" RENAME COLUMN {one} TO "another"', ()),
-        (f'ALTER TABLE "{table}" ADD COLUMN "added" TEXT DEFAULT ?', ()),
+        (f'ALTER TABLE "{table}" ADD COLUMN "added" TEXT DEFAULT 1', ()),
         (f'ALTER TABLE "{table}" RENAME TO "another"', ()),
         (f'CREATE TRIGGER t AFTER INSERT ON "{table}" BEGIN DELETE FROM "{table}"; END', ()),
         (f"PRAGMA user_version = {rng.choice([0, 1, 99])}", ()),
@@ -112,7 +111,7 @@ def _statement(database: sqlite3.Connection, rng: random.Random) -> tuple[str, t
 def published(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Offer mutated files of results; return what became of them."""
     _offer_payload(folder)
-    adversary, tally = Adversary(folder, rng, ()), Counter[str]()
+    adversary, tally = Adversary(folder, rng), Counter[str]()
     path = folder / "results.json"
     sound = _published_text(adversary, folder)
     for _ in range(number):

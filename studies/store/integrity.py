@@ -17,7 +17,7 @@ from ..errors import SpecError
 from . import database
 from .checksums import study_checksum, trial_checksums
 from .connection import BESIDE, ILL, check_circumstance, open_copy, open_to_read
-from .database import OF_A_TRIAL, NoStudyError, insert
+from .database import OF_A_TRIAL, NoStudyError, insert, quote
 
 
 def is_orphaned(path: Path) -> bool:
@@ -98,11 +98,10 @@ def _fault_of_trials(db: sqlite3.Connection) -> str | None:
 
 
 _NOT_IN_LEDGER = " UNION ".join(
-    f"SELECT identity FROM (SELECT DISTINCT identity FROM {table}) "
-    "WHERE identity NOT IN (SELECT identity FROM checksums)"
+    f"SELECT * FROM (SELECT DISTINCT identity FROM {table} EXCEPT SELECT identity FROM checksums)"
     for table in ("trials", "episodes", "seconds", "numbers")
 )
-"""Selects the identities of rows that have no checksum."""
+"""Selects the identities of rows that have no checksum; NULL is one."""
 _NOT_PLANNED = "SELECT identity FROM checksums EXCEPT SELECT identity FROM planned"
 """Selects the identities of trials that are not of the study."""
 
@@ -178,18 +177,21 @@ def recover(damaged: Path, db: sqlite3.Connection) -> int:
         How many trials were copied; none if episodes have other measures now.
     """
     planned = {*_select(db, "SELECT identity FROM planned")}
+    queries = {}
+    for table in ("trials", *OF_A_TRIAL):
+        names = ", ".join(map(quote, _columns(db, table)))  # the damaged one may have more
+        queries[table] = f"SELECT {names} FROM {table} WHERE identity = ?"
     copied = 0
     with open_copy(damaged) as old:
-        for identity, checksum in _read_checksums(old, _columns(db)).items():
+        for identity, checksum in _read_checksums(old, _columns(db, "episodes")).items():
             if identity not in planned:
                 continue
             try:
                 if dict(trial_checksums(old, identity)) != {identity: checksum}:
                     continue
-                query = "SELECT * FROM {} WHERE identity = ?"
                 tables = {
-                    table: old.execute(query.format(table), (identity,)).fetchall()
-                    for table in ("trials", *OF_A_TRIAL)
+                    table: old.execute(query, (identity,)).fetchall()
+                    for table, query in queries.items()
                 }
             except (sqlite3.Error, *ILL):
                 continue
@@ -208,12 +210,12 @@ def _read_checksums(old: sqlite3.Connection, columns: list[str]) -> dict[str, st
     with suppress(sqlite3.Error, *ILL):
         # A table that it cannot understand is passed over.
         old.execute("PRAGMA writable_schema = ON")
-        if _columns(old) != columns:
+        if _columns(old, "episodes") != columns:
             return {}
         for identity, checksum in old.execute("SELECT identity, sha256 FROM checksums"):
             checksums.setdefault(identity, checksum)
     return checksums
 
 
-def _columns(db: sqlite3.Connection) -> list[str]:
-    return [name for _, name, *_ in db.execute("PRAGMA table_info(episodes)")]
+def _columns(db: sqlite3.Connection, table: str) -> list[str]:
+    return [name for _, name, *_ in db.execute(f"PRAGMA table_info({table})")]

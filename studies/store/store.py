@@ -401,7 +401,9 @@ class Store:
         database.insert(self._db, table, rows)
 
     def _note(self, trial: Planned, state: str, error: str | None, digest: str | None) -> None:
-        self._db.execute("DELETE FROM trials WHERE identity = ?", (trial.identity,))
+        # By table: what is left of a trial whose row is gone hangs on nothing.
+        for table in ("trials", *database.OF_A_TRIAL):
+            self._db.execute(f"DELETE FROM {table} WHERE identity = ?", (trial.identity,))
         row = (trial.identity, trial.condition, trial.seed, state, error, digest, self._code)
         self._insert("trials", [row])
 

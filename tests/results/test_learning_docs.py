@@ -27,6 +27,8 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
     [
         ("learning-curve", COLUMNS),
         ("tasks", COLUMNS),
+        ("tasks-written", COLUMNS),
+        ("hand-written", ("evaluation success", "all touch")),
         ("told", COLUMNS),
         ("scaling", ("evaluation success", "all touch")),
         ("crowds", ("evaluation success", "all touch")),

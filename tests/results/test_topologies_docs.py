@@ -22,8 +22,15 @@ from nested_agents.studies.store.database import EVALUATION
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "edges.md"
 
 
-def test_the_table_of_hierarchies(capsys: pytest.CaptureFixture[str]) -> None:
-    table = print_table("hierarchies", ("evaluation success", "messages"), capsys)
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("hierarchies", ("evaluation success", "messages")),
+        ("own-relation", ("evaluation success", "decisions to goal", "messages")),
+    ],
+)
+def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    table = print_table(name, columns, capsys)
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: put in\n{table}"
 
 
@@ -148,7 +155,7 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
 def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
     for name in names:
         for group in contrasts(na.load(ROWS / f"{name}.json").results, by="topology").groups:
-            rates = [line.estimates["success"].value for line in group.table]
+            rates = [line.estimates["evaluation success"].value for line in group.table]
             learner, orders, verdict, ends = re.findall(
                 r"(.+), (\d+) orders, within 0.1: (.+) (\[.+\])", equivalence(group)
             )[0]
@@ -167,7 +174,7 @@ def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
         order = re.findall(r"agent(\d)", own.condition) or "12345678"
         order = order[::-1] if own.condition.endswith("reversed") else order
         heard = sum(abs(int(a) - int(b)) == 1 for a, b in pairwise(order))
-        rates = [bracketed(line.estimates["success"]) for line in (own, other)]
+        rates = [bracketed(line.estimates["evaluation success"]) for line in (own, other)]
         line = f"| {' '.join(order)} | {heard} | {' | '.join(rates)} |"
         assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
 

@@ -126,14 +126,14 @@ def to_the_goal(success: Array, steps: Array) -> Array:
 
 
 def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
-    """Draw success and time of a decision of one size, a row for every hierarchy."""
+    """Draw success and messages of a decision of one size, a row for every hierarchy."""
     from ...presentation import figures
 
     rows = distinct(case.hierarchy for case in cases)
     whose = distinct(case.value_of for case in cases)
     offsets = figures.beside(len(whose))
     figure, panels = figures.panels(1, 2, (7.2, 1.3 + 0.36 * len(rows)), sharey=True)
-    for axes, title in zip(panels[0], (EVALUATED, DECIDING), strict=True):
+    for axes, title in zip(panels[0], (EVALUATED, "messages"), strict=True):
         for case in cases:
             i = whose.index(case.value_of)
             row = rows.index(case.hierarchy) + offsets[i]
@@ -144,7 +144,6 @@ def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
         axes.set_xlabel(title)
         axes.grid(axis="x", alpha=0.25)
     figures.as_rates(panels[0, 0], "x")
-    figures.log_axis(panels[0, 1], "x")
     figures.name_rows(panels[0, 0], rows)
     if len(whose) > 1:
         names = [f"value of: {value_of}" for value_of in whose]
@@ -155,8 +154,8 @@ def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: success and time of a decision by number of robots.
 
-    Of one size it is a chart with a row for each hierarchy. Otherwise there is a column of panels
-    for each choice of whose value decides. Points are means over seeds,
+    Of one size it is a chart of success and messages, with a row for each hierarchy. Otherwise
+    there is a column of panels for each choice of whose value decides. Points are means over seeds,
     bars their 95 % intervals; hierarchies differ by colour and marker, and stand a little beside
     each other.
     """

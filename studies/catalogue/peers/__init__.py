@@ -1,9 +1,9 @@
 """The peers study: how ours compares with learners of other libraries, and with planners.
 
 Training stops at some shares of its episodes, `CHECKPOINTS`, for an evaluation without exploration,
-on the same worlds every time. Success stands against the decisions experienced until then, and
-against the CPU seconds that training took, physics included, evaluations not. The first condition
-is compared with all others at the end, paired by seed.
+on the same worlds every time. Success stands against the decisions experienced until then. The CPU
+seconds that training took, physics included, evaluations not, are a column. The first condition is
+compared with all others at the end, paired by seed.
 """
 
 from time import process_time
@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, judged
-from ...results.notation import two_figures
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stack_estimates
 from ...trials.session import Session
@@ -62,8 +61,6 @@ class LearningCourse(NamedTuple):
     """Its label."""
     decisions: Array
     """``(k,)`` decisions experienced until each evaluation, means over seeds."""
-    seconds: Array
-    """``(k,)`` CPU seconds spent until each evaluation, means over seeds."""
     success: Estimate
     """The evaluations' success rates ``(k,)``."""
 
@@ -91,12 +88,10 @@ def analyse(results: Results) -> Analysis:
         table.append(Summary(condition, len(steps), estimates))
         success[episodes] = estimates[EVALUATED]
         decisions = [steps[:, :count].sum(axis=1).mean() for count in success]
-        seconds = [np.mean(numbers.get(f"{CPU}{count}", np.nan)) for count in success]
         courses.append(
             LearningCourse(
                 condition,
                 np.array(decisions),
-                np.array(seconds),
                 stack_estimates([*success.values()]),
             )
         )
@@ -113,7 +108,7 @@ def draw(analysis: Analysis) -> Figures:
     """Return the figure: evaluation success against experience, a panel for each condition.
 
     The condition's line has a colour, and a band for its 95 % intervals; those of the others are
-    grey. Beside its name stands the CPU time of training.
+    grey.
     """
     from matplotlib.ticker import LogLocator
 
@@ -126,16 +121,13 @@ def draw(analysis: Analysis) -> Figures:
             axes.plot(other.decisions, other.success.value, color="#c9ccd2", lw=0.8)
         f.draw_curve(axes, own.decisions, own.success, 0, alpha=0.15, marker="o", markersize=3.5)
         axes.set_title(own.condition, loc="left", fontsize=8)
-        if np.isfinite(own.seconds[-1]):
-            text = f"{two_figures(float(own.seconds[-1]))} s"
-            axes.set_title(text, loc="right", fontsize=7, color="#666666")
         f.log_axis(axes, "x")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
     for axes in panels.flat[len(courses) - panels.shape[1] : len(courses)]:
         axes.tick_params(labelbottom=True)
-    figure.supxlabel("decisions of training; right of a name: CPU time of training", fontsize=9)
+    figure.supxlabel("decisions of training", fontsize=9)
     figure.supylabel(EVALUATED, fontsize=9)
     return {"peers": figure}
 

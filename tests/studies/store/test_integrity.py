@@ -17,7 +17,7 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import integrity
 from nested_agents.studies.store.checksums import trial_checksums
-from nested_agents.studies.store.database import DATABASE, SPEC_FILE
+from nested_agents.studies.store.database import DATABASE, OF_A_TRIAL, SPEC_FILE
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.store.writer import lock_directory
 from nested_agents.studies.trials.keeping import notes_of, pending
@@ -74,6 +74,7 @@ def test_what_is_sound_is_left_alone(study, sound):
         "UPDATE trials SET seed = 7 WHERE identity = ?",
         "UPDATE checksums SET sha256 = 'x' WHERE identity = ?",
         "DELETE FROM episodes WHERE identity = ? AND episode = 1",
+        "DELETE FROM trials WHERE identity = ?",
     ],
 )
 def test_a_changed_row_is_named_and_its_trial_alone_runs_again(study, sound, statement, capsys):
@@ -361,6 +362,26 @@ def test_rows_that_no_run_wrote_are_told_and_never_counted(study, sound, tables,
     assert ran == 0
     assert f"no run wrote: {name}; kept as {DATABASE}.damaged-1, 6 trials taken over" in note
     assert content(study) == content(sound)
+
+
+@pytest.mark.parametrize("table", ["trials", *OF_A_TRIAL])
+@pytest.mark.parametrize(
+    "edit",
+    [
+        "DELETE FROM {}",
+        "DELETE FROM {} WHERE identity = (SELECT max(identity) FROM {})",
+        "ALTER TABLE {} ADD COLUMN added TEXT",
+        "UPDATE OR IGNORE {} SET identity = NULL",
+    ],
+)
+def test_one_run_mends_what_was_edited(study, sound, table, edit):
+    try:
+        change(study, edit.replace("{}", table))
+    except sqlite3.Error:
+        pytest.skip("the table does not take it")
+    finish(study)
+    assert content(study) == content(sound)
+    assert finish(study) == ([], 0)
 
 
 def test_a_trial_that_is_not_planned_is_told_and_not_taken_over(study, sound):
