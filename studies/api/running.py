@@ -22,6 +22,7 @@ from ..spec.spec import Spec
 from ..store.database import CHECKPOINTS
 from ..store.store import Store
 from ..trials.arrangement import check_conditions
+from ..trials.checkpoints import sweep
 from ..trials.keeping import open_to_run, pending
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer, Outcome, run_trials, versions
@@ -105,7 +106,8 @@ def run_study(
         if retry_failed:
             store.forget_failed()
         if checkpoint:
-            spec.sources.checkpoints = stack.enter_context(_checkpoints(directory, checkpoint))
+            kept = _checkpoints(directory, checkpoint, observer)
+            spec.sources.checkpoints = stack.enter_context(kept)
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
         with spec.sources.active():
@@ -132,13 +134,13 @@ def run_study(
 
 
 @contextmanager
-def _checkpoints(directory: Path, seconds: float) -> Iterator[Checkpoints]:
+def _checkpoints(directory: Path, seconds: float, observer: Observer) -> Iterator[Checkpoints]:
     """Make a folder for checkpoints of trials, and remove it in the end if none is left."""
     folder = directory.resolve() / CHECKPOINTS
     with suppress(OSError):  # trials go on without
         folder.mkdir(exist_ok=True)
-        for half_written in folder.glob(".*.new"):
-            half_written.unlink()
+        for remark in sweep(folder):
+            observer.note(remark)
     code = json.dumps([fingerprint(present()), versions()])
     try:
         yield Checkpoints(folder, seconds, code)

@@ -278,6 +278,9 @@ class Spec(Settings):
         spec._conditions = grid(
             spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations, spec.curriculum
         )
+        if spec.decisions is not None and [c.label for c in spec._conditions] == ["default"]:
+            (only,) = spec._conditions  # its learner says more, and no kept study has this yet
+            spec._conditions = (only._replace(label=only.settings.learner.kind),)
         tables = [table for condition in spec._conditions for table in condition.tables]
         names = dict(mentions([{"study": spec.study}, *tables]))
         for name, key in names.items():

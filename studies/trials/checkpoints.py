@@ -2,8 +2,8 @@
 
 A file per trial in the folder of the study, replaced every few minutes and at evaluations on the
 way, gone when its trial is kept. It holds arrays of numbers and a table of JSON, behind a digest of
-both. What is damaged, of another trial, or of other code is as if it were not there. A trial that
-goes on has the rows that it would have had, bit by bit.
+both. What is damaged, of another trial, or of other code is as if it were not there; damage is
+remarked when a study is run. A trial that goes on has the rows that it would have had, bit by bit.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import hashlib
 import io
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -97,11 +97,10 @@ class Checkpoint:
         if self._place is None:
             return None
         try:
-            content = read_bytes(self._place.file(self._identity))
-            digest = content[:DIGEST].decode()
-            if hashlib.sha256(content[DIGEST:]).hexdigest() != digest:
+            content = _content(self._place.file(self._identity))
+            if content is None:
                 return None
-            with np.load(io.BytesIO(content[DIGEST:]), allow_pickle=False) as file:
+            with np.load(io.BytesIO(content), allow_pickle=False) as file:
                 arrays = dict(file)
             table = json.loads(arrays.pop(TABLE).tobytes())
             if (table["identity"], table["code"]) != (self._identity, self._place.code):
@@ -132,6 +131,23 @@ def place(trial: Trial) -> Checkpoints | None:
     if known is None or not is_built_in or any(n.endswith(".py") for n in trial.sources.texts):
         return None
     return known
+
+
+def sweep(folder: Path) -> Iterator[str]:
+    """Remove what is half-written and what is damaged, and yield a remark on each of the latter."""
+    for half_written in folder.glob(".*.new"):
+        half_written.unlink()
+    for file in sorted(folder.glob("*.npz")):
+        if _content(file) is None:
+            file.unlink()
+            yield f"{file}: is damaged, its trial begins anew"
+
+
+def _content(path: Path) -> bytes | None:
+    """Return the arrays in a file as bytes; None if their digest is another one."""
+    content = read_bytes(path)
+    digest = hashlib.sha256(content[DIGEST:]).hexdigest().encode()
+    return content[DIGEST:] if content[:DIGEST] == digest else None
 
 
 def _write(path: Path, arrays: Recording) -> None:

@@ -36,6 +36,11 @@ def test_a_trial_is_the_same_again_and_evaluates_on_the_way():
     assert [row.episode for row in trained] == list(range(12))
 
 
+def test_a_single_condition_is_called_as_its_learner():
+    tables = (TABLE, {**TABLE, "preset": "paper"})
+    assert [Spec.of(table).conditions()[0].label for table in tables] == ["hierarchy-ppo", "paper"]
+
+
 def test_worlds_by_a_loop_and_learners_in_one_world_keep_the_budget():
     looped = {**TABLE, "scenario": {"kind": "line-up"}, "agents": "team", "decisions": 200}
     assert measure(trials_of(Spec.of(looped))[0]).numbers == {"decisions": 200.0}

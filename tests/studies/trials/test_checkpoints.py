@@ -16,8 +16,10 @@ from nested_agents.studies.api.status import Status
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.tables import dumps
+from nested_agents.studies.store.database import CHECKPOINTS
 from nested_agents.studies.trials.checkpoints import Checkpoint
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.workers.runner import Observer
 
 PPO = {"worlds": 4, "rollout": 20, "batch_size": 60, "epochs": 1, "hidden": [8]}
 MANY = {"study": "experience", "seeds": 1, "decisions": 2400, "steps": 25, "evaluation": 2}
@@ -46,6 +48,16 @@ TABLES = {
         "curriculum": [{"name": "easy", "episodes": 2, "scenario": {"start": "easy"}}],
     },
 }  # fmt: skip
+
+
+class Notes(Observer):
+    """Keeps what is noted."""
+
+    def __init__(self):
+        self.notes = []
+
+    def note(self, text):
+        self.notes.append(text)
 
 
 class Killed(BaseException):
@@ -122,6 +134,20 @@ def test_a_damaged_checkpoint_is_as_if_it_were_not_there(spoil, tmp_path, monkey
     file.write_bytes(spoil(file.read_bytes()))
     assert Checkpoint(trial).read() is None
     assert measured(trial) == straight
+
+
+def test_damage_is_remarked_once_and_the_trial_begins_anew(tmp_path):
+    (trial,) = trials_of(Spec.of(TABLES["ours"]))
+    observer = Notes()
+    folder = tmp_path / CHECKPOINTS
+    folder.mkdir()
+    (folder / f"{trial.identity}.npz").write_bytes(b"0" * 100)
+    (folder / ".half.npz.new").write_bytes(b"")
+    na.run(TABLES["ours"], tmp_path, jobs=1, observer=observer)
+    assert [note for note in observer.notes if "damaged" in note] == [
+        f"{folder / trial.identity}.npz: is damaged, its trial begins anew"
+    ]
+    assert not folder.exists()
 
 
 def test_that_of_other_code_or_of_another_trial_is_not_taken(tmp_path, monkeypatch):
