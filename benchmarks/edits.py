@@ -111,7 +111,7 @@ def _statement(database: sqlite3.Connection, rng: random.Random) -> tuple[str, t
 def published(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Offer mutated files of results; return what became of them."""
     _offer_payload(folder)
-    adversary, tally = Adversary(folder, rng, ()), Counter[str]()
+    adversary, tally = Adversary(folder, rng), Counter[str]()
     path = folder / "results.json"
     sound = _published_text(adversary, folder)
     for _ in range(number):

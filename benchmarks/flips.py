@@ -32,7 +32,7 @@ def flips(number: int, rng: random.Random, folder: Path) -> Counter[str]:
 
 def every_byte(rng: random.Random, folder: Path) -> Counter[str]:
     """Flip a bit in every byte of the database, one after the other, and read the study."""
-    adversary, tally = Adversary(folder, rng), Counter[str]()
+    adversary, tally = Adversary(folder, rng, LINES), Counter[str]()
     path = adversary.study / DATABASE
     sound = path.read_bytes()
     for at in range(len(sound)):
@@ -49,7 +49,7 @@ def every_byte(rng: random.Random, folder: Path) -> Counter[str]:
 def obstacles(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Put folders in place of files, and cut files short; return what happened."""
     without_figures()
-    adversary, tally = Adversary(folder, rng), Counter[str]()
+    adversary, tally = Adversary(folder, rng, LINES), Counter[str]()
     harms: list[tuple[Path, int | None]] = [
         (adversary.study / name, None)
         for name in (LOCK, DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm")

@@ -10,6 +10,7 @@ import signal
 import sys
 import time
 from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -105,11 +106,11 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
         for trial in adversary.trials[5:]:
             save(store, trial, adversary.result(trial), 1.0)
     with inline(adversary.repeat):
-        whole = {name: _undisturbed(name, adversary, folder) for name in OTHERS}
+        undisturbed = cache(lambda name: _undisturbed(name, adversary, folder))
         while tally["kills"] < number:
-            name = rng.choice([*whole])
+            name = rng.choice([*OTHERS])
             tally["kills"] += 1
-            tally[f"{name}: {_killed(name, whole[name], adversary, folder)}"] += 1
+            tally[f"{name}: {_killed(name, undisturbed(name), adversary, folder)}"] += 1
     return tally
 
 

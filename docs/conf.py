@@ -14,6 +14,8 @@ import diagrams  # noqa: E402
 import reference  # noqa: E402
 from docutils import nodes  # noqa: E402
 
+from nested_agents.studies.results.notation import whole  # noqa: E402
+
 reference.write(HERE / "reference")
 archive.write(HERE / "reference" / "archive.md")
 diagrams.draw(HERE / "diagrams")
@@ -76,18 +78,22 @@ def skip_signatures_of_c(app, what, name, thing, skip, options):
     return True if isinstance(thing, GenericAlias | BuiltinFunctionType) else None
 
 
-def keep_intervals_whole(app, doctree):
-    """Keep a short interval of a table in one line, and a count and its total."""
-    for entry in doctree.findall(nodes.entry):
-        for text in [*entry.findall(nodes.Text)]:
+INTERVAL = r"(\[[^],]+,) ([^]]+\])"
+
+
+def keep_numbers_whole(app, doctree):
+    """Keep an estimate and its interval in one line; in tables the interval."""
+    for paragraph in doctree.findall(nodes.paragraph):
+        in_table = isinstance(paragraph.parent, nodes.entry)
+        for text in [*paragraph.findall(nodes.Text)]:
             if not isinstance(text.parent, nodes.literal):
-                whole = re.sub(r"\[([-.]?\S{1,3}), ([-.]?\S{1,3})\]", "[\\1,\u00a0\\2]", text)
-                whole = re.sub(r"^(\d+) of (\d+)$", "\\1\u00a0of\u00a0\\2", whole)
-                text.parent.replace(text, nodes.Text(whole))
+                kept = re.sub(INTERVAL, "\\1\u00a0\\2", text) if in_table else whole(text)
+                kept = re.sub(r"^(\d+) of (\d+)$", "\\1\u00a0of\u00a0\\2", kept)
+                text.parent.replace(text, nodes.Text(kept))
 
 
 def setup(app):
     """Connect what is above."""
-    app.connect("doctree-read", keep_intervals_whole)
+    app.connect("doctree-read", keep_numbers_whole)
     app.connect("autodoc-process-docstring", escape_bars)
     app.connect("autodoc-skip-member", skip_signatures_of_c)

@@ -63,9 +63,9 @@ PUBLISHED = {
 condition is not one of them."""
 CONTROLS = (*LEARN_NOTHING, "random")
 ALREADY = "published"
-"""The task whose rows are those, and their source."""
-NEW = "new"
-"""The source of the rows of all other tasks."""
+"""The task whose rows are those."""
+SEEN = (ALREADY, "signals")
+"""Tasks on whose rows the way of predicting was chosen."""
 QUALITIES = {
     "signals": {"right": 1, "success": 1},
     "games": {"share_of_best": 1},
@@ -155,7 +155,7 @@ def trial_rows(results: Results, teams: Mapping[str, TeamKind]) -> pd.DataFrame:
 
 
 def read_rows(folder: Path = COMMITTED) -> pd.DataFrame:
-    """Return the rows of all tasks in a folder, with their source.
+    """Return the rows of all tasks in a folder, with the file as their source.
 
     Raises
     ------
@@ -165,9 +165,7 @@ def read_rows(folder: Path = COMMITTED) -> pd.DataFrame:
     files = sorted(folder.glob("*.parquet"))
     if not files:
         raise SpecError(f"{folder}: holds no rows of the atlas, TASK.parquet")
-    frames = [
-        read_table(path).assign(source=ALREADY if path.stem == ALREADY else NEW) for path in files
-    ]
+    frames = [read_table(path).assign(source=path.stem) for path in files]
     rows = pd.concat(frames, ignore_index=True)
     return rows.assign(loss=-rows["return"]) if "return" in rows else rows
 

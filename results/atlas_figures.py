@@ -76,7 +76,7 @@ def draw_checks(checked: Sequence[Check]) -> Figure:
         axes.scatter(places, known.value, c=colours, s=12)
         axes.axhline(1.0, color="#888888", lw=0.8, ls=":")
         figures.log_axis(axes)
-        axes.set_xticks(places, [str(check.size) for check in own], fontsize=6)
+        axes.set_xticks(places, [str(check.size) for check in own], fontsize=6, rotation=90)
         axes.set_title(MEASURES[name], loc="left")
     figure.supylabel("predicted / measured", fontsize=8)
     figure.supxlabel("number of agents; red: outside the 90 % interval", fontsize=8)

@@ -133,7 +133,7 @@ def _choices(
         best, second = str(order.index[-1]), str(order.index[-2])
         apart = (at[best] - at[second]).to_numpy(dtype=float)
         p = float(stats.ttest_1samp(apart, 0.0).pvalue) if np.ptp(apart) > 0.0 else 1.0
-        predicted = max(fitted, key=lambda h: sign * fitted[h].distribution(size)[0])
+        predicted = max(fitted, key=lambda h: sign * fitted[h].distribution(size).quantile(0.5))
         rivals = [
             h for h in fitted if h != predicted and not _is_above(fitted, predicted, h, size, sign)
         ]

@@ -110,7 +110,7 @@ def atlas(
     Laws are fitted to teams of at most 16 agents, and of at most 8, and larger ones of the same
     rows are predicted. Without --out the rows are the committed ones.
     """
-    from .atlas import ALREADY, COMMITTED, read_rows, run_tasks
+    from .atlas import ALREADY, COMMITTED, SEEN, read_rows, run_tasks
     from .atlas_faults import fault_costs, thresholds
     from .atlas_predictions import SMALL, checks, choices, coverage, shares_right
 
@@ -119,14 +119,20 @@ def atlas(
     folder = run_tasks(out, jobs, tasks) if out is not None else rows or COMMITTED
     frame = read_rows(folder)
     print_text(f"{len(frame):,} trials of {frame.groupby(TEAM_AND_SIZE).ngroups} conditions")
-    for source, own in frame.groupby("source"):
-        is_known = source == ALREADY
-        print_text("", "Of published studies" if is_known else "Of tasks run after the rule")
-        for most in (SMALL, SMALL // 2) if is_known else (SMALL,):
-            print_text("", f"From at most {most} agents: larger teams in 90 % intervals")
-            print_lines(coverage(checks(own, most)))
-            chosen = choices(own, most)
-            print_lines([*shares_right(chosen), *map(str, chosen)])
+    seen = frame["source"].isin(SEEN)
+    groups = {
+        "Tasks looked at after the rule": (frame[~seen], SMALL),
+        "Signals, on which it was chosen": (frame[seen & (frame["source"] != ALREADY)], SMALL),
+        "Published studies, on which it was chosen": (frame[frame["source"] == ALREADY], SMALL),
+        "Published studies, of half the size": (frame[frame["source"] == ALREADY], SMALL // 2),
+    }
+    for title, (own, most) in groups.items():
+        if own.empty:
+            continue
+        print_text("", f"{title}: teams larger than {most} in 90 % intervals")
+        print_lines(coverage(checks(own, most)))
+        chosen = choices(own, most)
+        print_lines([*shares_right(chosen), *map(str, chosen)])
         costs = fault_costs(own)
         if costs:
             print_text("", "What faults cost")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import pickle
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from importlib import import_module
 from io import BytesIO
@@ -51,31 +51,49 @@ class PickledCopies(Copies):
 
     def __init__(self, simulator: Simulator) -> None:
         self._layers = list(_layers(simulator))
-        self._kept: dict[int, object] = {id(layer): layer for layer in self._layers}
         file = BytesIO()
-        pickler: Any = pickle.Pickler(file, pickle.HIGHEST_PROTOCOL)
-        pickler.persistent_id = self._identity
+        saver = _Saver(file, self._layers)
         # Attribute by attribute: many environments (EzPickle) would be made anew.
-        pickler.dump([vars(layer) for layer in self._layers])
+        saver.dump([vars(layer) for layer in self._layers])
+        self._shared = saver.kept
         self._saved = file.getvalue()
-
-    def _identity(self, value: object) -> int | None:
-        """Return the identity of what copies have in common, and of the layers themselves."""
-        if id(value) not in self._kept:
-            if not _is_shared(value):
-                return None
-            self._kept[id(value)] = value
-        return id(value)
 
     @contextmanager
     def lane(self) -> Iterator[Simulator]:
         """Return a copy."""
         copies: dict[int, Any] = {id(layer): object.__new__(type(layer)) for layer in self._layers}
-        unpickler: Any = pickle.Unpickler(BytesIO(self._saved))
-        unpickler.persistent_load = {**self._kept, **copies}.__getitem__
-        for layer, attributes in zip(copies.values(), unpickler.load(), strict=True):
+        loader = _Loader(BytesIO(self._saved), self._shared | copies)
+        for layer, attributes in zip(copies.values(), loader.load(), strict=True):
             vars(layer).update(attributes)
         yield copies[id(self._layers[0])]
+
+
+class _Saver(pickle.Pickler):
+    """Saves, of what copies have in common and of the layers themselves, the identity only."""
+
+    def __init__(self, file: BytesIO, layers: Iterable[object]) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self.kept: dict[int, object] = {id(layer): layer for layer in layers}
+
+    def persistent_id(self, value: object, /) -> int | None:
+        """Return the identity of a value of which no copy is made; None of others."""
+        if id(value) not in self.kept:
+            if not _is_shared(value):
+                return None
+            self.kept[id(value)] = value
+        return id(value)
+
+
+class _Loader(pickle.Unpickler):
+    """Loads what a `_Saver` has saved."""
+
+    def __init__(self, file: BytesIO, kept: Mapping[int, object]) -> None:
+        super().__init__(file)
+        self._kept = kept
+
+    def persistent_load(self, identity: int, /) -> object:
+        """Return the value of an identity."""
+        return self._kept[identity]
 
 
 class SavedMujoco(Copies):

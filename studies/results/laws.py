@@ -12,11 +12,10 @@ Seeds are the unit of sampling, and all sizes of a seed are resampled together. 
 decided by sizes that are left out: each of the largest third is predicted from those below it. A
 simpler law stands unless another one predicts them better by more than `MARGIN`.
 
-A prediction of the mean of new seeds has the variance of the fit, of so many seeds, and of sizes
-about the law: what is left where sizes deviate by more than seeds explain. Seeds do not show what
-these deviations do to the law itself: that is their leverage on the size which is predicted. Its
-degrees of freedom are Satterthwaite's (1946). Values that a run did not live to see (*censored*)
-are only known to be larger than the last seen, and enter the likelihood so (Tobin 1958).
+A prediction of the mean of new seeds has the variance of the fit, of so many seeds, and of a law
+that does not go on as it did, see `drift`. Degrees of freedom of the first two are Satterthwaite's
+(1946). Values that a run did not live to see (*censored*) are only known to be larger than the last
+seen, and enter the likelihood so (Tobin 1958).
 """
 
 from __future__ import annotations
@@ -27,7 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.numerics import BoolArray, optimize, special, stats
+from ...core.numerics import BoolArray, optimize, special
+from .drift import Drift, Mixture, drift
 from .statistics import Array, Estimate
 
 RESAMPLES = 400
@@ -42,6 +42,8 @@ LEAST = 2.0
 """The smallest size of a law that is linear to quadratic, as pairs of agents are: n (n - 1)."""
 FLAT = 1e-9
 """Where so little is left of the variance of seeds, it is taken for rounding."""
+MOST_FREEDOM = 1e6
+"""Degrees of freedom of what is as good as normal."""
 
 
 class Curve(NamedTuple):
@@ -186,8 +188,10 @@ class Law(NamedTuple):
     """``(RESAMPLES, k)`` parameters of resampled seeds."""
     noise: float
     """Variance of seeds at a size, on the scale."""
-    misfit: float
-    """Variance of sizes about the law, beyond that of seeds."""
+    left: Array
+    """What means of seeds deviate by from the law ``(m,)``, on the scale."""
+    scatter: float
+    """Variance of a seed at a size, beyond what it has at all."""
     held_out: tuple[tuple[float, float, Estimate], ...] = ()
     """Of each size that was left out: size, what was measured, its 90 % prediction."""
 
@@ -216,31 +220,34 @@ class Law(NamedTuple):
 
         Of numbers it is the geometric mean.
         """
-        value, variance, freedom = self.distribution(size, seeds)
-        half = float(special.stdtrit(freedom, 0.5 + level / 2.0)) * math.sqrt(variance)
+        known = self.distribution(size, seeds)
         back = self.sample.scale.back
-        ends = (value, value - half, value + half)
-        return Estimate(*(np.asarray(back(np.asarray(end))) for end in ends))
+        shares = (0.5, 0.5 - level / 2.0, 0.5 + level / 2.0)
+        return Estimate(*(np.asarray(back(np.asarray(known.quantile(p)))) for p in shares))
 
-    def distribution(self, size: float, seeds: int | None = None) -> tuple[float, float, float]:
-        """Return mean, variance and degrees of freedom of a prediction, on the scale."""
+    def distribution(self, size: float, seeds: int | None = None) -> Mixture:
+        """Return the distribution of a prediction, on the scale."""
         x = np.log([size])
         m = len(self.sample.sizes)
         parts = [
             (self._spread(self._resampled_at(x)) ** 2, self.seeds - 1.0),
             (self.noise / (seeds or self.seeds), (self.seeds - 1.0) * m),
-            self._deviation(x),
         ]
-        return float(self.curve.of(self.parameters, x)[0]), *_sum(parts)
+        left = self._drift(x)
+        value = float(self.curve.of(self.parameters, x)[0])
+        return _mixed(left.weights, value + left.shifts, left.variances, parts)
 
     def _resampled_at(self, x: Array) -> Array:
         """Return the laws of resampled seeds ``(RESAMPLES,)`` at ``x`` ``(1,)``."""
         return np.array([self.curve.of(p, x)[0] for p in self.resampled])
 
-    def _deviation(self, x: Array) -> tuple[float, float]:
-        """Return variance and freedom of what sizes deviate from the law, at ``x`` ``(1,)``."""
-        spare = max(1.0, float(len(self.sample.sizes) - self.curve.n_parameters))
-        return self.misfit * (1.0 + self._leverage(x)), spare
+    def _drift(self, x: Array) -> Drift:
+        """Return how far the law may be left at ``x`` ``(1,)``."""
+        fitted = np.log(self.sample.sizes)
+        slopes = self._slopes(np.append(fitted, x))
+        return drift(
+            fitted, float(x[0]), self.left, slopes[:-1], slopes[-1], self.scatter / self.seeds
+        )
 
     def less(self, base: Law, size: float, level: float = 0.9) -> Estimate:
         """Return by how much new means lie above those of another law at a size, on the scale.
@@ -257,20 +264,16 @@ class Law(NamedTuple):
         parts = [
             (self._spread(self._resampled_at(x) - base._resampled_at(x)) ** 2, self.seeds - 1.0),
             (noise / self.seeds, (self.seeds - 1.0) * len(both)),
-            self._deviation(x),
-            base._deviation(x),
         ]
-        variance, freedom = _sum(parts)
-        half = float(special.stdtrit(freedom, 0.5 + level / 2.0)) * math.sqrt(variance)
-        return Estimate(*map(np.asarray, (value, value - half, value + half)))
-
-    def _leverage(self, x: Array) -> float:
-        """Return how far deviations of the fitted sizes carry to one ``(1,)``: j (J'J)^-1 j'."""
-        if self.misfit == 0.0:
-            return 0.0
-        fitted = self._slopes(np.log(self.sample.sizes))
-        there = self._slopes(x)
-        return float((there @ np.linalg.pinv(fitted.T @ fitted) @ there.T)[0, 0])
+        one, other = self._drift(x), base._drift(x)
+        known = _mixed(
+            np.outer(one.weights, other.weights).ravel(),
+            value + np.subtract.outer(one.shifts, other.shifts).ravel(),
+            np.add.outer(one.variances, other.variances).ravel(),
+            parts,
+        )
+        shares = (0.5, 0.5 - level / 2.0, 0.5 + level / 2.0)
+        return Estimate(*(np.asarray(known.quantile(p)) for p in shares))
 
     def _slopes(self, x: Array) -> Array:
         """Return the derivatives ``(m, k)`` of the law at ``x`` by its parameters."""
@@ -282,12 +285,16 @@ class Law(NamedTuple):
         return self.sample.scale.back(self.curve.of(self.parameters, np.log(sizes)))
 
 
-def _sum(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return the sum of variances and its degrees of freedom (Satterthwaite 1946)."""
-    variance = sum(part for part, _ in parts)
-    if variance <= FLAT**2:
-        return FLAT**2, min(freedom for _, freedom in parts)
-    return variance, variance**2 / sum(part**2 / freedom for part, freedom in parts)
+def _mixed(
+    weights: Array, means: Array, variances: Array, parts: Sequence[tuple[float, float]]
+) -> Mixture:
+    """Return a mixture of what varies in itself and by `parts`, each a variance and its freedom.
+
+    Degrees of freedom of sums are Satterthwaite's (1946).
+    """
+    total = variances + sum(part for part, _ in parts) + FLAT**2
+    lack = sum(part**2 / freedom for part, freedom in parts)
+    return Mixture(weights, means, total, np.minimum(total**2 / (lack + FLAT**6), MOST_FREEDOM))
 
 
 def fit(curve: Curve, sample: Sample, resamples: int = RESAMPLES) -> Law:
@@ -302,17 +309,21 @@ def fit(curve: Curve, sample: Sample, resamples: int = RESAMPLES) -> Law:
     else:
         each = [(values[r], sample.censored[r]) for r in drawn]
         resampled = np.array([_fitted(curve, x, *own, [parameters]) for own in each])
-    left = values - curve.of(parameters, x)
+    at = curve.of(parameters, x)
+    left = values - at
     seen = ~sample.censored
     if seen.all():
         noise = float(values.var(axis=0, ddof=1).mean())
-        spare = m - curve.n_parameters
-        of_sizes = float((left.mean(axis=0) ** 2).sum()) / spare if spare > 0 else 0.0
-        misfit = max(0.0, of_sizes - noise / n_seeds)
+        own = left - left.mean(axis=1, keepdims=True)
+        scatter = min(noise, float(own.var(axis=0, ddof=1).mean()) * m / (m - 1.0))
     else:
         noise = float((left[seen] ** 2).mean())
-        misfit = 0.0
-    return Law(curve, sample, parameters, resampled, noise, misfit)
+        scatter = noise
+        deviation = math.sqrt(noise)
+        z = left[~seen] / deviation  # means of what lies beyond, as the law has it
+        hazard = np.exp(-0.5 * z**2 - 0.5 * math.log(2.0 * math.pi) - special.log_ndtr(-z))
+        left[~seen] = deviation * hazard
+    return Law(curve, sample, parameters, resampled, noise, left.mean(axis=0), scatter)
 
 
 def _fitted(
@@ -383,10 +394,8 @@ def _held_out(curve: Curve, sample: Sample) -> list[tuple[float, tuple[float, fl
             continue
         law = fit(curve, sample.first(k), FEW_RESAMPLES)
         size = float(sample.sizes[k])
-        value, variance, freedom = law.distribution(size)
         mean = float(sample.values[:, k].mean())
-        width = math.sqrt(variance)
-        density = float(stats.t.logpdf((mean - value) / width, freedom)) - math.log(width)
+        density = law.distribution(size).log_density(mean)
         measured = float(sample.scale.back(np.asarray(mean)))
         checks.append((density, (size, measured, law.predict(size))))
     return checks

@@ -69,8 +69,8 @@ def bracketed(estimate: Estimate, form: Callable[[float], str] = two_figures) ->
     return value if np.isnan(estimate.low) else f"{value} [{low}, {high}]"
 
 
-WHOLE = re.compile(r"[-+]?[.\d]\S* \[[^]]*\]|p [=<] \S+|\d+ seeds?")
-"""What stands in one line: an estimate and its interval, p, a count of seeds."""
+WHOLE = re.compile(r"[-+]?[.\d]\S* \[[^]]*\]|\w+ [=<] \S+|\d+ seeds?|last \d+")
+"""What stands in one line: an estimate and its interval, ``p = .03``, a count of seeds."""
 
 
 def whole(text: str) -> str:

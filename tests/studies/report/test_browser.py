@@ -79,7 +79,7 @@ def test_it_fits_the_screen(page):
     assert page.evaluate(OVERFLOW) <= 0
     for section in ("table", "figures", "replay", "failed", "spec", "versions"):
         assert page.locator(f"#{section}").is_visible()
-    page.locator("details summary").first.click()
+    page.locator("#failed details summary").first.click()
     assert page.get_by_text("RuntimeError: <off & away>").last.is_visible()
     assert page.evaluate(OVERFLOW) <= 0
 

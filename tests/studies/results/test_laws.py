@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.studies.results import laws
+from nested_agents.studies.results import drift, laws
 
 SIZES = np.array([2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
 LAWS = {
@@ -45,14 +45,36 @@ def test_pairs_of_agents_are_linear_to_quadratic() -> None:
 
 
 def test_sizes_that_deviate_from_a_law_widen_what_it_predicts_far_away() -> None:
-    """By the variance of a new value in a regression: s^2 (1 + 1 / m + (x - mean)^2 / S_xx)."""
     deviations = np.exp([0.2, -0.2, -0.2, 0.2, 0.2, -0.2])
-    sample = laws.of_numbers(SIZES, np.tile(SIZES * deviations, (3, 1)))
-    law = laws.fit(laws.POWER, sample)
-    x = np.log(SIZES)
-    far = np.log(1024.0) - x.mean()
-    variance = law.misfit * (1.0 + 1.0 / 6.0 + far**2 / ((x - x.mean()) ** 2).sum())
-    assert law.distribution(1024.0)[1] == pytest.approx(variance, rel=1e-4)
+    laws_of = [
+        laws.fit(laws.POWER, laws.of_numbers(SIZES, np.tile(SIZES * own, (3, 1))))
+        for own in (np.ones(6), deviations)
+    ]
+    widths = [[float(np.ptp(np.log(law.predict(n)))) for n in (128.0, 1024.0)] for law in laws_of]
+    assert widths[0][1] < 1e-3 < 0.1 < widths[1][0] < widths[1][1] / 4.0
+
+
+@pytest.mark.slow
+def test_intervals_cover_laws_whose_exponent_wanders() -> None:
+    """Each by another sigma, drawn of what `drift` takes it to be before anything is measured."""
+    rng = np.random.default_rng(3)
+    sizes = np.array([2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 64.0])
+    steps = np.diff(np.log(sizes))
+    inside = 0
+    times = 300
+    for _ in range(times):
+        sigma = drift.WANDER * abs(np.tan(np.pi * (rng.uniform() - 0.5)))
+        y = [0.0]
+        slope = 0.4
+        for h in steps:  # exactly the integral of a random walk over a step
+            a, b = rng.normal(size=2)
+            y.append(y[-1] + slope * h + sigma * h**1.5 * (a / 2.0 + b / 12.0**0.5))
+            slope += sigma * a * h**0.5
+        values = np.exp(np.array(y) + rng.normal(0.0, 0.1, size=(6, 8)))
+        law = laws.fit(laws.POWER, laws.of_numbers(sizes[:7], values[:, :7]), 100)
+        p = law.predict(64.0)
+        inside += bool(p.low <= np.exp(np.log(values[:, 7]).mean()) <= p.high)
+    assert 0.86 <= inside / times <= 0.94, inside / times
 
 
 def test_a_break_is_met_by_a_fit() -> None:
@@ -82,7 +104,7 @@ def test_intervals_of_exponents_and_predictions_cover_what_they_promise() -> Non
         new = 5.0 * 64.0**0.4 * np.exp(rng.normal(0.0, np.hypot(0.15, 0.3), size=9).mean())
         covered += [e.low <= 0.4 <= e.high, p.low <= new <= p.high]
     assert 0.91 <= covered[0] / times <= 0.99, "95 %"
-    assert 0.85 <= covered[1] / times <= 0.96, "90 %"
+    assert covered[1] / times >= 0.85, "90 %, of more laws than one that does not wander"
 
 
 def test_rates_follow_a_logistic_curve() -> None:

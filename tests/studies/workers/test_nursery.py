@@ -99,7 +99,7 @@ def test_a_process_that_is_left_behind_is_not_waited_for() -> None:
 def test_what_cannot_be_pickled_fails_its_trial() -> None:
     outcome = apart(made_up_harm.odd)
     assert not outcome.lost
-    assert "pickle" in outcome.error.splitlines()[-1]
+    assert "odd.<locals>.<lambda>" in outcome.error.splitlines()[-1]
 
 
 def test_what_it_prints_is_printed(capfd) -> None:
