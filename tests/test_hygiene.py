@@ -43,7 +43,7 @@ TOP = {
     "results", "scenarios", "studies", "tests", "topologies",
     ".containerignore", ".gitignore", ".pre-commit-config.yaml", ".readthedocs.yaml",
     "CHANGELOG.md", "CITATION.cff", "CODE_OF_CONDUCT.md", "CONTRIBUTING.md", "Containerfile",
-    "LICENSE", "README.md", "box2d.lock", "conftest.py", "dev", "pyproject.toml",
+    "DECISIONS.md", "LICENSE", "README.md", "box2d.lock", "conftest.py", "dev", "pyproject.toml",
     "requirements.lock", "setup.py",
 }  # fmt: skip
 """What may stand at the top of the repository; the rest is what commands have left there."""

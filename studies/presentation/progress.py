@@ -9,6 +9,8 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from shutil import get_terminal_size
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 from ...core.plugins.printing import printable
@@ -80,7 +82,8 @@ class Terminal(Observer):
         """Say it, if it has not been said."""
         if line not in self._noted:
             self._noted.add(line)
-            say(line)
+            width = get_terminal_size().columns if sys.stderr.isatty() else len(line)
+            say(line if len(line) <= width else fill(line, width, subsequent_indent="  "))
 
     def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
         """Show how many of `total` trials are done, which have failed, and how long is left."""

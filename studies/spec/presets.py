@@ -4,11 +4,14 @@ A preset states where it departs from the defaults of the settings models; a spe
 laid over it. `frozen`, `random` and `planner` are the controls of a learning curve.
 """
 
+from __future__ import annotations
+
 import tomllib
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from .tables import SpecTable
+if TYPE_CHECKING:
+    from .tables import SpecTable
 
 
 class Preset(NamedTuple):

@@ -158,7 +158,9 @@ def schema(kind: str = "spec") -> Schema:
             "$defs": writer.definitions
         }
     if kind not in writer.definitions:
-        raise SpecError(f"schema {kind!r}: {closest(kind, ['spec', *writer.definitions])}")
+        is_one = "." in kind  # a kind of a table, as scenario.box-pushing
+        names = ["spec", *(n for n in writer.definitions if n.islower() and ("." in n) <= is_one)]
+        raise SpecError(f"schema {kind!r}: {closest(kind, names)}")
     own = writer.definitions[kind]
     return {"$schema": DIALECT, **own, "$defs": writer.definitions}
 

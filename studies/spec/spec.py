@@ -134,6 +134,8 @@ MOST_TRIALS = 100_000
 
 MOST_KEYS = 6
 """A remark names no more of them."""
+FEW_KEYS = 2
+"""Nor of those that are left out, of which most users have never heard."""
 
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 
@@ -389,8 +391,8 @@ class Spec(Settings):
         left_out = dict.fromkeys(key for c in self.conditions() for key in c.left_out)
         if left_out:
             kinds = dict.fromkeys(kind for c in self.conditions() for kind in c.other_kinds)
-            keys = join_names(left_out, MOST_KEYS)
-            lines.append(f"{keys}: of the preset, left out for {join_names(kinds, MOST_KEYS)}")
+            keys = join_names(left_out, FEW_KEYS)
+            lines.append(f"{keys}: of the preset, left out for {join_names(kinds, FEW_KEYS)}")
         lines += self._of_controls()
         for condition in self.conditions():
             lines += condition.settings.warnings()

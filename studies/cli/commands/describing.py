@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
@@ -291,9 +292,20 @@ class TeamOptions(TypedDict):
 @click.option(
     "--actions", type=click.IntRange(2), metavar="N", default=4, help="Actions of each actuator."
 )
+@click.option(
+    "--scenario",
+    metavar="KIND",
+    help="Over the agents of a scenario with its default settings, as spread or signals.",
+)
 @options.formats("table", "json")
 @options.plot
-def show(topology: str, form: view.Form, plot: Path | None, **team: Unpack[TeamOptions]) -> int:
+def show(
+    topology: str,
+    scenario: str | None,
+    form: view.Form,
+    plot: Path | None,
+    **team: Unpack[TeamOptions],
+) -> int:
     """Show a topology: edges, order of decision, who sees whom, cost.
 
     SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json,
@@ -302,11 +314,12 @@ def show(topology: str, form: view.Form, plot: Path | None, **team: Unpack[TeamO
     from ....topologies.view import format_view, view
 
     with refused():
-        views = _of_spec(topology)
+        views = _of_spec(topology) if scenario is None else _over(topology, scenario)
         if views is None:
             views = [view(topology, **team)]
         elif team["agents"] or team["robots"] or team["per"] != "actuator":
-            raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
+            whose = "is the spec of a study" if scenario is None else f"over {scenario}"
+            raise SpecError(f"{topology}: {whose}, which says its own agents")
         for number, hierarchy in enumerate(views, 1):
             if plot is not None:
                 several = f"-{number}" if len(views) > 1 else ""
@@ -354,3 +367,19 @@ def _of_spec(path: str) -> list[view.HierarchyView] | None:
     spec = Spec.load(Path(path))
     with spec.sources.active():
         return list(hierarchies_of(spec))
+
+
+def _over(topology: str, scenario: str) -> list[view.HierarchyView]:
+    """Return a topology over the agents of a scenario.
+
+    Raises
+    ------
+    SpecError
+        If there is no such scenario or topology, or they do not fit; one line.
+    """
+    from ...spec.spec import Spec
+    from ...trials.hierarchies import hierarchies_of
+
+    spec = Spec.of({"scenario": {"kind": scenario}, "topology": topology})
+    with spec.sources.active():
+        return [replace(one, text=topology) for one in hierarchies_of(spec)]

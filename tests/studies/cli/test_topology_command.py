@@ -127,6 +127,15 @@ def test_robots_are_shown_as_they_are_arranged(said, line_world) -> None:
     assert shown["joint_actions_per_step"] == hierarchy.joint_actions(len(scenario.action_set))
 
 
+def test_it_is_shown_over_the_agents_of_a_scenario(said) -> None:
+    status, out, _ = said("show", "tree:2", "--scenario", "spread")
+    assert status == 0
+    assert out.startswith("tree:2: 3 agents, depth 2, 135 joint actions a step\n")  # 5^3 + 2 x 5
+    status, _, errors = said("show", "chain", "--scenario", "spread", "--agents", "3")
+    assert (status, errors.count("\n")) == (2, 1)
+    assert "chain: over spread, which says its own agents" in errors
+
+
 def test_a_plot_is_written(said, tmp_path: Path) -> None:
     assert said("show", "star", "--plot", str(tmp_path / "star.svg"))[0] == 0
     assert "<svg" in (tmp_path / "star.svg").read_text()
