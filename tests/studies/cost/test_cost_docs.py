@@ -17,7 +17,7 @@ COMMANDS = [
     for line in block.splitlines()
     if line.startswith("nested-agents ")
 ]
-LONG = ("--measured", "nested-agents run")
+LONG = ("--measured", "nested-agents run", "nested-agents profile")
 
 
 def test_there_are_commands() -> None:
