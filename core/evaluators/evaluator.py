@@ -198,6 +198,7 @@ class Aggregation(Evaluator):
         """Per agent ``(k,)`` the agents whose values decide."""
         self._body_of = np.array([g for g, group in enumerate(problem.groups) for _ in group])
         self._last: tuple[Sequence[FloatArray], IntArray, Pooled] | None = None
+        self._have_learned: set[int] = set()
 
     @staticmethod
     def require(key: str, value: str, allowed: str, why: str) -> None:
@@ -223,11 +224,14 @@ class Aggregation(Evaluator):
 
     def indifferent(self, deliberation: Deliberation) -> bool:
         """Return whether every action must come to zero: nothing is learned yet, or ever."""
-        if self.problem.rule != "value":
+        agent = deliberation.agent
+        if self.problem.rule != "value" or agent in self._have_learned:
             return False
-        weights = deliberation.weights
-        decide = (weights[i] for i in self.concerned[deliberation.agent].tolist())
-        return not any(own[:64].any() or own.any() for own in decide)
+        decide = (deliberation.weights[i] for i in self.concerned[agent].tolist())
+        if not any(own[:64].any() or own.any() for own in decide):
+            return True
+        self._have_learned.add(agent)
+        return False
 
     def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
         """Return what joint actions ``(m, n)`` are worth to the deciding agent, ``(m,)``."""

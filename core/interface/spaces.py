@@ -201,6 +201,11 @@ class ActionSet:
     def __len__(self) -> int:
         return len(self.names)
 
+    @cached_property
+    def _arrays(self) -> tuple[FloatArray, FloatArray]:
+        """`gains` and `increments`."""
+        return np.asarray(self.gains), np.asarray(self.increments)
+
     def apply(
         self, speeds: FloatArray, actions: IntArray, unit: FloatArray, limit: FloatArray
     ) -> FloatArray:
@@ -220,6 +225,6 @@ class ActionSet:
         >>> ActionSet().apply(np.array([0.5, 0.1]), np.array([0, 3]), np.ones(2), np.ones(2))
         array([1., 0.])
         """
-        gains, increments = np.asarray(self.gains), np.asarray(self.increments)
+        gains, increments = self._arrays
         wanted = gains[actions] * speeds + increments[actions] * unit
         return np.clip(wanted, -limit, limit)

@@ -190,7 +190,11 @@ class NetworkPolicy(SharedPolicy):
 
     def _values(self, own: FloatArray, joint: FloatArray) -> FloatArray:
         """Return the values ``(m, k)`` of states as inputs ``(m, k, n_own)``, ``(m, n_joint)``."""
-        values = self.critic(self._critics(own, joint)).reshape(own.shape[:2])
+        return self._valued(self._critics(own, joint)).reshape(own.shape[:2])
+
+    def _valued(self, inputs: FloatArray) -> FloatArray:
+        """Return the values ``(m, 1)`` by inputs ``(m, n)`` of critics."""
+        values = self.critic(inputs)
         return (
             values * self._moments.deviation + self._moments.mean if self._scales_values else values
         )
@@ -202,7 +206,7 @@ class NetworkPolicy(SharedPolicy):
         own = held["seen"][..., -self._n_own :].reshape(size * worlds, k, -1)
         joint = held["joint"].reshape(size * worlds, -1)
         critics = self._critics(own, joint)
-        values = self._values(own, joint).reshape(size, worlds, k)
+        values = self._valued(critics).reshape(size, worlds, k)
         advantages = estimate(held["rewards"], values, entered, held["last"], self.settings)
         returns = advantages + values
         if self._scales_values:

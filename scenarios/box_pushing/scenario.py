@@ -164,18 +164,18 @@ class BoxPushing(Scenario, Embodiment):
         """Command the wheels, let the world go on for one decision period, observe and reward."""
         self._speeds = self.commanded(self._speeds, joint_action)
         before = self._distance()
-        poses = self.world.robot_poses.copy()
-        box = self.world.box_pose.copy()
+        poses = np.concatenate([self.world.box_pose[None], self.world.robot_poses])
+        box = poses[0]
         radius = self.robot.radius
         begin = perf_counter()
         self._advance(self._speeds)
         moved = perf_counter()
         states = self._observe(box)
         period = self.settings.period
-        twists = mean_twists(poses, self.world.robot_poses, period)
-        if min(least_gap(poses, radius), least_gap(self.world.robot_poses, radius)) > APART:
-            of_box = mean_twists(box[None], self.world.box_pose[None], period)
-            twists = np.concatenate([of_box, twists])
+        there = self.world.robot_poses
+        twists = mean_twists(poses, np.concatenate([self.world.box_pose[None], there]), period)
+        if min(least_gap(poses[1:], radius), least_gap(there, radius)) <= APART:
+            twists = twists[1:]  # what the box does tells nothing of the push then
         measured = self.measure()
         readings = self.settings.infrared.noisy(self.world.infrared()[0], self._sensing)
         terminated = self._reached()
@@ -280,7 +280,7 @@ class BoxPushing(Scenario, Embodiment):
             "wheel_speeds": self._speeds,
             "contact": self.world.contact.copy(),
             "contact_time": self.world.contact_time.copy(),
-            "contact_fraction": float(np.mean(self.world.contact_time)),
+            "contact_fraction": float(self.world.contact_time.mean()),
             "failed": self._failures.failed,
             "distance_m": self._distance(),
             "orientation_rad": orientation,

@@ -90,7 +90,8 @@ class EpisodeMeter:
             value = spent[source] if source in spent else value_at(measure, transition)
             before = self._values[measure.name]
             self._values[measure.name] = GATHER[measure.gathering](before, value)
-        self._return += float(np.mean(transition.reward))
+        reward = transition.reward
+        self._return += reward if isinstance(reward, float) else float(np.mean(reward))
 
     def row(self) -> EpisodeRow:
         """Return the measurements of the episode, which has ended.

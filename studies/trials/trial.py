@@ -136,7 +136,7 @@ class Trial:
             return f"{self.decisions} decisions"
         return lengths([[stage.episodes for stage in self.curriculum]], self.episodes)
 
-    @property
+    @cached_property
     def recorded(self) -> dict[int, str]:
         """Names of the training episodes that are recorded, by number.
 

@@ -81,8 +81,8 @@ class View(Situations):
     @cached_property
     def before(self) -> FloatArray:
         """Distance of the box from the goal before the motion that led here [m]."""
-        x, y = (self.goal[k] - self.origin[..., k] for k in range(2))
-        return np.hypot(x, y)
+        x, y = self.origin.T[:2]
+        return np.hypot(self.goal[0] - x, self.goal[1] - y)
 
     @property
     def approach(self) -> FloatArray:
