@@ -25,7 +25,7 @@ short = {"seeds": 2, "episodes": 1, "steps": 12, "evaluation": 2, "preset": "own
 spec = na.Spec(study="scaling", sweep={"scenario.robots": [1, 2]}, **short)
 print(na.plan(spec, jobs=1, timed=False))
 study = na.run(spec, OUT, jobs=1)
-print(study.table(["success", "decision [ms]"]))
+print(study.table(["evaluation success", "decision [ms]"]))
 comparison = study.compare(by="robots", measure="steps")
 print(comparison)
 study.figure().savefig(f"{OUT}/scaling.pdf")

@@ -62,12 +62,10 @@ def as_scenario(thing: object) -> Scenario:
     ValueError
         If the thing lacks what is necessary; one line.
     """
-    if isinstance(thing, Scenario):
-        return thing
     missing = ", ".join(name for name in NECESSARY if offered(thing, name) is None)
     if missing:
         raise ValueError(f"scenario.kind: {type(thing).__name__} lacks {missing}")
-    return PlainScenario(thing)
+    return thing if isinstance(thing, Scenario) else PlainScenario(thing)
 
 
 def as_prediction(thing: Any) -> Prediction | None:

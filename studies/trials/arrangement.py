@@ -153,8 +153,9 @@ def check_conditions(
             except KeyboardInterrupt:
                 raise
             except BaseException as error:
-                if isinstance(error, Exception) and not place(error):
-                    raise  # no code of the user's
+                is_ours = not (place(error) or spec.sources.texts)
+                if isinstance(error, Exception) and is_ours:
+                    raise
                 problem = f"the scenario or topology raises {format_error(error)}{place(error)}"
                 failing = failing or SpecError(f"{problem}{where}")
     if failing and not (measures and may_fail):

@@ -232,12 +232,21 @@ def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
     assert np.isfinite(session.result().rows[0].measures["spread_m"])
 
 
-def test_what_is_no_scenario_is_told_before_anything_runs(tmp_path, capsys):
+HALVES = {
+    "Plain": "Plain lacks step",
+    "Empty": "Empty lacks agents, state_space, action_set",
+    "Hollow": "raises AttributeError: 'int' object has no attribute",
+}
+"""What is said of scenarios that lack something."""
+
+
+@pytest.mark.parametrize("name", HALVES)
+def test_what_is_no_scenario_is_told_before_anything_runs(tmp_path, capsys, name):
     (tmp_path / "half.py").write_text("""
 import nested_agents as na
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 
-class Half:
+class Plain:
     class Settings(na.ScenarioSettings):
         pass
 
@@ -245,8 +254,24 @@ class Half:
         whole = LineUp(LineUpSettings())
         self.agents, self.action_set = whole.agents, whole.action_set
         self.state_space, self.reset = whole.state_space, whole.reset
+
+class Empty(LineUp):
+    Settings = Plain.Settings
+
+    def __init__(self, settings):
+        pass
+
+class Hollow(Empty):
+    measures = (1,)
+
+    def __init__(self, settings):
+        whole = LineUp(LineUpSettings())
+        self.agents, self.action_set = whole.agents, whole.action_set
+        self.state_space = whole.state_space
 """)
-    (tmp_path / "half.toml").write_text('scenario.kind = "half.py:Half"\n')
+    (tmp_path / "half.toml").write_text(f'scenario.kind = "half.py:{name}"\n')
     assert main(["run", str(tmp_path / "half.toml"), "--out", str(tmp_path / "out")]) == 2
-    assert "error: scenario.kind: Half lacks step\n" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert HALVES[name] in error
+    assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()

@@ -109,7 +109,7 @@ def test_scores_may_have_names_that_mean_something_in_studies(scores, name) -> N
     comparison = na.compare_table(
         table, condition="topology", score=name, seed="run", item="question"
     )
-    assert comparison.contrasts.title == f"{name}, evaluation"
+    assert comparison.contrasts.title == f"evaluation {name}"
     assert comparison.differences[0].estimate.value == pytest.approx(3.0)
 
 
