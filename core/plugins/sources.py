@@ -80,8 +80,8 @@ class Sources:
         Directory of a study, whose copies stand in for files that are not there any more, before
         those of `folder`, if that is a study too.
     brought_by
-        What brought the `texts` along, and names modules, if it is not the user's own: these are
-        run only if they are trusted, see `is_trusted`.
+        What brought the `texts` along, and names files and modules, if it is not the user's own:
+        these are run only if they are trusted, see `is_trusted`.
 
     Attributes
     ----------
@@ -150,6 +150,8 @@ class Sources:
             If there is no such file, or it is no text.
         """
         if name not in self._texts:
+            if self._brought_by is not None:
+                self._brought[name] = self._brought_by
             self._texts[name] = self._read(name)
         return self._texts[name]
 
