@@ -291,7 +291,8 @@ def _refused(refusal: ValueError) -> str:
 def _wrong_states(world: AdaptedWorld, environment: Drawn, states: np.ndarray) -> str:
     """Return how states differ from what players see; nothing if they do not."""
     names = [variable.name for variable in world.state_space.variables]
-    for group, player in zip(world.groups, environment.ids, strict=True):
+    # The actuators of a single player are bodies of their own.
+    for group, player in zip(world.groups, environment.ids, strict=len(environment.ids) > 1):
         if player not in environment.agents and not environment.is_over:
             continue  # it has left
         seen = environment.truth[player]

@@ -80,8 +80,8 @@ class Sources:
         Directory of a study, whose copies stand in for files that are not there any more, before
         those of `folder`, if that is a study too.
     brought_by
-        What brought the `texts` along, and names modules, if it is not the user's own: these are
-        run only if they are trusted, see `is_trusted`.
+        What brought the `texts` along, and names files and modules, if it is not the user's own:
+        these are run only if they are trusted, see `is_trusted`.
 
     Attributes
     ----------
@@ -150,6 +150,8 @@ class Sources:
             If there is no such file, or it is no text.
         """
         if name not in self._texts:
+            if self._brought_by is not None:
+                self._brought[name] = self._brought_by
             self._texts[name] = self._read(name)
         return self._texts[name]
 
@@ -373,7 +375,9 @@ def kept_name(name: str) -> str:
     ('..__arms__arm.py', 'arms%5F%5Farm.py')
     """
     quoted = re.sub(r"[%\\]|_(?=[_/])|(?<=[_/])_", lambda match: f"%{ord(match[0]):02X}", name)
-    return quoted.replace("/", "__")
+    flat = quoted.replace("/", "__")
+    # File systems take names of up to 255 bytes.
+    return flat if len(flat.encode()) <= 200 else f"{sha256(name)}{flat[-30:]}"
 
 
 def former_kept_name(name: str) -> str:

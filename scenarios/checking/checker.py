@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from math import isnan
 from pathlib import Path
+from textwrap import fill
 from traceback import extract_tb
 from typing import NamedTuple
 
@@ -74,6 +75,19 @@ class Findings(NamedTuple):
                 yield f"{v.name} is predicted no better than if it stayed as it is"
             if max(v.low - v.least, v.greatest - v.high) > FAR * width:
                 yield f"{v.name} goes more than {FAR} times its range beyond it"
+
+    def remarks(self) -> Iterator[tuple[str, str]]:
+        """Yield what came of it in words, each after its kind: passed, not checked, warning."""
+        yield "passed", ", ".join(self.passed)
+        for name, reason in self.unchecked.items():
+            yield "not checked", f"{name}: {reason}"
+        for warning in self.warnings():
+            yield "warning", warning
+
+    def __str__(self) -> str:
+        """Return them as the command ``check`` prints them."""
+        lines = (f"{kind}  {text}" for kind, text in self.remarks())
+        return "\n".join(fill(line, 80, subsequent_indent=" " * 8) for line in lines)
 
 
 class ScenarioError(ValueError):

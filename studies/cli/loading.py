@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from ...core.plugins.sources import Sources, files_in
 from ...core.plugins.trust import LIBRARIES, is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
 from ..presentation.progress import say
 from ..spec.outline import other_spec
-from ..store.database import DATABASE
+from ..store.database import DATABASE, SPEC_FILE
+from ..store.durable import read_text
 from ..store.store import Store
 
 if TYPE_CHECKING:
@@ -51,15 +54,35 @@ def load_results(
 def trust_files(*sources: Path) -> None:
     """Allow what studies keep and name to be run and imported, and say what."""
     for source in sources:
-        for title, text in untrusted(source).items():
-            say(f"{title} is trusted from now on")
-            trust_text(text)
+        _trust(untrusted(source))
 
 
 def trust_beside(*places: Path) -> None:
-    """Do so for the studies that places are, or lie in as their specs do."""
+    """Do so for the studies that places are, or lie in as their specs do, and for what these name.
+
+    A spec that stands beside a database may name other files than the database keeps.
+    """
     folders = {place if place.is_dir() else place.parent for place in map(Path.resolve, places)}
-    trust_files(*(folder for folder in folders if (folder / DATABASE).exists()))
+    for folder in folders:
+        if (folder / DATABASE).exists():
+            _trust(untrusted(folder))
+            _trust(_named_by_copy(folder))
+
+
+def _trust(texts: Mapping[str, str]) -> None:
+    for title, text in texts.items():
+        say(f"{title} is trusted from now on")
+        trust_text(text)
+
+
+def _named_by_copy(folder: Path) -> dict[str, str]:
+    """Return the code that the spec beside a database names; none if that is no spec."""
+    try:
+        table = tomllib.loads(read_text(folder / SPEC_FILE))
+        files = {name: Sources(folder).text(name) for name in sorted(files_in(table))}
+    except (OSError, ValueError, RecursionError):
+        return {}  # told by whoever reads the spec
+    return _untrusted(folder, files, table)
 
 
 def untrusted(source: Path) -> dict[str, str]:
@@ -68,16 +91,21 @@ def untrusted(source: Path) -> dict[str, str]:
     These are the Python files that are kept with it, and modules by name; those of a file of
     results are named in its spec.
     """
-    texts: dict[str, str] = {}
+    files: dict[str, str] = {}
     if source.is_dir():
         with Store.open(source) as store:
-            kept = store.sources()
+            files = store.sources()
             tables: object = [store.spec(), *store.settings().values()]
-        texts = {f"{n}, which came with {source},": t for n, t in kept.items() if n.endswith(".py")}
     else:
         from ..results import published  # pandas takes its time
 
         tables = published.load(source).outline.table
+    return _untrusted(source, files, tables)
+
+
+def _untrusted(source: Path, files: Mapping[str, str], tables: object) -> dict[str, str]:
+    """Return what is not trusted of files, and of the modules that tables name."""
+    texts = {f"{n}, which came with {source},": t for n, t in files.items() if n.endswith(".py")}
     modules = {m for m, _ in modules_in(tables) if m.partition(".")[0] not in LIBRARIES}
     texts |= {f"{name}, which {source} names,": module_text(name) for name in modules}
     return {title: text for title, text in texts.items() if not is_trusted(text)}

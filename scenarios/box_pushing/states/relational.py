@@ -97,7 +97,9 @@ class View(Situations):
     @cached_property
     def push(self) -> FloatArray:
         """Direction ``(m,)`` in which the robots' middle would push the box [rad]."""
-        return _direction(self.box[:, :2] - self.robots[:, :, :2].mean(axis=1))
+        return _direction(
+            self.box[:, :2] - np.add.reduce(self.robots[:, :, :2], axis=1) / self.robots.shape[1]
+        )
 
     @cached_property
     def contact_push(self) -> FloatArray:
@@ -223,7 +225,7 @@ def _angle(
 
 
 def _missed(view: View, bearing: FloatArray) -> FloatArray:
-    off = np.clip(bearing, -0.5 * pi, 0.5 * pi)
+    off = np.minimum(np.maximum(bearing, -0.5 * pi), 0.5 * pi)
     return view.distance * np.sin(off)
 
 

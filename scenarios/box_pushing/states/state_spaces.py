@@ -48,10 +48,13 @@ class BoxStateSpace:
         The same as `sense`, each built-in function called once for all robots.
         """
         shape = view.gaps.shape
-        at_once, others = self._columns
+        common, at_once, others = self._columns
         shared = np.empty((*shape, len(self.functions)))
-        of_others = sense([self.functions[c] for c in others], view, range(shape[1]))
-        shared[:, :, others] = of_others.swapaxes(0, 1)
+        if others:
+            of_others = sense([self.functions[c] for c in others], view, range(shape[1]))
+            shared[:, :, others] = of_others.swapaxes(0, 1)
+        for column in common:
+            shared[:, :, column] = self.functions[column](view, 0)[:, None]
         if at_once:
             each = view.seen_by_each()
             for column in at_once:
@@ -64,10 +67,11 @@ class BoxStateSpace:
         return all(thing.trusted for thing in self.functions)
 
     @cached_property
-    def _columns(self) -> tuple[list[int], list[int]]:
-        """Which columns one call fills for all robots, and which not."""
-        own = [thing.trusted and not thing.common for thing in self.functions]
-        return np.flatnonzero(own).tolist(), np.flatnonzero(~np.array(own)).tolist()
+    def _columns(self) -> tuple[list[int], list[int], list[int]]:
+        """Which built-in columns are common, which one call fills for all robots, and users'."""
+        kinds = [(1 - thing.common if thing.trusted else 2) for thing in self.functions]
+        common, at_once, others = ([c for c, k in enumerate(kinds) if k == j] for j in range(3))
+        return common, at_once, others
 
     def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""

@@ -279,17 +279,17 @@ def reward(
     approach = approach[:, None]
     orientation = orientation[:, None]
     r1 = settings.c1 * np.exp(-settings.r1 * distance)
-    r2_r3 = (settings.c2 * np.exp(-settings.r2 * readings)).sum(axis=2)
+    r2_r3 = np.add.reduce(settings.c2 * np.exp(-settings.r2 * readings), axis=2)
     r4 = settings.c4 * np.abs(orientation)
-    touching = contact.all(axis=2)
+    touching = np.logical_and.reduce(contact, axis=2)
     within = readings > 0.0
     near = -r2_r3 + (r1 if settings.attraction_without_contact else 0.0)
     nearer = approach < -settings.least_approach
     there = task.reached(distance, orientation) & settings.pays_at_goal
     gained = np.full(near.shape, settings.some_out_of_range)
     for condition, pay in (  # from the least specific on
-        (~within.any(axis=2), settings.all_out_of_range),
-        (within.all(axis=2), near),
+        (~np.logical_or.reduce(within, axis=2), settings.all_out_of_range),
+        (np.logical_and.reduce(within, axis=2), near),
         (touching, settings.receding),
         (touching & nearer, r1 - r2_r3 - r4),
         (there, settings.c1),

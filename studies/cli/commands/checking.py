@@ -74,11 +74,9 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            print_wrapped(f"{case.label}: {', '.join(findings.passed)}", "passed  ", 8)
-            for name, reason in findings.unchecked.items():
-                print_wrapped(f"{name}: {reason}", "not checked  ", 8)
-            for warning in findings.warnings():
-                print_wrapped(warning, "warning  ", 8)
+            for kind, text in findings.remarks():
+                label = f"{case.label}: " if kind == "passed" else ""
+                print_wrapped(f"{label}{text}", f"{kind}  ", 8)
             frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
             _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
     if is_spec and not faults:

@@ -109,6 +109,8 @@ class BarePrediction:
 def test_what_a_scenario_need_not_have_is_not_asked_for() -> None:
     findings = check_scenario(Bare)
     assert set(CHECKS) - set(findings.passed) == {"sensed and predicted"} == {*findings.unchecked}
+    assert str(findings).startswith("passed  form, measures, ")
+    assert "\nnot checked  sensed and predicted: " in str(findings)
 
 
 def test_the_findings_hold_what_was_met_beside_what_is_said() -> None:

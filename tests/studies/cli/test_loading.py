@@ -152,6 +152,14 @@ def test_a_terminal_that_writes_ascii_alone_is_enough(study, command) -> None:
     assert (status, err) == (0, "")
 
 
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_what_a_terminal_cannot_write_has_a_sign_in_its_place(encoding) -> None:
+    command = Command("measure", "topology", "show", "edges:a–b>c", encoding=encoding)
+    status, out, err = finish(command)
+    assert (status, err) == (0, "")
+    assert ("1  a–b " if encoding == "utf-8" else "1  a-b ") in out
+
+
 @pytest.mark.parametrize("command", ["table", "results", "status"])
 def test_a_reader_that_goes_away_is_told_by_the_status(study, command) -> None:
     reading, writing = os.pipe()

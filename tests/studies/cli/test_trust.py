@@ -155,6 +155,26 @@ def test_a_spec_kept_with_a_study_is_looked_at_by_trust_alone(
     assert mark.exists()
 
 
+@pytest.mark.parametrize(("command", "place"), [("check", "."), ("plan", ".."), ("run", ".")])
+def test_files_beside_a_kept_spec_are_somebody_elses_too(
+    command: str, place: str, foreign: Path, mark: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (foreign / place / "evil.py").write_text(f"# evil\n{MINE.format(mark=str(mark))}")
+    table = SPEC.replace('"mine.py:STUDY"', '"learning-curve"')
+    table = table.replace('"mine.py:ring"', f'"{place}/evil.py:ring"')
+    (foreign / SPEC_FILE).write_text(table)
+    out = ["--out", str(foreign.parent / "out")] if command == "run" else []
+    line = [command, str(foreign / SPEC_FILE), *out]
+    assert main(line) == 2
+    error = capsys.readouterr().err
+    assert f"{place}/evil.py came with {foreign}" in error
+    assert error.count("\n") == 1
+    assert not mark.exists()
+    main([*line, "--trust"])
+    assert f"{place}/evil.py, which came with {foreign}, is trusted" in capsys.readouterr().err
+    assert mark.exists()
+
+
 def test_a_report_says_what_it_leaves_out(
     theirs: Path,
     tmp_path: Path,
