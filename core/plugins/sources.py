@@ -375,7 +375,9 @@ def kept_name(name: str) -> str:
     ('..__arms__arm.py', 'arms%5F%5Farm.py')
     """
     quoted = re.sub(r"[%\\]|_(?=[_/])|(?<=[_/])_", lambda match: f"%{ord(match[0]):02X}", name)
-    return quoted.replace("/", "__")
+    flat = quoted.replace("/", "__")
+    # File systems take names of up to 255 bytes.
+    return flat if len(flat.encode()) <= 200 else f"{sha256(name)}{flat[-30:]}"
 
 
 def former_kept_name(name: str) -> str:

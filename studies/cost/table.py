@@ -173,8 +173,8 @@ def _of_another_evaluator(rows: Sequence[CostRow]) -> list[str]:
     if not own:
         return []
     return wrap(
-        f"They count the evaluator exact. The default one, auto, is that up to {auto.exact_up_to} "
-        f"agents, one and those below it; up to {auto.sampling_up_to} it is sampling if agents "
+        f"They count the evaluator exact. The default, auto, is exact up to {auto.exact_up_to} "
+        f"agents (one and those below it), up to {auto.sampling_up_to} sampling if agents "
         "decide by their own value, else best-response, which try fewer joint actions: "
         f"nested-agents profile counts and times them. Rows: {', '.join(own)}.",
         WIDTH,

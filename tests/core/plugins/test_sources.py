@@ -134,6 +134,13 @@ def test_copies_of_different_files_have_different_names(names: list[str]) -> Non
     assert "/" not in one
 
 
+def test_a_long_path_has_a_copy_of_a_name_that_file_systems_take() -> None:
+    names = [kept_name(f"{'folder/' * n}\u00e9arm.py") for n in (10, 60, 61)]
+    assert len(set(names)) == 3
+    assert all(len(name.encode()) <= 200 and name.endswith("arm.py") for name in names)
+    assert names[0].count("folder__") == 10
+
+
 def test_a_copy_under_the_name_of_an_earlier_version_is_read(tmp_path: Path) -> None:
     copies = tmp_path / "sources"
     copies.mkdir()
