@@ -292,6 +292,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "hand-written-200",
         "own-relation-games",
         "own-relation-arms",
+        "own-relation-4",
         "own-relation",
         "disagreement-2",
         "disagreement-4",

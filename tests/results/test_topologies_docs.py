@@ -26,6 +26,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "edges.md"
     ("name", "columns"),
     [
         ("hierarchies", ("evaluation success", "messages")),
+        ("own-relation-4", ("evaluation success", "decisions to goal", "messages")),
         ("own-relation", ("evaluation success", "decisions to goal", "messages")),
     ],
 )
