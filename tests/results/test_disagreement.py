@@ -45,25 +45,38 @@ def test_the_table_of_simple_spread_is_that_of_the_rows() -> None:
     assert [d.p < 0.05 for d in compared.differences] == [True] * 4
 
 
-def test_the_table_of_arms_is_that_of_the_rows() -> None:
-    rows = pd.read_csv(ROWS / "arm-experience.csv").sort_values("seed")
+ARMS = ((1000, 10_000, 30_000, 100_000, 400_000), 25)
+"""After how many decisions teams are evaluated, and by how many episodes."""
+BOXES = ((1000, 3000, 10_000, 30_000, 100_000), 10)
+
+
+@pytest.mark.parametrize(
+    ("name", "evaluated", "said"),
+    [
+        ("arm", ARMS, {400_000: ".01 [0, .02]", 100_000: ".07 [.01, .17]"}),
+        ("box", BOXES, {100_000: ".20 [-.03, .39]", 30_000: "-.10 [-.40, .10]"}),
+    ],
+)
+def test_tables_of_success_by_experience_are_those_of_the_rows(name, evaluated, said) -> None:
+    rows = pd.read_csv(ROWS / f"{name}-experience.csv").sort_values("seed")
     page = (DOCS / "peers.md").read_text(encoding="utf-8")
-    for line in arm_lines(rows):
+    for line in success_lines(rows, *evaluated):
         assert line in page
     wide = rows.pivot(index=["decisions", "seed"], columns="condition", values="success")
     ahead = wide["hierarchy-ppo, chain"] - wide["hierarchy-ppo, no edges"]
-    for decisions, text in ((400_000, ".01 [0, .02]"), (100_000, ".07 [.01, .17]")):
+    for decisions, text in said.items():
         assert bracketed(na.bootstrap(ahead.loc[decisions].to_numpy())) == text
+        assert text in page
 
 
-def arm_lines(rows: pd.DataFrame) -> list[str]:
-    """Return the rows of the table, by shares of 25 evaluation episodes."""
+def success_lines(rows: pd.DataFrame, evaluated: tuple[int, ...], episodes: int) -> list[str]:
+    """Return the rows of a table of shares of so many evaluation episodes."""
     lines = []
     for condition, own in rows.groupby("condition"):
         cells = []
-        for n in (1000, 10_000, 30_000, 100_000, 400_000):
+        for n in evaluated:
             shares = own[own["decisions"] == n]["success"].to_numpy()
-            solved = np.arange(25) < np.rint(25 * shares)[:, None]
+            solved = np.arange(episodes) < np.rint(episodes * shares)[:, None]
             cells.append(bracketed(na.rate(solved)) if len(shares) else "")
         lines.append(f"| {condition} | {' | '.join(cells)} |")
     return lines
