@@ -179,7 +179,7 @@ class PartSettings(Settings):
     factory: ClassVar[str] = ""
     """Where the class is that is built of them, imported when it is wanted."""
     player: ClassVar[str] = ""
-    """Where the module is that plays recordings on a page, see `studies.report.page`; empty:
+    """Where the module is that plays recordings on a page, see `studies.report.replays`; empty:
     recordings are drawn as films."""
 
     def build(self, *given: Any) -> Any:

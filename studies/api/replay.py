@@ -85,7 +85,8 @@ def draw_episode(
 
 def _player(directory: Path, trial: Planned) -> str:
     """Return a page that plays the recorded episodes of a trial."""
-    from ..report.page import player_page, replays
+    from ..report.page import player_page
+    from ..report.replays import replays
 
     with Store.open(directory) as store:
         return player_page(replays(store, read(store), [trial]))

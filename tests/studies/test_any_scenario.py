@@ -20,7 +20,7 @@ from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.tables import tabulate
-from nested_agents.studies.report.page import replays
+from nested_agents.studies.report.replays import replays
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.outline import StudyOutline

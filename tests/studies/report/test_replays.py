@@ -3,7 +3,7 @@ import json
 
 from nested_agents.scenarios.box_pushing.pictures import rendering
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.studies.report.page import replays
+from nested_agents.studies.report.replays import replays
 from nested_agents.studies.results import results
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import spec_of
