@@ -332,7 +332,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "wide",
         "peers-tuning",
         "peers-tuning-arm",
-        "peers-tuning-arm-ours",
+        "peers-tuning-arm-fuzzy",
         "peers-one-robot",
         "peers-four-robots",
         "peers-100",
