@@ -63,8 +63,8 @@ class BestResponseSettings(EvaluatorSettings):
 
     kind: Literal["best-response"] = "best-response"
     sweeps: Annotated[int, Field(ge=0, le=100), unwritten(1)] = 1
-    """Rounds in which every body improves the plan before anything is decided. Where all hear all that
-    is decided, the decisions are a round, too: with 0 they take three quarters of the time."""
+    """Rounds in which every body improves the plan before anything is decided. Where all hear all
+    that is decided, the decisions are a round, too: with 0 they take three quarters of the time."""
 
     def build(self, problem: DecisionProblem) -> Aggregation:
         """Return the evaluator of a team."""
