@@ -312,6 +312,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "long-arms",
         "thousand-arms",
         "tasks",
+        "readings",
         "told",
         "costs",
         "controls",
