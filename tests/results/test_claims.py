@@ -328,7 +328,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "sixty-four",
         "from-eight",
         "from-eight-128",
-        "sweeps",
+        "rounds",
         "wide",
         "peers-tuning",
         "peers-tuning-arm",
