@@ -1,4 +1,4 @@
-"""Networks at the field's budgets: tables by decisions, whether an edge helps, what foresight saves.
+"""Networks at the field's budgets: tables by decisions, what an edge and foresight are worth.
 
 ``python -m nested_agents.results.experience`` prints the tables of docs/peers.md from the rows
 of `TASKS` that are there; with directories of kept studies ``experience`` it prints their rows, as
@@ -14,18 +14,19 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.interface.measures import SUCCESS
-from ..core.numerics import pd
+from ..core.numerics import FloatArray, pd
 from ..studies.api.loading import load
 from ..studies.catalogue.peers import AFTER
 from ..studies.cli.display import print_text
 from ..studies.results.analysis import Difference, differences, format_p
-from ..studies.results.notation import bracketed
+from ..studies.results.notation import bracketed, two_figures
 from ..studies.results.results import Results
 from ..studies.results.statistics import LEVEL, Estimate, bootstrap, rate
 from . import ROWS
 
 RANDOM = "random"
 RETURN = "return"
+FUZZY = "fuzzy TD"
 CHAIN = "hierarchy-ppo, chain"
 SPAN = 0.1
 """Margin of returns: this share of the way from random to the best at the end."""
@@ -33,7 +34,7 @@ HALF = 0.5
 """Evaluation success at which decisions of training are compared."""
 
 
-class Task(NamedTuple):
+class PublishedCourse(NamedTuple):
     """A task whose rows are published."""
 
     shown: tuple[int, ...]
@@ -49,14 +50,14 @@ class Task(NamedTuple):
 
 
 TASKS = {
-    "spread": Task((1000, 10_000, 100_000, 400_000), 100, 1.0),
-    "vmas": Task((1000, 3000, 10_000, 30_000, 100_000), 4, None),
-    "landmarks": Task((1000, 3000, 10_000, 30_000), 100),
-    "ring": Task((1000, 3000, 10_000, 30_000), 1, edges="hierarchy-ppo, own edges"),
-    "arm": Task((1000, 10_000, 30_000, 100_000, 400_000), 25, 0.05),
-    "arm-16": Task((1000, 3000, 10_000, 30_000, 100_000), 10),
-    "box": Task((1000, 3000, 10_000, 30_000, 100_000), 10),
-    "four-robots": Task((1000, 3000, 10_000, 30_000, 100_000), 5),
+    "spread": PublishedCourse((1000, 10_000, 100_000, 400_000), 100, 1.0),
+    "vmas": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 4, None),
+    "landmarks": PublishedCourse((1000, 3000, 10_000, 30_000), 100),
+    "ring": PublishedCourse((1000, 3000, 10_000, 30_000), 1, edges="hierarchy-ppo, own edges"),
+    "arm": PublishedCourse((1000, 10_000, 30_000, 100_000, 400_000), 25, 0.05),
+    "arm-16": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 10),
+    "box": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 10),
+    "four-robots": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 5),
 }
 """By the name of their rows."""
 
@@ -105,7 +106,7 @@ def lines(name: str) -> Iterator[str]:
         yield f"| {condition} | {' | '.join(cells)} |"
 
 
-def _estimate(means: np.ndarray, measure: str, task: Task) -> Estimate:
+def _estimate(means: FloatArray, measure: str, task: PublishedCourse) -> Estimate:
     """Return the mean of evaluations by seed with its interval."""
     if measure == RETURN:
         return bootstrap(means)
@@ -113,7 +114,7 @@ def _estimate(means: np.ndarray, measure: str, task: Task) -> Estimate:
     return rate(np.arange(task.episodes) < reached)
 
 
-class Edge(NamedTuple):
+class EdgeWorth(NamedTuple):
     """What an edge is worth to networks at the end of training."""
 
     compared: Difference
@@ -130,12 +131,12 @@ class Edge(NamedTuple):
         return "equal" if -self.margin <= low and high <= self.margin else "not decided"
 
 
-def edge(name: str) -> Edge:
+def edge(name: str) -> EdgeWorth:
     """Return what an edge is worth in a task."""
     task = TASKS[name]
     rows = read(name)
     measure = rows.columns[-1]
-    of_networks = rows[~rows["condition"].str.startswith("ours")]
+    of_networks = rows[~rows["condition"].str.startswith(FUZZY)]
     last = of_networks[of_networks["decisions"] == task.shown[-1]]
     ends = last.pivot_table(index="seed", columns="condition", values=measure)
     pairs = [(c, measure, ends[task.edges], ends[c]) for c in ends if c != task.edges]
@@ -143,7 +144,7 @@ def edge(name: str) -> Edge:
     means = ends.mean()
     span = SPAN * float(means.max() - means[RANDOM])
     (without,) = [d for d in compared if d.condition == task.without]
-    return Edge(without, span if task.margin is None else task.margin)
+    return EdgeWorth(without, span if task.margin is None else task.margin)
 
 
 def edge_lines() -> Iterator[str]:
@@ -151,16 +152,20 @@ def edge_lines() -> Iterator[str]:
     yield "| rows | seeds | decisions | with edges less without | p | margin | edge |"
     yield "|---|---|---|---|---|---|---|"
     for name in committed():
-        compared, margin = edge(name)
-        shown = bracketed(compared.estimate)
-        p = format_p(compared.p).removeprefix("= ")
-        decisions = f"{TASKS[name].shown[-1]:,}"
-        verdict = Edge(compared, margin).verdict
-        cells = (name, str(compared.seeds), decisions, shown, p, f"{margin:.2g}", verdict)
+        worth = edge(name)
+        cells = (
+            name,
+            str(worth.compared.seeds),
+            f"{TASKS[name].shown[-1]:,}",
+            bracketed(worth.compared.estimate),
+            format_p(worth.compared.p).removeprefix("= ").replace("0.", "."),
+            two_figures(worth.margin),
+            worth.verdict,
+        )
         yield f"| {' | '.join(cells)} |"
 
 
-class Foresight(NamedTuple):
+class PredictorWorth(NamedTuple):
     """How many times as many decisions networks need as agents with a predictor."""
 
     times: Estimate
@@ -194,13 +199,13 @@ def decisions_to(own: pd.DataFrame, criterion: float = HALF) -> tuple[pd.Series,
     return pd.Series(np.exp(reached), wide.index), missed
 
 
-def foresight(name: str, ours: str = "ours", networks: str = CHAIN) -> Foresight:
+def foresight(name: str, fuzzy: str = FUZZY, networks: str = CHAIN) -> PredictorWorth:
     """Return what a predictor saves in a task."""
     rows = read(name)
     needed, missed = decisions_to(rows[rows["condition"] == networks])
-    own, _ = decisions_to(rows[rows["condition"] == ours])
+    own, _ = decisions_to(rows[rows["condition"] == fuzzy])
     estimate = bootstrap(np.log(needed / own).dropna().to_numpy())
-    return Foresight(Estimate(*map(np.exp, estimate)), missed)
+    return PredictorWorth(Estimate(*map(np.exp, estimate)), missed)
 
 
 def foresight_lines() -> Iterator[str]:
@@ -209,10 +214,10 @@ def foresight_lines() -> Iterator[str]:
     yield "|---|---|---|"
     for name in committed():
         conditions = read(name)["condition"].unique()
-        for ours in sorted(c for c in conditions if c.startswith("ours")):
-            times, missed = foresight(name, ours)
+        for fuzzy in sorted(c for c in conditions if c.startswith(FUZZY)):
+            times, missed = foresight(name, fuzzy)
             never = f", {missed} seeds never" if missed else ""
-            yield f"| {name} | {ours} | {bracketed(times)} times{never} |"
+            yield f"| {name} | {fuzzy} | {bracketed(times)} times{never} |"
 
 
 def main(places: list[str]) -> None:
