@@ -11,9 +11,9 @@ from rich.table import Table
 Row = dict[str, Any]
 
 STEPS = {
-    "rule_base": "rules", "agents": "n", "ours_us": "ours\n\\[us]",
-    "literal_ratio": "literal\n/ours", "factorised_ratio": "factor.\n/ours",
-    "streaming_ratio": "ours/\nstream",
+    "rule_base": "rules", "agents": "n", "ours_us": "toolkit\n\\[us]",
+    "literal_ratio": "literal\n/toolkit", "factorised_ratio": "factor.\n/toolkit",
+    "streaming_ratio": "toolkit/\nstream",
     "decide_ns_per_joint_action": "decide\n\\[ns/ja]",
     "predict_ns_per_joint_action": "+predict\n\\[ns/ja]", "bytes_per_agent": "kB/\nagent",
 }  # fmt: skip

@@ -128,10 +128,10 @@ def _compare(robots: int) -> None:
 def others(budget: float) -> tuple[list[Row], list[str]]:
     """Time ours with two robots and other worlds in turns; return rows, and what is missing."""
     candidates: dict[str, Callable[[], Any]] = {
-        "ours, 2 robots, 16 rays": Run(World, 2),
+        "toolkit, 2 robots, 16 rays": Run(World, 2),
         "naive pybox2d, the same": Run(NaiveWorld, 2),
-        "ours by WheelsEnv, hold = 1": _wheels(1),
-        "ours by WheelsEnv, hold = 8": _wheels(8),
+        "toolkit by WheelsEnv, hold = 1": _wheels(1),
+        "toolkit by WheelsEnv, hold = 8": _wheels(8),
     }
     _compare(2)
     missing = []

@@ -2,9 +2,10 @@
 Robots that surround a fleeing target
 =====================================
 
-A world that no setting of ours was made for, written by the pages alone; the page *My world is not
-learned* goes through it. Run it by ``nested-agents run examples/pursuit.toml --out out/pursuit``,
-check it by ``nested-agents check examples/pursuit.py:Pursuit``.
+An environment that no setting of the toolkit was made for, written by the pages alone; the page
+*My environment is not learned* goes through it. Run it by
+``nested-agents run examples/pursuit.toml --out out/pursuit``, check it by
+``nested-agents check examples/pursuit.py:Pursuit``.
 """
 
 import numpy as np

@@ -36,8 +36,8 @@ class Criterion:
 
     Examples
     --------
-    >>> at_least(0.8).text, within(0.01).text
-    ('at least 0.8', 'within 0.01 of 0, no p < .05')
+    >>> at_least(0.8).text, within(0.15).text
+    ('at least 0.8', 'within 0.15 of 0, no p < .05')
     """
 
     text: str
@@ -183,7 +183,7 @@ def print_claims(findings: Sequence[Finding], form: Format) -> None:
             f"[{colour}]{finding.verdict}[/]",
         )
     Console().print(table)
-    print("With 95 % intervals. A claim holds if the whole interval meets the criterion,")
+    print("\nWith 95 % intervals. A claim holds if the whole interval meets the criterion,")
     print("does not if none of it does, and is not decided in between or by under 5 seeds.")
 
 

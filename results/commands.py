@@ -38,7 +38,7 @@ CATALOGUE = Path(catalogue.__file__).parent
     "what has been run before is read."
 )
 @options.flag(
-    "--quick", "Small versions of the studies: six minutes on two cores, and wide intervals."
+    "--quick", "Small versions of the studies, of 5 or 6 seeds: minutes, and wide intervals."
 )
 @click.option(
     "--of",

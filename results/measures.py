@@ -114,7 +114,7 @@ def cost_error(results: Results) -> Measured:
     problem = Problem()
     nested = problem.nested(range(4)) / PAPER_NESTED - 1.0
     single = problem.single_agent(4) / PAPER_SINGLE - 1.0
-    return _computed(max(nested, single, key=abs))
+    return _computed(max(abs(nested), abs(single)))
 
 
 def tried_beside_joint_action_learners(results: Results) -> Measured:

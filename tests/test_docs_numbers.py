@@ -19,11 +19,17 @@ PAGES = {
 """The pages that people write, without what is printed or typed."""
 NUMBER = r"[-+]?[\d,]*\.?\d+"
 ESTIMATE = re.compile(rf"(?<![\w.,])({NUMBER})\s\[({NUMBER}),\s({NUMBER})\]")
-TIME = re.compile(rf"{NUMBER} ?(?:ms|us|µs)\b")
+TIME = re.compile(
+    rf"{NUMBER} ?(?:ms|us|µs)\b|{NUMBER} (?:s|min|minutes) of a core|{NUMBER} decisions a second"
+)
 GIVEN = {"64 ms", "1 ms", "10 ms"}
 """Times that nobody measured: the control period, and what a message is taken to take."""
 
 
+MOST_WORDS = 24_000
+"""Of prose on all pages, tables left out."""
+MOST_CHANGES = 3_000
+"""Words of the changelog."""
 REPEATING = ("README.md", "docs/concepts.md", "docs/claims.md")
 """Pages whose sentences repeat what stands elsewhere."""
 
@@ -47,6 +53,12 @@ def test_times_of_decisions_stand_in_benchmarks_alone() -> None:
         if time not in GIVEN
     }
     assert measured == set(), "say a ratio, or link to docs/benchmarks.md"
+
+
+def test_pages_are_short() -> None:
+    prose = " ".join(re.sub(r"^\|.*$", "", text, flags=re.MULTILINE) for text in PAGES.values())
+    assert len(prose.split()) <= MOST_WORDS
+    assert len((DOCS.parent / "CHANGELOG.md").read_text(encoding="utf-8").split()) <= MOST_CHANGES
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -109,7 +109,7 @@ Names: TypeAlias = Sequence[str]
 Bodies: TypeAlias = Sequence[Names]
 Pairs: TypeAlias = tuple[tuple[str, str], ...]
 Members = TypeAliasType("Members", "tuple[str | Members, ...]")
-"""The members of a team: agents, or teams of members, to any depth."""
+"""The members of a group: agents, or groups of members, to any depth."""
 Order: TypeAlias = Literal["listed", "reversed", "interleaved"] | tuple[str, ...]
 
 
@@ -204,10 +204,10 @@ def teams(
     link: Literal["chain", "star"] = "chain",
     members: Members | None = None,
 ) -> nx.DiGraph:
-    """Put the leaders of nested teams in a chain or a star, each above its team.
+    """Put the leaders of nested groups in a chain or a star, each above its group.
 
-    The leader of a team is that of its first member, that of an agent the agent itself. Without
-    `members`, the team is one of robots of wheels: the first wheels form a chain, each above its
+    The leader of a group is that of its first member, that of an agent the agent itself. Without
+    `members`, the groups are robots of wheels: the first wheels form a chain, each above its
     own robot's other wheels.
 
     Parameters
@@ -215,7 +215,7 @@ def teams(
     agents, bodies
         Names, also by body.
     link
-        Whether the leaders of the members of a team form a chain or a star.
+        Whether the leaders of the members of a group form a chain or a star.
     members
         Nested lists of agent names, to any depth; none: the bodies (robots) of the scenario.
 
@@ -355,7 +355,7 @@ def random_hierarchy(
 
 
 def names_of(members: Iterable[str | Members]) -> list[str]:
-    """Return the agents of nested teams, from left to right.
+    """Return the agents of nested groups, from left to right.
 
     Examples
     --------
@@ -400,9 +400,9 @@ def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbours: bool = 
 
 
 def _team(members: Sequence[str | Members], arrange: Callable[[Names], nx.DiGraph]) -> nx.DiGraph:
-    """Return the graph of a team whose members' leaders are arranged so."""
+    """Return the graph of a group whose members' leaders are arranged so."""
     if not members:
-        raise ValueError("a team has no members")
+        raise ValueError("a group has no members")
     graph = nx.compose_all(
         [independent([m]) if isinstance(m, str) else _team(m, arrange) for m in members]
     )

@@ -4,7 +4,7 @@ A string is ``"kind"`` or ``"kind:argument"``, see `parse`. A further topology i
 `builders` and one line in `TOPOLOGIES`; its keyword-only parameters are its settings. What may
 follow ``kind:`` is in `strings.ARGUMENTS`.
 
-Users bring hierarchies as files of graphs and teams, in Python files, and in installed packages. A
+Users bring hierarchies as files of graphs and groups, in Python files, and in installed packages. A
 user's topology is a function ``(agents, bodies) -> graph``. It is given the names of the agents and
 the same names by body (robot), and returns a networkx DiGraph over all agents, or pairs (superior,
 subordinate); an agent in no pair stands alone.
@@ -116,7 +116,7 @@ def parse(text: str | Mapping[str, object]) -> TopologySettings:
 
     Besides ``"kind"`` and ``"kind:argument"``, a file of a graph or of such a table, a
     ``file.py:function`` and the name of an installed package's topology stand for themselves. A
-    table without a kind that has `members` is one of teams, one that has `edges` of these.
+    table without a kind that has `members` is one of groups, one that has `edges` of these.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def build(
 
 
 def from_file(agents: Names, bodies: Bodies = (), *, path: str) -> nx.DiGraph:
-    """Read a graph or nested teams from a GraphML, JSON or TOML file.
+    """Read a graph or nested groups from a GraphML, JSON or TOML file.
 
     Parameters
     ----------

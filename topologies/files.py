@@ -21,7 +21,7 @@ def read_file(path: str) -> nx.Graph | dict[str, object]:
     """Read a graph, or a topology as it stands in a spec, from GraphML, JSON or TOML by suffix.
 
     JSON and TOML hold a table, perhaps under ``topology``: of edges, ``{"edges": [["a", "b"], ...],
-    "alone": [...]}``, of nested teams, ``{"members": [...]}``, or with the key ``kind``. JSON with
+    "alone": [...]}``, of nested groups, ``{"members": [...]}``, or with the key ``kind``. JSON with
     the key ``nodes`` is a graph as `networkx.node_link_data` writes it. An agent is named by its
     node's id; if all ids are numbers, with or without an ``n`` before them, and nodes have labels,
     by its label.

@@ -3,7 +3,7 @@
 The first agent to decide makes a plan for all agents that it sees below it. The plan starts from
 the best of a few joint actions: those in which all bodies do the same, and those in which the team
 is cut in two and the agents of either part do the same. (To turn a wide box half a team must slow
-down, and no agent gains by doing so alone.) One sweep of best responses improves it: body by body,
+down, and no agent gains by doing so alone.) One round of best responses improves it: body by body,
 each takes what is best while the others keep to the plan (iterated best response, Gauss-Seidel;
 Shoham and Leyton-Brown 2009, Section 7.7).
 
@@ -63,8 +63,8 @@ class BestResponseSettings(EvaluatorSettings):
 
     kind: Literal["best-response"] = "best-response"
     sweeps: Annotated[int, Field(ge=0, le=100), unwritten(1)] = 1
-    """How often every body improves the plan before anything is decided. Where all hear all that is
-    decided, the decisions are a sweep, too: with 0 they take three quarters of the time."""
+    """Rounds in which every body improves the plan before anything is decided. Where all hear all
+    that is decided, the decisions are a round, too: with 0 they take three quarters of the time."""
 
     def build(self, problem: DecisionProblem) -> Aggregation:
         """Return the evaluator of a team."""
@@ -98,7 +98,7 @@ class _Ahead(NamedTuple):
 
 
 class BestResponse(Aggregation):
-    """Plans for other agents by sweeps of best responses.
+    """Plans for other agents by rounds of best responses.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ class BestResponse(Aggregation):
         return plan
 
     def _started(self, deliberation: Deliberation, free: tuple[int, ...]) -> IntArray:
-        """Return the plan ``(n,)`` that the sweep of best responses starts from."""
+        """Return the plan ``(n,)`` that the round of best responses starts from."""
         if free not in self._starts:
             self._starts[free] = self._starting(free)
         tried = _with(deliberation.joint_action, [(free, self._starts[free])])

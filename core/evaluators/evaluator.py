@@ -199,6 +199,7 @@ class Aggregation(Evaluator):
         self._body_of = np.array([g for g, group in enumerate(problem.groups) for _ in group])
         self._last: tuple[Sequence[FloatArray], IntArray, Pooled] | None = None
         self._have_learned: set[int] = set()
+        self._unlearned: tuple[Sequence[FloatArray], IntArray] | None = None
 
     @staticmethod
     def require(key: str, value: str, allowed: str, why: str) -> None:
@@ -227,8 +228,13 @@ class Aggregation(Evaluator):
         agent = deliberation.agent
         if self.problem.rule != "value" or agent in self._have_learned:
             return False
-        decide = (deliberation.weights[i] for i in self.concerned[agent].tolist())
-        if not any(own[:64].any() or own.any() for own in decide):
+        weights = deliberation.weights
+        concerned = self.concerned[agent]
+        last = self._unlearned
+        if last is not None and last[0] is weights and last[1] is concerned:
+            return True  # asked once for agents of one decision, who may be many
+        if not any(weights[i][:64].any() or weights[i].any() for i in concerned.tolist()):
+            self._unlearned = weights, concerned
             return True
         self._have_learned.add(agent)
         return False

@@ -64,7 +64,11 @@ def as_scenario(thing: object) -> Scenario:
     """
     missing = ", ".join(name for name in NECESSARY if offered(thing, name) is None)
     if missing:
-        raise ValueError(f"scenario.kind: {type(thing).__name__} lacks {missing}")
+        hint = ""
+        if offered(thing, "action_space") is not None:
+            kind = "gymnasium" if offered(thing, "possible_agents") is None else "pettingzoo"
+            hint = f"; a spec names it by scenario.id, with scenario.kind = {kind!r}"
+        raise ValueError(f"scenario.kind: {type(thing).__name__} lacks {missing}{hint}")
     return thing if isinstance(thing, Scenario) else PlainScenario(thing)
 
 

@@ -116,9 +116,9 @@ def has_entry(data: object, key: int | str) -> bool:
 
 
 def entry(data: object, key: int | str) -> object:
-    """Return the entry of a table at a key, or of a list at an index; None if it is neither."""
+    """Return the entry of a table at a key, or of a list at an index; None if there is none."""
     if isinstance(data, Mapping):
-        return data[key]
+        return data.get(key)
     return data[key] if isinstance(data, Sequence) and isinstance(key, int) else None
 
 
@@ -154,7 +154,9 @@ def explain(
         is_there = problem.keys[-1:] == (name,) or isinstance(name, int)
         return f"{problem.path if is_there else dotted((*problem.keys, name))}: missing"
     if kind_of_problem == "plugged_kind":
-        return f"{_on_kind(problem)}{problem.details['msg']}"
+        kind = entry(problem.details["input"], "kind")
+        hint = several((*problem.keys, "kind"), kind, "")
+        return f"{_on_kind(problem)}{problem.details['msg']}{hint}"
     if kind_of_problem.startswith("union_tag"):
         return _on_unknown_kind(problem, model, table)
     # The members of a union complain one by one about the same place: say what any would take.
@@ -204,8 +206,20 @@ def _on_value(problem: Complaint, text: str, model: type[BaseModel], table: Tabl
     hint = ""
     if owner is not None and is_other_type:
         hint = mistaken(problem.keys[-1], owner.model_fields, problem.details["type"])
-    hint = hint or _pointer(problem.keys, value, model, table)
+    hint = hint or _pointer(problem.keys, value, model, table) or several(problem.keys, value, text)
     return f"{problem.path} = {show(value)}: {text}{hint}"
+
+
+def several(keys: Keys, value: object, text: str) -> str:
+    """Return where the values of a key of a section stand if a list was given for one value.
+
+    Examples
+    --------
+    >>> several(("scenario", "robots"), [2, 4], "must be a whole number")
+    '; values to compare stand in sweep'
+    """
+    is_one = isinstance(value, list | tuple) and len(keys) > 1 and isinstance(keys[-1], str)
+    return "; values to compare stand in sweep" * (is_one and "list" not in text)
 
 
 def _pointer(keys: Keys, value: object, model: type[BaseModel], table: Table) -> str:

@@ -11,7 +11,6 @@ it is trusted, see `trust`; so are modules that it names, see `Sources.permit`.
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import linecache
 import re
@@ -27,6 +26,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from .printing import printable
+from .syntax import imported, tree_text
 from .trust import LIBRARIES, is_trusted, module_text, sha256, trust
 
 ZIPPED = b"PK"
@@ -403,27 +403,10 @@ def meaning(text: str, name: str) -> str:
     if not name.endswith(".py"):
         return sha256(text)[:16]
     try:
-        tree = ast.dump(ast.parse(text, name))
+        tree = tree_text(text, name)
     except (SyntaxError, ValueError, RecursionError) as error:
         raise ValueError(f"{name} cannot be run: {format_error(error)}") from None
     return sha256(tree)[:16]
-
-
-def imported(text: str) -> set[str]:
-    """Return the top-level names of all modules that Python text imports; none if it is no Python.
-
-    Examples
-    --------
-    >>> sorted(imported("import numpy.linalg; from tank import Tank"))
-    ['numpy', 'tank']
-    """
-    try:
-        nodes = list(ast.walk(ast.parse(text)))
-    except (SyntaxError, ValueError, RecursionError):
-        return set()
-    names = {alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names}
-    names |= {n.module or "" for n in nodes if isinstance(n, ast.ImportFrom) and not n.level}
-    return {name.partition(".")[0] for name in names}
 
 
 def format_error(error: BaseException) -> str:

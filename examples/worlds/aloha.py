@@ -12,7 +12,7 @@ sent. All islands receive the team's reward, and see their own backlog alone.
 
 Departures. In the benchmark's public code islands 5 and 6, at opposite ends of the two rows, are
 neighbours, too; here they are not. An episode is truncated by its limit; there it is terminated.
-Its agents remember what they saw (recurrent networks); what ours see is this observation.
+Its agents remember what they saw (recurrent networks); what agents here see is this observation.
 """
 
 import numpy as np

@@ -178,9 +178,9 @@ class BoxPushing(Scenario, Embodiment):
             twists = twists[1:]  # what the box does tells nothing of the push then
         measured = self.measure()
         readings = self.settings.infrared.noisy(self.world.infrared()[0], self._sensing)
-        terminated = self._reached()
         away = measured["distance_m"]
         distance, way, turn = np.array([[away], [away - before], [measured["orientation_rad"]]])
+        terminated = bool(self.task.reached(distance, turn)[0])
         contact = self.world.contact[None]
         strongest = readings.max(axis=1)[None]
         gained = reward(self.task, distance, way, turn, contact, strongest)[0]

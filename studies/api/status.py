@@ -52,7 +52,7 @@ def progress(store: Store) -> Progress:
     trials = store.planned()
     refusal = outdated(store)
     states = store.states()
-    now = None if refusal is not None else look(store.directory)
+    now = look(store.directory)  # perhaps the process is of that other code
     begun = {} if now is None else now[1]
     pending = [trial for trial in trials if trial.identity not in states]
     running = [(t.condition, t.seed, begun[t.identity]) for t in pending if t.identity in begun]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from itertools import chain
 from shlex import quote
 from shutil import get_terminal_size
 from textwrap import fill
@@ -42,7 +43,7 @@ def print_wrapped(text: str, first: str = "", indent: int = 4) -> None:
 def print_lines(lines: Iterable[str]) -> None:
     """Print lines; on a terminal those that are wider than it go on in the next one, indented."""
     width = get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
-    for line in lines:
+    for line in chain.from_iterable(text.split("\n") for text in lines):
         print_text(line if len(line) <= width else fill(line, width, subsequent_indent="  "))
 
 

@@ -173,7 +173,7 @@ def rules_table(
     names, *columns = zip(*lines, strict=True)
     heads = pd.MultiIndex.from_tuples([name.rpartition(".")[::2] for name in agents])
     frame = pd.DataFrame(list(zip(*columns, strict=True)), index=names, columns=heads)
-    return frame.to_string(line_width=WIDTH, sparsify=False)
+    return frame.to_string(line_width=WIDTH, sparsify=False).replace("  \\\n", "\n")
 
 
 def mean_shares(parts: Sequence[Parts]) -> dict[int, float]:

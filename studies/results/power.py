@@ -321,12 +321,12 @@ def exponent_text(
             break
     takes = f"A difference of {goal} takes about {enough} seeds" if enough else ""
     if seeds < seeds_needed(comparisons):
-        text = f"{counted} are too few to tell any apart, at least {seeds_needed(comparisons)} "
-        text += f"are needed. {takes}."
+        text = f"{counted} are too few for a significant difference, "
+        text += f"at least {seeds_needed(comparisons)} are needed. {takes}."
     else:
         least = two_figures(detectable(deviation / _reach(sizes), seeds, comparisons))
         text = f"with {counted} of sizes {sizes[0]:g} to {sizes[-1]:g}, those that differ by "
-        text += f"{least} are told apart with probability {two_figures(WANTED)}."
+        text += f"{least} are significantly different with probability {two_figures(WANTED)}."
         if len(larger) > len(sizes) and takes:
             up_to = f", or sizes to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
             text += f" {takes}{up_to}."

@@ -99,8 +99,8 @@ class ScalingLaw(NamedTuple):
         seeds = seeds_for(APART, spread, len(pairs)) if spread > 0.0 else None
         if seeds is not None:
             lines += wrapped(
-                f"Power: exponents that differ by {two_figures(APART)} are told apart with "
-                f"probability .80 by about {seeds} seeds at these sizes."
+                f"Power: exponents that differ by {two_figures(APART)} are significantly different "
+                f"with probability .80 by about {seeds} seeds at these sizes."
             )
         return lines
 

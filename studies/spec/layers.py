@@ -25,7 +25,7 @@ from ...core.evaluators.coordination import MaxPlusSettings, VariableElimination
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import MOST_RULES, BatchTDSettings
 from ...core.learners.fitted_q import FittedQSettings
-from ...core.plugins.problems import explain, misplaced, problems_of
+from ...core.plugins.problems import explain, misplaced, problems_of, several
 from ...core.plugins.settings import ScenarioSettings, Settings, tuples
 from ...core.plugins.words import closest, show
 from ...scenarios import DEFAULT
@@ -411,8 +411,9 @@ def section(name: str, value: object) -> TomlTable:
         return dict(value)
     is_topology = name.rpartition(".")[2] == "topology"
     if not is_topology or not isinstance(value, str):
-        allowed = "a name or a table" if is_topology else "a table"
-        raise SpecError(f"{name} = {show(value)}: must be {allowed}")
+        allowed = "must be a name or a table" if is_topology else "must be a table"
+        hint = several((name, "kind"), value, allowed) * is_topology
+        raise SpecError(f"{name} = {show(value)}: {allowed}{hint}")
     with refused(name.removesuffix("topology")):
         return parse(value).model_dump()
 

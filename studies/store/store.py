@@ -27,7 +27,7 @@ from typing import Any
 from ...core.interface.measures import Measure
 from ..errors import SpecError
 from . import database, durable, integrity
-from .checksums import trial_checksums
+from .checksums import find_altered, trial_checksums
 from .connection import DamageError, has_log, open_to_read, open_to_write, transaction
 from .database import CHECKPOINTS, DATABASE, NoStudyError, Planned, StudyNotes
 from .durable import Recording
@@ -148,9 +148,7 @@ class Store:
 
     def _damaged_rows(self) -> dict[str, str]:
         """Return by identity whose rows are not what was written, one line each."""
-        written = dict(self._db.execute("SELECT identity, sha256 FROM checksums").fetchall())
-        actual = dict(trial_checksums(self._db))
-        damaged = [i for i in actual | written if actual.get(i) != written.get(i)]
+        damaged = find_altered(self._db)
         if not damaged:
             return {}
         known = "SELECT identity, condition, seed FROM "

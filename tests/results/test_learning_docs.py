@@ -34,7 +34,7 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("crowds", ("evaluation success", "all touch")),
         ("sixty-four", ("evaluation success",)),
         ("from-eight-128", ("evaluation success", "success, 128")),
-        ("sweeps", ("evaluation success", "success, sixty-four")),
+        ("rounds", ("evaluation success", "success, sixty-four")),
         ("from-eight", ("evaluation success", "success, sixty-four")),
         ("wide", ("evaluation success", "success, sixty-four")),
         ("large-team", LARGE_TEAM),

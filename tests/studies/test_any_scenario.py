@@ -235,6 +235,8 @@ def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
 HALVES = {
     "Plain": "Plain lacks step",
     "Empty": "Empty lacks agents, state_space, action_set",
+    "Gym": "step; a spec names it by scenario.id, with scenario.kind = 'gymnasium'",
+    "Zoo": "step; a spec names it by scenario.id, with scenario.kind = 'pettingzoo'",
     "Hollow": "raises AttributeError: 'int' object has no attribute",
 }
 """What is said of scenarios that lack something."""
@@ -268,6 +270,16 @@ class Hollow(Empty):
         whole = LineUp(LineUpSettings())
         self.agents, self.action_set = whole.agents, whole.action_set
         self.state_space = whole.state_space
+
+class Gym:
+    Settings = Plain.Settings
+    action_space = 1
+
+    def __init__(self, settings):
+        pass
+
+class Zoo(Gym):
+    possible_agents = ()
 """)
     (tmp_path / "half.toml").write_text(f'scenario.kind = "half.py:{name}"\n')
     assert main(["run", str(tmp_path / "half.toml"), "--out", str(tmp_path / "out")]) == 2

@@ -123,7 +123,7 @@ def test_a_refusal_is_one_line_that_names_the_culprit(text: str, message: str) -
     [
         ({"kind": "teams", "members": [["a", "b"], ["c"]]}, "agent 'd' is missing from members"),
         ({"kind": "teams", "members": [["a", "b"], ["c", "d", "a"]]}, "agent 'a' occurs more than"),
-        ({"kind": "teams", "members": [["a", "b"], [], ["c", "d"]]}, "a team has no members"),
+        ({"kind": "teams", "members": [["a", "b"], [], ["c", "d"]]}, "a group has no members"),
     ],
 )
 def test_a_table_that_does_not_fit_is_refused(table: dict, message: str) -> None:

@@ -113,7 +113,8 @@ class View(Situations):
     def _contact(self) -> FloatArray:
         """The middle ``(m, 2)`` of the robots in contact [m], see `contact_push`."""
         weights = (np.exp(-np.maximum(self.gaps, 0.0) / CLOSE) + LEAST)[:, :, None]
-        return (weights * self.robots[:, :, :2]).sum(axis=1) / weights.sum(axis=1)
+        middle = np.add.reduce(weights * self.robots[:, :, :2], axis=1)
+        return middle / np.add.reduce(weights, axis=1)
 
     @cached_property
     def path(self) -> FloatArray:
@@ -335,7 +336,8 @@ def others_away(view: View, robot: int) -> FloatArray:
     """
     others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
     gaps = np.ascontiguousarray(view.gaps[:, others])  # added up alike however many situations
-    return np.clip(gaps / AWAY, 0.0, 1.0).mean(axis=1)
+    away = np.minimum(np.maximum(gaps / AWAY, 0.0), 1.0)
+    return np.add.reduce(away, axis=1) / len(others)
 
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)

@@ -136,6 +136,8 @@ def analyse(results: Results) -> Analysis:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: evaluations against decisions experienced, bands 95 % intervals."""
+    from matplotlib.ticker import LogLocator
+
     from ...presentation import figures as f  # matplotlib takes its time
 
     figure, panels = f.panels(1, 1, (5.4, 3.6))
@@ -143,6 +145,7 @@ def draw(analysis: Analysis) -> Figures:
     for i, course in enumerate(analysis.cases):
         f.draw_curve(axes, course.decisions, course.values, i, marker="o", markersize=3.5)
     f.log_axis(axes, "x")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     axes.set_xlabel("joint decisions of training")
     is_rate = EVALUATED in analysis.differences
     axes.set_ylabel(EVALUATED if is_rate else RETURN)

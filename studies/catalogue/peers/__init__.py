@@ -1,4 +1,4 @@
-"""The peers study: how ours compares with learners of other libraries, and with planners.
+"""The peers study: how fuzzy agents compare with learners of other libraries, and with planners.
 
 Training stops at some shares of its episodes, `CHECKPOINTS`, for an evaluation without exploration,
 on the same worlds every time. Success stands against the decisions experienced until then. The CPU

@@ -186,7 +186,6 @@ def draw(analysis: Analysis) -> Figures:
 
     Points are means over seeds, bars their 95 % intervals; evaluators differ by colour and marker,
     and stand a little beside each other.
-    Messages are one black line if all evaluators pass as many.
     """
     from ...presentation import figures  # matplotlib takes its time
 
@@ -205,6 +204,7 @@ def draw(analysis: Analysis) -> Figures:
             figures.log_axis(axes)
         else:
             axes.set_yscale(scale, **({"linthresh": 1.0} if scale == "symlog" else {}))
+            axes.yaxis.set_major_formatter("{x:,.10g}")
             axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
     figures.as_rates(panels[0, 0])
     for period in {p.period for p in points if p.period is not None}:

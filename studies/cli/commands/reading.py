@@ -21,6 +21,7 @@ from ..display import (
     Form,
     in_form,
     print_data,
+    print_lines,
     print_meanings,
     print_study,
     print_table,
@@ -43,7 +44,7 @@ def status(directory: Path, watch: bool) -> int:
     if watch and sys.stdout.isatty():
         _watch(directory)
     with Store.open(directory) as store:
-        print_text(*describe(store, progress(store)))
+        print_lines(describe(store, progress(store)))
         failed = store.failed()
     for condition, seed, error in failed:
         print_text(f"\n{condition}, seed {seed} failed:\n{error.rstrip()}")

@@ -30,7 +30,7 @@ def made_up() -> Arrays:
     def found(p: float) -> dict[str, np.ndarray]:
         return {"success": (rng.random((SEEDS, 20)) < p).astype(int)}
 
-    chances = {"ours": (0.0, 1.0, 1.0), "PPO": (0.0, 0.1, 0.5)}
+    chances = {"fuzzy TD": (0.0, 1.0, 1.0), "PPO": (0.0, 0.1, 0.5)}
     phases = {
         f"after {count}": {c: found(p[i]) for c, p in chances.items()}
         for i, count in enumerate((2, 10))
@@ -40,7 +40,7 @@ def made_up() -> Arrays:
     seeds = dict.fromkeys(chances, tuple(range(SEEDS)))
     usage = {
         c: {f"cpu.{n}": np.full(SEEDS, rate * n) for n in (2, 10, 20)}
-        for c, rate in {"ours": 0.5, "PPO": 2.0}.items()
+        for c, rate in {"fuzzy TD": 0.5, "PPO": 2.0}.items()
     }
     return Arrays(training, last, phases, seeds=seeds, usage=usage)
 

@@ -59,6 +59,8 @@ def test_lines_are_broken_on_a_terminal_only(monkeypatch, capsys):
     print_lines(lines)
     broken = ["training success: 24 orders do not", "  differ significantly"]
     assert capsys.readouterr().out.splitlines() == ["short", "", *broken]
+    print_lines(["time with n agents of default:\n  deciding n^1.15 [.90, 1.40]"])  # a note
+    assert capsys.readouterr().out.splitlines()[1] == "  deciding n^1.15 [.90, 1.40]"
 
 
 def test_what_learns_nothing_is_named(tmp_path, capsys):

@@ -93,6 +93,12 @@ def test_what_other_code_has_done_is_done(study, monkeypatch, capsys):
     text = capsys.readouterr().out
     assert "done     4 of 6 trials" in text
     assert "nothing can be added: " in text
+    with made_up.opened(study, accept_code=True), Running(study, 3) as running:
+        running.begin(made_up.TRIALS[5].identity)
+        assert main(["status", str(study)]) == 0
+    text = capsys.readouterr().out
+    assert "running  1\n         frozen, seed 2, for" in text
+    assert "left     1\n" in text
 
 
 def test_a_study_of_another_version_is_refused(study, monkeypatch, capsys):

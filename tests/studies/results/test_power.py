@@ -156,11 +156,11 @@ def test_exponents_are_told_apart_by_more_seeds_or_larger_sizes() -> None:
     said = " ".join(" ".join(exponent_text([2.0, 4.0, 8.0, 16.0], 20)).split())
     # Logarithms of sizes lie log 2 apart: their squares about the mean sum up to 5 (log 2) ** 2.
     deviation = 0.5 / (5.0**0.5 * np.log(2.0))
-    assert f"differ by {two_figures(detectable(deviation, 20))} are told apart" in said
+    assert f"differ by {two_figures(detectable(deviation, 20))} are significantly different" in said
     assert f"takes about {seeds_for(0.2, deviation)} seeds, or sizes to 32." in said
-    few = " ".join(exponent_text([2.0, 3.0, 4.0], 5, comparisons=3))
+    few = " ".join(" ".join(exponent_text([2.0, 3.0, 4.0], 5, comparisons=3)).split())
     assert few.startswith(
-        "Exponents: 5 seeds are too few to tell any apart, at least 7 are needed."
+        "Exponents: 5 seeds are too few for a significant difference, at least 7 are needed."
     )
 
 

@@ -472,6 +472,27 @@ def test_edges_beside_neighbours_have_no_table():
         plain(Hierarchy("abc", [("a", "b")], neighbours=[("a", "c")]), "topology")
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"scenario": {"robots": [2, 4]}},
+        {"learner": {"kind": ["batch-td", "fitted-q"]}},
+        {"learner": {"decision": {"value_of": ["team", "own"]}}},
+        {"topology": ["chain", "star"]},
+        {"topology": {"kind": ["chain", "star"]}},
+    ],
+)
+def test_a_list_where_one_value_stands_is_pointed_to_the_sweep(wrong):
+    with pytest.raises(SpecError, match=r"values to compare stand in sweep$"):
+        Spec.read({"study": "scaling", "seeds": 2, **wrong})
+
+
+@pytest.mark.parametrize("wrong", [{"episodes": [3, 4]}, {"learner": ["td"]}])
+def test_a_list_that_cannot_be_swept_is_not(wrong):
+    with pytest.raises(SpecError, match=r"must be a (whole number|table)$"):
+        Spec.read({"study": "scaling", "seeds": 2, **wrong})
+
+
 def test_a_key_that_is_nearly_another_one_is_suggested():
     with pytest.raises(SpecError, match=r"scenario\.robot = 4: .*; did you mean 'robots'\?"):
         Spec.of({"scenario": {"robot": 4}})
