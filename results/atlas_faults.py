@@ -37,7 +37,7 @@ class FaultCost(NamedTuple):
 
 
 def fault_costs(rows: pd.DataFrame) -> list[FaultCost]:
-    """Return what faults cost in the quality of a task, by hierarchy and size."""
+    """Return what faults cost in the quality of a task, at the largest size, by hierarchy."""
     lines = []
     for task, own in rows.groupby("task", sort=False):
         measure = quality(str(task))
@@ -49,16 +49,16 @@ def fault_costs(rows: pd.DataFrame) -> list[FaultCost]:
 def _fault_costs(task: str, rows: pd.DataFrame, measure: str) -> Iterator[FaultCost]:
     whole = rows[rows["fault"] == NO_FAULT]
     failing = rows[rows["fault"] != NO_FAULT]
-    for (hierarchy, learner, fault, size), own in failing.groupby(
-        [*TeamKind._fields[1:], "size"], sort=False
-    ):
+    for (hierarchy, learner, fault), own in failing.groupby(list(TeamKind._fields[1:]), sort=False):
+        size = int(own["size"].max())
         places = (whole["hierarchy"] == hierarchy) & (whole["size"] == size)
         base = whole[places & (whole["learner"] == learner)].set_index("seed")[measure]
-        each = (own.set_index("seed")[measure] - base).dropna().to_numpy(dtype=float)
-        if len(each) < 2:
+        at = own[own["size"] == size].set_index("seed")[measure]
+        each = (at - base).dropna().to_numpy(dtype=float)
+        if len(each) < 2 or not each.any():  # no messages, which could fail
             continue
         p = float(stats.ttest_1samp(each, 0.0).pvalue) if np.ptp(each) > 0.0 else 1.0
-        yield FaultCost(task, str(hierarchy), int(size), str(fault), measure, bootstrap(each), p)
+        yield FaultCost(task, str(hierarchy), size, str(fault), measure, bootstrap(each), p)
 
 
 def _holm(lines: Sequence[FaultCost]) -> list[FaultCost]:

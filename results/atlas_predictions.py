@@ -16,7 +16,7 @@ from .atlas import COSTS, MEASURES, TeamKind, sample_of
 
 SMALL = 16
 """Agents of the largest teams that laws are fitted to."""
-SMALLER = {"landmarks": 4, "landmarks_more": 4, "permutation": 5, "boxes": 4}
+SMALLER = {"landmarks": 4, "landmarks_more": 4, "permutation": 5, "small_boxes": 4}
 """The same of tasks whose teams are all small."""
 
 
