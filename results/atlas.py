@@ -64,7 +64,7 @@ condition is not one of them."""
 CONTROLS = (*LEARN_NOTHING, "random")
 ALREADY = "published"
 """The task whose rows are those."""
-SEEN = (ALREADY, "signals", "signals_learned")
+SEEN = (ALREADY, "signals")
 """Tasks on whose rows the way of predicting was chosen."""
 UNSEEN = ("permutation", "small_boxes")
 """Tasks that were opened after the rule of the best hierarchy was committed."""
