@@ -66,13 +66,10 @@ ALREADY = "published"
 """The task whose rows are those."""
 SEEN = (ALREADY, "signals")
 """Tasks on whose rows the way of predicting was chosen."""
-QUALITIES = {
-    "signals": {"right": 1, "success": 1},
-    "games": {"share_of_best": 1},
-    "line_up": {"success": 1, "final_spread_m": -1},
-    "arms": {"success": 1, "final_distance_m": -1},
-}
-"""By what hierarchies of a task are ranked, each with its sign; of other tasks by success."""
+UNSEEN = ("permutation", "small_boxes")
+"""Tasks that were opened after the rule of the best hierarchy was committed."""
+QUALITIES = {"signals": "right", "signals_learned": "right", "games": "share_of_best"}
+"""By what hierarchies of a task are ranked; of other tasks by success."""
 
 
 class TeamKind(NamedTuple):
@@ -189,6 +186,6 @@ def sample_of(rows: pd.DataFrame, measure: str) -> laws.Sample | None:
     return laws.of_numbers(sizes, array) if (array > 0.0).all() else None
 
 
-def qualities(task: str) -> Mapping[str, int]:
-    """Return by which measures hierarchies of a task are ranked, each with its sign."""
-    return QUALITIES.get(task, {"success": 1})
+def quality(task: str) -> str:
+    """Return by which measure, the more the better, hierarchies of a task are ranked."""
+    return QUALITIES.get(task, "success")

@@ -11,7 +11,7 @@ from ..core.numerics import pd, stats
 from ..studies.results.analysis import format_p
 from ..studies.results.notation import bracketed, signed, two_figures
 from ..studies.results.statistics import LEVEL, Estimate, bootstrap, holm
-from .atlas import MEASURES, NO_FAULT, TeamKind, qualities
+from .atlas import MEASURES, NO_FAULT, TeamKind, quality
 
 DOSES = {"lost": "messages lost", "left": "members gone"}
 """With what the name of a fault begins that is a share of something."""
@@ -37,28 +37,28 @@ class FaultCost(NamedTuple):
 
 
 def fault_costs(rows: pd.DataFrame) -> list[FaultCost]:
-    """Return what faults cost in the first quality of a task, by hierarchy and size."""
+    """Return what faults cost in the quality of a task, at the largest size, by hierarchy."""
     lines = []
     for task, own in rows.groupby("task", sort=False):
-        measure, sign = next(iter(qualities(str(task)).items()))
+        measure = quality(str(task))
         if measure in own:
-            lines += _holm(list(_fault_costs(str(task), own, measure, sign)))
+            lines += _holm(list(_fault_costs(str(task), own, measure)))
     return lines
 
 
-def _fault_costs(task: str, rows: pd.DataFrame, measure: str, sign: int) -> Iterator[FaultCost]:
+def _fault_costs(task: str, rows: pd.DataFrame, measure: str) -> Iterator[FaultCost]:
     whole = rows[rows["fault"] == NO_FAULT]
     failing = rows[rows["fault"] != NO_FAULT]
-    for (hierarchy, learner, fault, size), own in failing.groupby(
-        [*TeamKind._fields[1:], "size"], sort=False
-    ):
+    for (hierarchy, learner, fault), own in failing.groupby(list(TeamKind._fields[1:]), sort=False):
+        size = int(own["size"].max())
         places = (whole["hierarchy"] == hierarchy) & (whole["size"] == size)
         base = whole[places & (whole["learner"] == learner)].set_index("seed")[measure]
-        each = ((own.set_index("seed")[measure] - base) * sign).dropna().to_numpy(dtype=float)
-        if len(each) < 2:
+        at = own[own["size"] == size].set_index("seed")[measure]
+        each = (at - base).dropna().to_numpy(dtype=float)
+        if len(each) < 2 or not each.any():  # no messages, which could fail
             continue
         p = float(stats.ttest_1samp(each, 0.0).pvalue) if np.ptp(each) > 0.0 else 1.0
-        yield FaultCost(task, str(hierarchy), int(size), str(fault), measure, bootstrap(each), p)
+        yield FaultCost(task, str(hierarchy), size, str(fault), measure, bootstrap(each), p)
 
 
 def _holm(lines: Sequence[FaultCost]) -> list[FaultCost]:

@@ -110,9 +110,10 @@ def atlas(
     Laws are fitted to teams of at most 16 agents, and of at most 8, and larger ones of the same
     rows are predicted. Without --out the rows are the committed ones.
     """
-    from .atlas import ALREADY, COMMITTED, SEEN, read_rows, run_tasks
+    from .atlas import ALREADY, COMMITTED, SEEN, UNSEEN, read_rows, run_tasks
+    from .atlas_choices import choices, shares_right
     from .atlas_faults import fault_costs, thresholds
-    from .atlas_predictions import SMALL, checks, choices, coverage, shares_right
+    from .atlas_predictions import SMALL, checks, coverage
 
     if out is None and (tasks or jobs is not None):
         raise SpecError(f"{'--task' if tasks else '--jobs'}: needs --out, where to run the tasks")
@@ -131,12 +132,17 @@ def atlas(
             continue
         print_text("", f"{title}: teams larger than {most} in 90 % intervals")
         print_lines(coverage(checks(own, most)))
-        chosen = choices(own, most)
-        print_lines([*shares_right(chosen), *map(str, chosen)])
-        costs = fault_costs(own)
-        if costs:
-            print_text("", "What faults cost")
-            print_lines([*map(str, costs), *thresholds(costs)])
+    chosen = choices(frame[frame["source"] != ALREADY])
+    for title, is_unseen in {"not seen before": True, "seen": False}.items():
+        cases = [choice for choice in chosen if (choice.case[0] in UNSEEN) == is_unseen]
+        print_text("", f"Best hierarchy of the largest teams, tasks {title}")
+        print_lines([*shares_right(cases), *map(str, cases)])
+    print_text("", "Best hierarchy of the largest teams, all tasks")
+    print_lines(shares_right(chosen))
+    costs = fault_costs(frame)
+    if costs:
+        print_text("", "What faults cost")
+        print_lines([*map(str, costs), *thresholds(costs)])
     if figures is not None:
         from ..studies.presentation.figures import write
         from .atlas_figures import FIGURES

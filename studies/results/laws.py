@@ -177,6 +177,18 @@ def of_rates(sizes: Array, successes: Array, episodes: int) -> Sample:
     return Sample(sizes, logits, np.zeros(logits.shape, dtype=bool), LOGIT)
 
 
+def apart(own: Sample, base: Sample) -> Sample:
+    """Return by how much values lie above those of the same seeds at the same sizes, on the scale.
+
+    What lets both grow alike is not in it, so that its law is left by less than theirs. Its values
+    are no logits, but may be negative, and have the same laws.
+    """
+    both, first, second = np.intersect1d(own.sizes, base.sizes, return_indices=True)
+    values = own.values[:, first] - base.values[:, second]
+    censored = own.censored[:, first] | base.censored[:, second]
+    return Sample(both, values, censored, LOGIT)
+
+
 class Law(NamedTuple):
     """A law that has been fitted."""
 
@@ -248,32 +260,6 @@ class Law(NamedTuple):
         return drift(
             fitted, float(x[0]), self.left, slopes[:-1], slopes[-1], self.scatter / self.seeds
         )
-
-    def less(self, base: Law, size: float, level: float = 0.9) -> Estimate:
-        """Return by how much new means lie above those of another law at a size, on the scale.
-
-        Both laws are of the same seeds, which are resampled together.
-        """
-        x = np.log([size])
-        value = float((self.curve.of(self.parameters, x) - base.curve.of(base.parameters, x))[0])
-        both, own, others = np.intersect1d(
-            self.sample.sizes, base.sample.sizes, return_indices=True
-        )
-        apart = self.sample.values[:, own] - base.sample.values[:, others]
-        noise = float(apart.var(axis=0, ddof=1).mean())
-        parts = [
-            (self._spread(self._resampled_at(x) - base._resampled_at(x)) ** 2, self.seeds - 1.0),
-            (noise / self.seeds, (self.seeds - 1.0) * len(both)),
-        ]
-        one, other = self._drift(x), base._drift(x)
-        known = _mixed(
-            np.outer(one.weights, other.weights).ravel(),
-            value + np.subtract.outer(one.shifts, other.shifts).ravel(),
-            np.add.outer(one.variances, other.variances).ravel(),
-            parts,
-        )
-        shares = (0.5, 0.5 - level / 2.0, 0.5 + level / 2.0)
-        return Estimate(*(np.asarray(known.quantile(p)) for p in shares))
 
     def _slopes(self, x: Array) -> Array:
         """Return the derivatives ``(m, k)`` of the law at ``x`` by its parameters."""
