@@ -66,7 +66,7 @@ ALREADY = "published"
 """The task whose rows are those."""
 SEEN = (ALREADY, "signals")
 """Tasks on whose rows the way of predicting was chosen."""
-UNSEEN = ("permutation", "small_boxes")
+UNSEEN = ("permutation", "small_boxes", "votes")
 """Tasks that were opened after the rule of the best hierarchy was committed."""
 QUALITIES = {"signals": "right", "signals_learned": "right", "games": "share_of_best"}
 """By what hierarchies of a task are ranked; of other tasks by success."""

@@ -1,5 +1,6 @@
 """The atlas: rows of trials, laws of small teams tested on large ones, and the committed rows."""
 
+import re
 from itertools import product
 from pathlib import Path
 
@@ -100,7 +101,15 @@ def test_bad_input(
 def test_the_command_prints_what_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["atlas"]) == 0
     page = Path(__file__).resolve().parents[2] / "docs" / "atlas.md"
-    assert capsys.readouterr().out.strip() in page.read_text(encoding="utf-8")
+    out = capsys.readouterr().out.strip()
+    text = page.read_text(encoding="utf-8")
+    assert out in text
+    (laws, share), *_ = re.findall(r"^all: .* inside, (\d+) laws, share (.*\]);", out, re.MULTILINE)
+    assert f"held in {share} of {laws} laws;" in text
+    counts = re.findall(
+        r"^(?:decided and right|the greatest prediction): .*, (.*\])$", out, re.MULTILINE
+    )
+    assert all(count in text.split("```")[-3] for count in counts[-2:])
 
 
 def test_the_page_has_the_law_of_decisions_to_success(capsys: pytest.CaptureFixture[str]) -> None:
