@@ -113,6 +113,8 @@ class Plan:
     """What looks wrong and is not refused, a line each."""
     costs: Mapping[str, ConditionCost] = field(default_factory=dict)
     """By label, what conditions take that were tried."""
+    worlds: int = 1
+    """In how many worlds the learner that has the most learns at once."""
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -127,6 +129,8 @@ class Plan:
         processes = count(self.processes, "process", "es")
         yield f"study    {outline.study}: {conditions} x {count(n_seeds, 'seed')}"
         yield f"trials   {self.trials}, each {outline.lengths} of up to {steps}"
+        if self.worlds > 1:
+            yield f"worlds   at most {self.worlds} at once; decisions are those of all together"
         if self.seconds is not None and self.likely is not None:
             quick, slow = map(duration, self.seconds)
             usual = duration(self.likely)
@@ -234,6 +238,7 @@ def plan(
         smallest=smallest,
         warnings=spec.warnings(),
         costs=costs,
+        worlds=max(c.settings.learner.at_once for c in spec.conditions()),
     )
 
 

@@ -307,9 +307,9 @@ def exponent_text(
     Examples
     --------
     >>> print(*exponent_text([2, 4, 8, 16], 20), sep="\n")
-    Exponents: with 20 seeds of sizes 2 to 16, those that differ by .21 are told
-      apart with probability .80. A difference of .20 takes about 23 seeds, or sizes
-      to 32.
+    Exponents: with 20 seeds of sizes 2 to 16, those that differ by .21 are
+      significantly different with probability .80. A difference of .20 takes about
+      23 seeds, or sizes to 32.
     """
     goal = two_figures(APART)
     counted = f"{seeds} seed{'s' * (seeds != 1)}"

@@ -31,6 +31,8 @@ def test_a_plan_tells_trials_time_memory_and_power() -> None:
     assert f"time     about {duration(plan.likely)} with 2 processes" in text
     assert "at most" not in text
     assert max(map(len, text.splitlines())) <= 80
+    single = {"study": "peers", "seeds": 1, "episodes": 1}
+    assert "worlds" not in str(na.plan(single, timed=False))
 
 
 def test_more_seeds_find_smaller_differences() -> None:
@@ -160,4 +162,7 @@ def test_a_plan_counts_decisions_and_tells_of_checkpoints():
     text = str(na.plan(table))
     assert "each 1,000,000,000 decisions in episodes of up to 10 steps" in text
     assert "killed   a trial goes on from its checkpoint, every 5 min" in text
+    assert f"worlds   at most {PPO['worlds']} at once; decisions are those of all together" in text
     assert max(map(len, text.splitlines())) <= 80
+    single = {"study": "peers", "seeds": 1, "episodes": 1}
+    assert "worlds" not in str(na.plan(single, timed=False))

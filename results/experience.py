@@ -1,0 +1,237 @@
+"""Networks at the field's budgets: tables by decisions, what an edge and foresight are worth.
+
+``python -m nested_agents.results.experience`` prints the tables of docs/peers.md from the rows
+of `TASKS` that are there; with directories of kept studies ``experience`` it prints their rows, as
+they are committed. A comparison is of the condition with edges, less that without: *helps* if it is
+better with p < .05, adjusted over all comparisons with it (Holm), *equal* if the whole interval
+lies within the margin, which each spec named before its runs.
+"""
+
+import sys
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.interface.measures import SUCCESS
+from ..core.numerics import FloatArray, pd
+from ..studies.api.loading import load
+from ..studies.catalogue.peers import AFTER
+from ..studies.cli.display import print_text
+from ..studies.results.analysis import Difference, differences, format_p
+from ..studies.results.notation import bracketed, two_figures
+from ..studies.results.results import Results
+from ..studies.results.statistics import LEVEL, Estimate, bootstrap, rate
+from . import ROWS
+
+RANDOM = "random"
+RETURN = "return"
+FUZZY = "fuzzy TD"
+CHAIN = "hierarchy-ppo, chain"
+SPAN = 0.1
+"""Margin of returns: this share of the way from random to the best at the end."""
+HALF = 0.5
+"""Evaluation success at which decisions of training are compared."""
+
+
+class PublishedCourse(NamedTuple):
+    """A task whose rows are published."""
+
+    shown: tuple[int, ...]
+    """Decisions of training after which its table has a column."""
+    episodes: int
+    """Of an evaluation."""
+    margin: float | None = 0.1
+    """Within which a difference is none that matters; none: `SPAN`."""
+    edges: str = CHAIN
+    """The condition with edges."""
+    without: str = "hierarchy-ppo, no edges"
+    """The condition that it is compared with."""
+
+
+TASKS = {
+    "spread": PublishedCourse((1000, 10_000, 100_000, 400_000), 100, 1.0),
+    "vmas": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 4, None),
+    "landmarks": PublishedCourse((1000, 3000, 10_000, 30_000), 100),
+    "ring": PublishedCourse((1000, 3000, 10_000, 30_000), 1, edges="hierarchy-ppo, own edges"),
+    "arm": PublishedCourse((1000, 10_000, 30_000, 100_000, 400_000), 25, 0.05),
+    "arm-16": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 10),
+    "box": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 10),
+    "four-robots": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 5),
+}
+"""By the name of their rows."""
+
+
+def read(name: str) -> pd.DataFrame:
+    """Return the rows of a task: condition, decisions, seed, and success or return."""
+    return pd.read_csv(ROWS / f"{name}-experience.csv").sort_values("seed", kind="stable")
+
+
+def committed() -> list[str]:
+    """Return the tasks whose rows are there."""
+    return [name for name in TASKS if (ROWS / f"{name}-experience.csv").is_file()]
+
+
+def rows_of(results: Results, budget: int) -> pd.DataFrame:
+    """Return means of evaluations by condition, decisions and seed, as they are committed.
+
+    The last one counts as after the `budget`, which a whole rollout may exceed.
+    """
+    conditions = sorted(results.of_phase("evaluation"))
+    is_rate = any(results.success(condition, "evaluation").any() for condition in conditions)
+    measure = SUCCESS.name if is_rate else RETURN
+    rows = []
+    for condition in conditions:
+        stops = {
+            int(phase.removeprefix(AFTER)): phase
+            for phase in results.phases
+            if phase.startswith(AFTER) and results.has(condition, phase)
+        }
+        for decisions, phase in sorted({**stops, budget: "evaluation"}.items()):
+            for seed, value in results.means(condition, phase, measure).items():
+                rows.append((condition, decisions, seed, round(float(value), 3)))
+    return pd.DataFrame(rows, columns=["condition", "decisions", "seed", measure])
+
+
+def lines(name: str) -> Iterator[str]:
+    """Yield the table of a task, a line for every condition."""
+    task = TASKS[name]
+    yield f"| condition | {' | '.join(f'{n:,}' for n in task.shown)} |"
+    yield "|" + " --- |" * (1 + len(task.shown))
+    for condition, own in read(name).groupby("condition"):
+        cells = []
+        for n in task.shown:
+            means = own[own["decisions"] == n].iloc[:, -1].to_numpy()
+            cells.append(bracketed(_estimate(means, own.columns[-1], task)) if len(means) else "")
+        yield f"| {condition} | {' | '.join(cells)} |"
+
+
+def _estimate(means: FloatArray, measure: str, task: PublishedCourse) -> Estimate:
+    """Return the mean of evaluations by seed with its interval."""
+    if measure == RETURN:
+        return bootstrap(means)
+    reached = np.rint(task.episodes * means)[:, None]
+    return rate(np.arange(task.episodes) < reached)
+
+
+class EdgeWorth(NamedTuple):
+    """What an edge is worth to networks at the end of training."""
+
+    compared: Difference
+    """With edges less without."""
+    margin: float
+    """Within which it is nothing."""
+
+    @property
+    def verdict(self) -> str:
+        """Whether an edge helps, harms, is worth nothing, or none of these can be said."""
+        value, low, high = map(float, self.compared.estimate)
+        if self.compared.p < LEVEL:
+            return "helps" if value > 0.0 else "harms"
+        return "equal" if -self.margin <= low and high <= self.margin else "not decided"
+
+
+def edge(name: str) -> EdgeWorth:
+    """Return what an edge is worth in a task."""
+    task = TASKS[name]
+    rows = read(name)
+    measure = rows.columns[-1]
+    of_networks = rows[~rows["condition"].str.startswith(FUZZY)]
+    last = of_networks[of_networks["decisions"] == task.shown[-1]]
+    ends = last.pivot_table(index="seed", columns="condition", values=measure)
+    pairs = [(c, measure, ends[task.edges], ends[c]) for c in ends if c != task.edges]
+    compared = differences({name: pairs}, of_rates=measure == SUCCESS.name)[name]
+    means = ends.mean()
+    span = SPAN * float(means.max() - means[RANDOM])
+    (without,) = [d for d in compared if d.condition == task.without]
+    return EdgeWorth(without, span if task.margin is None else task.margin)
+
+
+def edge_lines() -> Iterator[str]:
+    """Yield a table of what edges are worth, a line for every task."""
+    yield "| rows | seeds | decisions | with edges less without | p | margin | edge |"
+    yield "|---|---|---|---|---|---|---|"
+    for name in committed():
+        worth = edge(name)
+        cells = (
+            name,
+            str(worth.compared.seeds),
+            f"{TASKS[name].shown[-1]:,}",
+            bracketed(worth.compared.estimate),
+            format_p(worth.compared.p).removeprefix("= ").replace("0.", "."),
+            two_figures(worth.margin),
+            worth.verdict,
+        )
+        yield f"| {' | '.join(cells)} |"
+
+
+class PredictorWorth(NamedTuple):
+    """How many times as many decisions networks need as agents with a predictor."""
+
+    times: Estimate
+    """The ratio; geometric mean over seeds."""
+    missed: int
+    """Seeds of networks that did not get there, counted as if they had at the end."""
+
+
+def decisions_to(own: pd.DataFrame, criterion: float = HALF) -> tuple[pd.Series, int]:
+    """Return after how many decisions seeds succeed so often, and how many seeds never do.
+
+    Between evaluations success is linear in the logarithm of decisions. Whoever is there at the
+    first evaluation is counted by it, and who never is by the last one.
+    """
+    wide = own.pivot_table(index="seed", columns="decisions", values=SUCCESS.name)
+    logs = np.log(wide.columns.to_numpy(float))
+    reached = []
+    missed = 0
+    for _, success in wide.iterrows():
+        values = success.to_numpy()
+        above = np.flatnonzero(values >= criterion)
+        if not len(above):
+            missed += 1
+            reached.append(logs[-1])
+        elif above[0] == 0:
+            reached.append(logs[0])
+        else:
+            after = above[0]
+            ends = slice(after - 1, after + 1)
+            reached.append(np.interp(criterion, values[ends], logs[ends]))
+    return pd.Series(np.exp(reached), wide.index), missed
+
+
+def foresight(name: str, fuzzy: str = FUZZY, networks: str = CHAIN) -> PredictorWorth:
+    """Return what a predictor saves in a task."""
+    rows = read(name)
+    needed, missed = decisions_to(rows[rows["condition"] == networks])
+    own, _ = decisions_to(rows[rows["condition"] == fuzzy])
+    estimate = bootstrap(np.log(needed / own).dropna().to_numpy())
+    return PredictorWorth(Estimate(*map(np.exp, estimate)), missed)
+
+
+def foresight_lines() -> Iterator[str]:
+    """Yield a table of what foresight saves, a line for every task and kind of predictor."""
+    until = f"decisions of a chain of networks, until success is {two_figures(HALF)}"
+    yield f"| rows | condition | {until} |"
+    yield "|---|---|---|"
+    for name in committed():
+        conditions = read(name)["condition"].unique()
+        for fuzzy in sorted(c for c in conditions if c.startswith(FUZZY)):
+            times, missed = foresight(name, fuzzy)
+            never = f", {missed} seeds never" if missed else ""
+            yield f"| {name} | {fuzzy} | {bracketed(times)} times{never} |"
+
+
+def main(places: list[str]) -> None:
+    """Print the rows of kept studies, or the tables of committed ones."""
+    if places:
+        kept = [load(place) for place in places]
+        frames = [rows_of(one.results, one.outline.table["decisions"]) for one in kept]
+        print_text(pd.concat(frames).to_csv(index=False).strip())
+        return
+    for name in committed():
+        print_text("\n".join((name, "", *lines(name), "")))
+    print_text("\n".join((*edge_lines(), "", *foresight_lines())))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
