@@ -210,7 +210,8 @@ def foresight(name: str, fuzzy: str = FUZZY, networks: str = CHAIN) -> Predictor
 
 def foresight_lines() -> Iterator[str]:
     """Yield a table of what foresight saves, a line for every task and kind of predictor."""
-    yield f"| rows | condition | decisions of a chain of networks, until success is {HALF:g} |"
+    until = f"decisions of a chain of networks, until success is {two_figures(HALF)}"
+    yield f"| rows | condition | {until} |"
     yield "|---|---|---|"
     for name in committed():
         conditions = read(name)["condition"].unique()
