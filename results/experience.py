@@ -16,7 +16,7 @@ import numpy as np
 from ..core.interface.measures import SUCCESS
 from ..core.numerics import FloatArray, pd
 from ..studies.api.loading import load
-from ..studies.catalogue.peers import AFTER
+from ..studies.catalogue.peers import evaluated_after
 from ..studies.cli.display import print_text
 from ..studies.results.analysis import Difference, differences, format_p
 from ..studies.results.notation import bracketed, two_figures
@@ -82,12 +82,8 @@ def rows_of(results: Results, budget: int) -> pd.DataFrame:
     measure = SUCCESS.name if is_rate else RETURN
     rows = []
     for condition in conditions:
-        stops = {
-            int(phase.removeprefix(AFTER)): phase
-            for phase in results.phases
-            if phase.startswith(AFTER) and results.has(condition, phase)
-        }
-        for decisions, phase in sorted({**stops, budget: "evaluation"}.items()):
+        stops = evaluated_after(results, condition) | {budget: "evaluation"}
+        for decisions, phase in sorted(stops.items()):
             for seed, value in results.means(condition, phase, measure).items():
                 rows.append((condition, decisions, seed, round(float(value), 3)))
     return pd.DataFrame(rows, columns=["condition", "decisions", "seed", measure])

@@ -19,7 +19,7 @@ from ...results.statistics import Array, Estimate, bootstrap, rate, stack_estima
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..peers import AFTER, CPU
+from ..peers import AFTER, CPU, evaluated_after
 from ..study import check_evaluated
 
 FIRST = 1000
@@ -100,12 +100,7 @@ def analyse(results: Results) -> Analysis:
     table = []
     courses = []
     for condition in conditions:
-        stopped = {
-            int(phase.removeprefix(AFTER)): phase
-            for phase in results.phases
-            if phase.startswith(AFTER) and results.has(condition, phase)
-        }
-        phases = dict(sorted(stopped.items()))
+        phases = evaluated_after(results, condition)
         phases[int(results.numbers(condition)[DECISIONS].mean())] = "evaluation"
         values = {}
         for stop, phase in phases.items():

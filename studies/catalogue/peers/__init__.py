@@ -65,6 +65,16 @@ class LearningCourse(NamedTuple):
     """The evaluations' success rates ``(k,)``."""
 
 
+def evaluated_after(results: Results, condition: str) -> dict[int, str]:
+    """Return the phases in which a condition was evaluated on its way, by how much came before."""
+    phases = {
+        int(phase.removeprefix(AFTER)): phase
+        for phase in results.phases
+        if phase.startswith(AFTER) and results.has(condition, phase)
+    }
+    return dict(sorted(phases.items()))
+
+
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("evaluation")
@@ -74,12 +84,8 @@ def analyse(results: Results) -> Analysis:
         steps = results.values(condition, "steps").astype(float)
         numbers = results.numbers(condition)
         episodes = steps.shape[1]
-        earlier = {
-            int(phase.removeprefix(AFTER)): rate(results.success(condition, phase))
-            for phase in results.phases
-            if phase.startswith(AFTER) and results.has(condition, phase)
-        }
-        success = dict(sorted(earlier.items()))
+        stopped = evaluated_after(results, condition)
+        success = {n: rate(results.success(condition, phase)) for n, phase in stopped.items()}
         estimates = {f"success, {count}": estimate for count, estimate in success.items()}
         estimates |= evaluated(results, condition)
         estimates["decisions"] = bootstrap(steps.sum(axis=1), bounds=NOT_NEGATIVE)
