@@ -20,12 +20,18 @@ MARGIN = (0.4, 0.4)
 
 
 def draw_success(rows: pd.DataFrame) -> Figure:
-    """Return who succeeds where: by task, success against size; a line for each team."""
+    """Return who succeeds where: by task, success against size; a line for each team.
+
+    What fails at several sizes has a panel of its own.
+    """
     known = rows[rows["success"].notna()]
-    tasks = list(dict.fromkeys(known["task"]))
+    sizes_of = known.groupby(["task", "fault"])["size"].transform("nunique")
+    is_own = (known["fault"] != NO_FAULT) & (sizes_of > 1)
+    titles = known["task"].mask(is_own, known["task"] + ", " + known["fault"])
+    tasks = list(dict.fromkeys(titles))
     figure, panels = figures.grid(len(tasks), 2, PANEL, MARGIN, sharey=True)
     for axes, task in zip(panels.flat, tasks, strict=False):
-        own = known[known["task"] == task]
+        own = known[titles == task]
         teams = list(own.groupby(list(TeamKind._fields), sort=False))
         handles = []
         for index, (team, of_team) in enumerate(teams):
@@ -76,7 +82,9 @@ def draw_checks(checked: Sequence[Check]) -> Figure:
         axes.scatter(places, known.value, c=colours, s=12)
         axes.axhline(1.0, color="#888888", lw=0.8, ls=":")
         figures.log_axis(axes)
-        axes.set_xticks(places, [str(check.size) for check in own], fontsize=6, rotation=90)
+        every = 1 + len(own) // 25  # labels that do not lie over each other
+        shown = [str(check.size) for check in own[::every]]
+        axes.set_xticks(places[::every], shown, fontsize=6, rotation=90)
         axes.set_title(MEASURES[name], loc="left")
     figure.supylabel("predicted / measured", fontsize=8)
     figure.supxlabel("number of agents; red: outside the 90 % interval", fontsize=8)
