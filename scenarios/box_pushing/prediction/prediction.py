@@ -25,7 +25,7 @@ from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline
 from ..world.settings import InfraredSettings, Task, reward
 from .push import PushBelief, PushModel, outcomes, push
-from .responses import Setting, respond
+from .responses import Outlook, respond
 from .wheel_commands import (
     WheelCommands,
     choices_of,
@@ -175,7 +175,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         commands = self.wheel_commands
         wheels = len(self.groups[0])
         weights, agents, _, firsts = search.pooled
-        setting = Setting(
+        outlook = Outlook(
             robots=now.robots,
             box=now.box,
             goal=now.goal,
@@ -199,7 +199,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         n_actions = len(premises.action_set)
         wanted = columns.wanted
         exploring = search.exploring
-        joint = respond(search.starts, order, n_actions, setting, wanted, exploring, search.rng)
+        joint = respond(search.starts, order, n_actions, outlook, wanted, exploring, search.rng)
         if not len(joint):
             raise ArithmeticError("no joint action is worth most: not all values are numbers")
         return joint

@@ -24,7 +24,7 @@ from .push import PushModel, pushed
 from .wheel_commands import choices_of, speeds_of
 
 
-class Setting(NamedTuple):
+class Outlook(NamedTuple):
     """What is predicted, and what that is worth; M robots of w wheels with A actions each."""
 
     robots: FloatArray
@@ -73,28 +73,28 @@ class _Plan(NamedTuple):
 
 
 @njit(cache=True)
-def _worths(choices: IntArray, setting: Setting, wanted: Wanted) -> FloatArray:
+def _worths(choices: IntArray, outlook: Outlook, wanted: Wanted) -> FloatArray:
     """Return what wheel commands ``(m, M)`` are worth to the mean agent ``(m,)``."""
     robots, box, gaps = pushed(
-        setting.robots, setting.box, setting.twists, choices, setting.seconds, setting.model
+        outlook.robots, outlook.box, outlook.twists, choices, outlook.seconds, outlook.model
     )
     shared = relational(
         robots,
         box,
         gaps,
-        setting.goal,
-        setting.box,
-        setting.before,
-        setting.periods,
-        setting.model.edges,
-        setting.model.friction_radius,
-        setting.every,
-        setting.columns,
+        outlook.goal,
+        outlook.box,
+        outlook.before,
+        outlook.periods,
+        outlook.model.edges,
+        outlook.model.friction_radius,
+        outlook.every,
+        outlook.columns,
         *wanted,
     )
-    own = np.expand_dims(speeds_of(choices, setting.speeds), 2)
-    weights, agents, firsts = setting.weights, setting.agents, setting.firsts
-    total = total_compact(weights, agents, firsts, setting.kinds, own, shared, setting.packed)
+    own = np.expand_dims(speeds_of(choices, outlook.speeds), 2)
+    weights, agents, firsts = outlook.weights, outlook.agents, outlook.firsts
+    total = total_compact(weights, agents, firsts, outlook.kinds, own, shared, outlook.packed)
     return total / len(agents)
 
 
@@ -109,26 +109,26 @@ def _holds(plan: _Plan, robot: int) -> bool:
 
 
 @njit(cache=True)
-def _value(robots: IntArray, value: float, plan: _Plan, setting: Setting, wanted: Wanted) -> None:
+def _value(robots: IntArray, value: float, plan: _Plan, outlook: Outlook, wanted: Wanted) -> None:
     """Value the actions of some robots around a plan that is worth `value`."""
-    n_actions = setting.which.shape[1]
+    n_actions = outlook.which.shape[1]
     rows = np.empty((len(robots) * n_actions, len(plan.commands)), np.int64)
     m = 0
     for r in robots:
         for a in range(n_actions):
-            if setting.alike[r, a] == a and setting.which[r, a] != plan.commands[r]:
+            if outlook.alike[r, a] == a and outlook.which[r, a] != plan.commands[r]:
                 rows[m] = plan.commands
-                rows[m, r] = setting.which[r, a]
+                rows[m, r] = outlook.which[r, a]
                 m += 1
     worths: FloatArray = np.empty(0)
     if m > 0:
-        worths = _worths(rows[:m], setting, wanted)
+        worths = _worths(rows[:m], outlook, wanted)
     m = 0
     for r in robots:
         plan.around[r] = plan.commands
         for a in range(n_actions):
-            first = setting.alike[r, a]
-            if setting.which[r, a] == plan.commands[r]:
+            first = outlook.alike[r, a]
+            if outlook.which[r, a] == plan.commands[r]:
                 plan.worths[r, a] = value
             elif first == a:
                 plan.worths[r, a] = worths[m]
@@ -182,7 +182,7 @@ def respond(
     starts: IntArray,
     order: IntArray,
     n_actions: int,
-    setting: Setting,
+    outlook: Outlook,
     wanted: Wanted,
     exploring: Exploring,
     rng: np.random.Generator,
@@ -197,7 +197,7 @@ def respond(
         ``(M,)`` the robots in the order of decision.
     n_actions
         A.
-    setting, wanted
+    outlook, wanted
         What is predicted, and which state variables, see `Columns`.
     exploring
         How agents explore.
@@ -209,10 +209,10 @@ def respond(
     IntArray
         ``(n,)`` the joint action, empty where none is worth most: not all values are numbers.
     """
-    n, n_indices = setting.which.shape
+    n, n_indices = outlook.which.shape
     wheels = starts.shape[1] // n
-    choices = choices_of(starts, setting.which, n_actions)
-    worths = _worths(choices, setting, wanted)
+    choices = choices_of(starts, outlook.which, n_actions)
+    worths = _worths(choices, outlook, wanted)
     best = draw(worths, rng)
     joint = starts[best].copy()
     plan = _Plan(choices[best], np.empty((n, n_indices)), np.full((n, n), -1))
@@ -227,12 +227,12 @@ def respond(
             if not _holds(plan, r):
                 depth = min(2 * depth, MOST_AHEAD) if k == reach else 1
                 reach = min(k + depth, n)
-                _value(order[k:reach], value, plan, setting, wanted)
+                _value(order[k:reach], value, plan, outlook, wanted)
             if decides:
                 own = joint[r * wheels : (r + 1) * wheels]
                 best = _decide(r, plan.worths[r], own, n_actions, exploring, rng)
             else:
-                best = _improve(plan.worths[r], setting.alike[r], rng)
-            plan.commands[r] = setting.which[r, best]
+                best = _improve(plan.worths[r], outlook.alike[r], rng)
+            plan.commands[r] = outlook.which[r, best]
             value = plan.worths[r, best]
     return joint
