@@ -38,7 +38,13 @@ class FaultCost(NamedTuple):
 
 
 def fault_costs(rows: pd.DataFrame) -> list[FaultCost]:
-    """Return what faults cost in the quality of a task, at the largest size, by hierarchy."""
+    """Return what faults cost in the quality of a task, at the largest size, by hierarchy.
+
+    Raises
+    ------
+    ValueError
+        If a team has a seed twice: rows of two studies.
+    """
     lines = []
     for task, own in rows.groupby("task", sort=False):
         measure = quality(str(task))
@@ -53,8 +59,9 @@ def _fault_costs(task: str, rows: pd.DataFrame, measure: str) -> Iterator[FaultC
     for (hierarchy, learner, fault), own in failing.groupby(list(TeamKind._fields[1:]), sort=False):
         size = int(own["size"].max())
         places = (whole["hierarchy"] == hierarchy) & (whole["size"] == size)
-        base = whole[places & (whole["learner"] == learner)].set_index("seed")[measure]
-        at = own[own["size"] == size].set_index("seed")[measure]
+        same = whole[places & (whole["learner"] == learner)]
+        base = same.set_index("seed", verify_integrity=True)[measure]
+        at = own[own["size"] == size].set_index("seed", verify_integrity=True)[measure]
         each = (at - base).dropna().to_numpy(dtype=float)
         if len(each) < 2 or not each.any():  # no messages, which could fail
             continue

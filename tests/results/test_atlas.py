@@ -55,6 +55,11 @@ def test_what_losing_messages_costs_is_paired_by_seed() -> None:
     assert str(lines[0]).startswith("line_up, chain, batch-td, 64 agents, lost 0.3: success -.22 [")
 
 
+def test_rows_of_two_studies_are_not_taken_for_one() -> None:
+    with pytest.raises(ValueError, match="duplicate"):
+        faults.fault_costs(pd.concat([rows_of(), rows_of(), rows_of(fault="lost 0.3")]))
+
+
 def test_thresholds_are_between_shares_that_were_run() -> None:
     frames = [rows_of()]
     for share, cost in ((0.2, 0.0), (0.5, 0.3)):
