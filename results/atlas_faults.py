@@ -60,9 +60,8 @@ def _fault_costs(task: str, rows: pd.DataFrame, measure: str) -> Iterator[FaultC
         size = int(own["size"].max())
         places = (whole["hierarchy"] == hierarchy) & (whole["size"] == size)
         same = whole[places & (whole["learner"] == learner)]
-        base = same.set_index("seed", verify_integrity=True)[measure]
-        at = own[own["size"] == size].set_index("seed", verify_integrity=True)[measure]
-        each = (at - base).dropna().to_numpy(dtype=float)
+        pairs = own[own["size"] == size].merge(same, on="seed", validate="1:1")
+        each = (pairs[f"{measure}_x"] - pairs[f"{measure}_y"]).dropna().to_numpy(dtype=float)
         if len(each) < 2 or not each.any():  # no messages, which could fail
             continue
         p = float(stats.ttest_1samp(each, 0.0).pvalue) if np.ptp(each) > 0.0 else 1.0

@@ -56,7 +56,7 @@ def test_what_losing_messages_costs_is_paired_by_seed() -> None:
 
 
 def test_rows_of_two_studies_are_not_taken_for_one() -> None:
-    with pytest.raises(ValueError, match="duplicate"):
+    with pytest.raises(ValueError, match="not unique"):
         faults.fault_costs(pd.concat([rows_of(), rows_of(), rows_of(fault="lost 0.3")]))
 
 
