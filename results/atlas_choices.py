@@ -81,6 +81,8 @@ def _choice(
     case: tuple[str, str, str], rows: pd.DataFrame, measure: str, small: int
 ) -> HierarchyChoice | None:
     """Return the choice of a case; None if fewer than two hierarchies have a law."""
+    means = rows.pivot_table(index="seed", columns=["size", "hierarchy"], values=measure).dropna()
+    rows = rows[rows["seed"].isin(means.index)]
     samples = {}
     for hierarchy, own in rows[rows["size"] <= small].groupby("hierarchy", sort=False):
         sample = sample_of(own, measure)
@@ -88,20 +90,18 @@ def _choice(
             samples[str(hierarchy)] = sample
     if len(samples) < 2:
         return None
-    known = rows[rows["hierarchy"].isin(list(samples))]
-    means = known.pivot_table(index="seed", columns=["size", "hierarchy"], values=measure)
-    sizes = [int(n) for n in known["size"].unique() if len(means[n].columns) == len(samples)]
+    sizes = [int(n) for n in rows["size"].unique() if set(samples) <= set(means[n].columns)]
     size = max(sizes, default=0)
     if size <= small:
         return None
-    at = means[size].dropna()
+    at = means[size][list(samples)]
     best = str(at.mean().idxmax())
     others = [hierarchy for hierarchy in samples if hierarchy != best]
     tests = paired_tests([(at[best].to_numpy(), at[other].to_numpy()) for other in others])
     median = {h: laws.choose(own).distribution(size).quantile(0.5) for h, own in samples.items()}
     predicted = max(median, key=lambda h: median[h])
     rivals = [h for h in samples if h != predicted and not _is_above(samples, predicted, h, size)]
-    nearest = means[max(n for n in sizes if n <= small)].mean().idxmax()
+    nearest = means[max(n for n in sizes if n <= small)][list(samples)].mean().idxmax()
     p = max(adjusted for _, adjusted in tests)
     return HierarchyChoice(case, measure, size, predicted, tuple(rivals), str(nearest), best, p)
 

@@ -35,7 +35,7 @@ from pathlib import Path
 from types import CodeType, FunctionType
 from typing import IO, Any, TypeVar, cast
 
-from . import locks
+from .. import locks
 
 F = TypeVar("F", bound=Callable[..., Any])
 

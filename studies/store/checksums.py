@@ -81,12 +81,13 @@ def _rows(db: sqlite3.Connection, identity: str | None) -> Iterator[tuple[str, R
     first = {key: [r[:-1] if r[-1] is None else r for r in rows] for key, rows in trials}
     seconds = {key: list(rows) for key, rows in _by_identity(db, identity, "seconds")}
     numbers = {key: list(rows) for key, rows in _by_identity(db, identity, "numbers", ", name")}
-    seen: set[str] = set()
-    without: RowsOfTable = ((key, ()) for key in first | seconds | numbers if key not in seen)
-    for key, rows in chain(_by_identity(db, identity, "episodes", ", phase, episode"), without):
-        seen.add(key)
-        parts = first.get(key, []), list(rows), seconds.get(key, []), numbers.get(key, [])
-        yield key, RowsOfTrial(*parts)
+    for key, rows in _by_identity(db, identity, "episodes", ", phase, episode"):
+        yield (
+            key,
+            RowsOfTrial(first.pop(key, []), list(rows), seconds.pop(key, []), numbers.pop(key, [])),
+        )
+    for key in first | seconds | numbers:
+        yield key, RowsOfTrial(first.get(key, []), [], seconds.get(key, []), numbers.get(key, []))
 
 
 def _by_identity(
@@ -112,11 +113,11 @@ def _quick_sha256(rows: RowsOfTrial) -> str | None:
     The text of episodes is written by another library, which writes some numbers, as 1e-5, and
     some letters in another way. Different rows never have the same text.
     """
-    values = [*chain.from_iterable(rows.episodes)]
-    if bytes in map(type, values):
+    episodes = rows.episodes
+    if bytes in map(type, chain.from_iterable(episodes)):
         return None
-    text = to_json(rows.episodes, inf_nan_mode="constants")
-    if text.count(b",") != max(len(values) - 1, 0):  # a text has one
+    text = to_json(episodes, inf_nan_mode="constants")
+    if episodes and text.count(b",") != len(episodes) * len(episodes[0]) - 1:  # a text has one
         return None
     before = ENCODER.encode(rows.trials).encode()
     after = ENCODER.encode([rows.seconds, rows.numbers])[1:].encode()

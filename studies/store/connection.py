@@ -16,7 +16,7 @@ from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
-from ...core.numerics import locks
+from ...core import locks
 from ..errors import SpecError
 
 CIRCUMSTANCES = (

@@ -11,14 +11,14 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ..errors import SpecError
 
-Recording = dict[str, NDArray[Any]]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Recording = dict[str, "NDArray[Any]"]
 """Arrays of one episode of T steps by name: what the scenario's ``recorded`` names, each
 ``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if agents are rewarded one by one; what its
 ``constants_of_episode`` returns; and ``messages_fail`` ``(T + 1, n)``, whose messages fail, if any
@@ -115,10 +115,17 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
             os.close(folder)
 
 
-def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str:
-    """Write recordings by name to an ``.npz`` file; return the SHA-256 of its content."""
-    buffer = io.BytesIO()
+def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str | None:
+    """Write recordings by name to an ``.npz`` file; return the SHA-256 of its content.
+
+    Without any arrays nothing is written, and None returned.
+    """
     arrays = {f"{name}/{key}": a for name, r in recordings.items() for key, a in r.items()}
+    if not arrays:
+        return None
+    import numpy as np  # takes its time, for which no command that only reads rows has to wait
+
+    buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
     content = buffer.getvalue()
     write(path, content)
@@ -152,6 +159,8 @@ def read_recording(path: Path, name: str, digest: str | None = None) -> Recordin
     NotRecordedError
         If it holds no such recording.
     """
+    import numpy as np
+
     prefix = f"{name}/"
     try:
         content = read_bytes(path)

@@ -1,7 +1,7 @@
 """The ledger of a study: a directory that loses nothing that was finished.
 
 ``results.sqlite`` holds the spec, the conditions, one row per trial and one per episode;
-``recordings/IDENTITY.npz`` the recorded episodes of a trial; ``checkpoints/IDENTITY.npz`` what a
+``recordings/IDENTITY.npz`` what a trial recorded, if anything; ``checkpoints/IDENTITY.npz`` what a
 trial under way has come to; ``study.toml`` the spec, to read and to run again. The database is
 written through (WAL, synchronous=FULL), and a recording is complete before its trial is noted as
 done: a crash at any moment costs the running trials only, or what they did since their checkpoints.
@@ -30,7 +30,7 @@ from . import database, durable, integrity
 from .checksums import find_altered, trial_checksums
 from .connection import DamageError, has_log, open_to_read, open_to_write, transaction
 from .database import CHECKPOINTS, DATABASE, NoStudyError, Planned, StudyNotes
-from .durable import Recording
+from .durable import NotRecordedError, Recording
 
 NO_LOG = (
     "is kept with a rollback journal, as on file systems that share no memory (NFS, Lustre, GPFS): "
@@ -310,7 +310,8 @@ class Store:
         damaged = self._damaged_rows()
         folder = os.fspath(self.directory / "recordings")  # paths of thousands take their time
         query = (
-            "SELECT identity, condition, seed, recording_sha256 FROM trials WHERE state = 'done'"
+            "SELECT identity, condition, seed, recording_sha256 FROM trials "
+            "WHERE recording_sha256 IS NOT NULL"
         )
         for identity, condition, seed, written in self._db.execute(query).fetchall():
             path = f"{folder}/{identity}.npz"
@@ -375,7 +376,10 @@ class Store:
         """Return a recorded episode of a trial by its name in `Planned.recorded`, or its `TEAM`."""
         query = "SELECT recording_sha256 FROM trials WHERE identity = ?"
         row = self._db.execute(query, (identity,)).fetchone()
-        return durable.read_recording(self._recordings(identity), name, *(row or ()))
+        path = self._recordings(identity)
+        if row == (None,):
+            raise NotRecordedError(f"{path}: does not exist: the trial recorded nothing")
+        return durable.read_recording(path, name, *(row or ()))
 
     def _recordings(self, identity: str) -> Path:
         return self.directory / "recordings" / f"{identity}.npz"

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
-from ...core.numerics import locks
+from ...core import locks
 from ..errors import SpecError
 from . import durable
 from .connection import NO_LOCKS, NoLocksError

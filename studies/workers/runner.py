@@ -16,7 +16,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from itertools import chain, islice
-from multiprocessing import resource_tracker
 from pathlib import Path
 from platform import python_version
 from queue import Empty, SimpleQueue
@@ -150,6 +149,8 @@ def undisturbed() -> Iterator[None]:
 @contextmanager
 def beginning_processes() -> Iterator[None]:
     """Put off Ctrl-C; the processes begun meanwhile never hear of it: it is for the parent."""
+    from multiprocessing import resource_tracker  # takes its time
+
     resource_tracker.ensure_running()  # would unblock the signal when the first process begins
     if sys.platform == "win32":  # which blocks no signals
         with undisturbed():

@@ -57,6 +57,13 @@ def test_every_fault_is_a_case_at_the_largest_size_of_all_its_hierarchies() -> N
     ]
 
 
+def test_a_seed_that_one_hierarchy_lacks_is_left_out() -> None:
+    rows = rows_of(seeds=8)
+    lacks = (rows["seed"] == 3) & (rows["hierarchy"] == "star") & (rows["size"] == 4)
+    (choice,) = choices(rows[~lacks])
+    assert choice.p == pytest.approx(2.0 / 2**7)
+
+
 @pytest.mark.parametrize("rows", [rows_of()[lambda d: d["size"] < 8], rows_of()[:20]])
 def test_too_few_sizes_or_hierarchies_are_no_case(rows: pd.DataFrame) -> None:
     assert choices(rows) == []

@@ -15,7 +15,7 @@ LOADED = [
     (["--version"], set()),
     (["--help"], set()),
     (["presets"], set()),
-    (["status", STUDY], {"numpy"}),
+    (["status", STUDY], set()),
     (["topology", "list"], {"numpy", "pydantic", "rich"}),
     (["cost"], {"numpy", "pydantic", "rich", "core.agents.team"}),
     (["topology", "show", "chain"], {"numpy", "pydantic", "rich", "core.agents.team", "networkx"}),

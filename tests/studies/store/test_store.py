@@ -1,6 +1,7 @@
 import os
 import shutil
 import sqlite3
+from dataclasses import replace
 
 import made_up
 import pytest
@@ -10,6 +11,7 @@ from nested_agents.studies.spec import spec as spec_module
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import database, durable, writer
 from nested_agents.studies.store.database import DATABASE, RESULTS_VERSION, SPEC_FILE
+from nested_agents.studies.store.durable import NotRecordedError
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending, spec_of
 from nested_agents.studies.trials.trial import trials_of
@@ -121,6 +123,21 @@ def test_a_recording_that_cannot_be_read_is_named(finished):
             store.recording(trial.identity, "last")
         path.unlink()
         with pytest.raises(SpecError, match="no such file"):
+            store.recording(trial.identity, "last")
+
+
+def test_a_trial_that_records_nothing_has_no_file(tmp_path):
+    trial = made_up.TRIALS[0]
+    result = replace(made_up.measure(trial), recordings={})
+    with made_up.opened(tmp_path / "study") as store:
+        save(store, trial, result, 1.5)
+        assert pending(store, made_up.TRIALS) == list(made_up.TRIALS[1:])
+    assert list((tmp_path / "study" / "recordings").iterdir()) == []
+    path = tmp_path / "study" / "recordings" / f"{trial.identity}.npz"
+    path.write_bytes(b"of somebody else")
+    with Store.open(tmp_path / "study") as store:
+        assert store.damage() == {}
+        with pytest.raises(NotRecordedError, match="the trial recorded nothing"):
             store.recording(trial.identity, "last")
 
 

@@ -7,7 +7,7 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from nested_agents.core.numerics import locks
+from nested_agents.core import locks
 
 WITHOUT = """
 import builtins, importlib, pkgutil, sys
@@ -27,7 +27,7 @@ def refuse(name, globals=None, *rest, **named):
 
 builtins.__import__ = refuse
 source = open(sys.argv[1]).read()
-stand_in = ModuleType("nested_agents.core.numerics.locks")
+stand_in = ModuleType("nested_agents.core.locks")
 sys.platform = "win32"  # for one module: what others do with the word is their affair
 exec(source, vars(stand_in))
 sys.platform = "linux"
