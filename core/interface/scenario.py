@@ -29,7 +29,7 @@ Twists = FloatArray | Callable[[], FloatArray | None] | None
 """Those of a transition, what measures them, or nothing."""
 
 
-class Measured:
+class DeferredTwists:
     """The twists of a transition: given, or measured when they are first asked for."""
 
     def __get__(self, transition: Transition | None, owner: type[Transition]) -> FloatArray | None:
@@ -61,7 +61,7 @@ class Transition:
     """Whether the episode ends for lack of time."""
     info: Mapping[str, Any]
     """Measurements of the step by name, scalars or small arrays; for records, not for learners."""
-    twists: Measured = Measured()
+    twists: DeferredTwists = DeferredTwists()
     """``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], where bodies
     measure it; ``(K + M, 3)`` where they also measure what they move, its twists standing first,
     and nothing else than these bodies moved it. Given is also a function that returns them, which
