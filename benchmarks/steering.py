@@ -2,8 +2,9 @@
 
 Reads the committed rows of the scaling studies, rebuilds the worlds of their evaluation episodes,
 and counts the successful ones by the *initial heading error*: the angle between the normal of the
-face that the team stands at and the direction from the box to the goal. Below it stands how the
-others ended: the box was pushed too far away, or decisions ran out. No trial is run.
+face that the team stands at and the direction from the box to the goal. A second table counts those
+within what pushing from one side can make good, and beyond it. Below them stands how the others
+ended: the box was pushed too far away, or decisions ran out. No trial is run.
 
 With ``--scripted 64 128`` the scripted controller plays such worlds of teams of these sizes, in as
 many decisions as the trained teams had.
@@ -26,12 +27,14 @@ from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.numerics import FloatArray, IntArray, wrap
 from nested_agents.results import ROWS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.world.starts import STARTS
 from nested_agents.studies.results import published
 from nested_agents.studies.results.notation import bracketed
 from nested_agents.studies.results.statistics import rate
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 
 from .scripted.controller import decisions_to_goal
+from .scripted.crowd import CONE, LEVER
 
 EDGES = (0.0, 10.0, 15.0, 20.0, 30.0, 50.0)
 """Of the bins of the initial heading error [deg]; medium starts have at most 50."""
@@ -61,6 +64,28 @@ def heading_errors(robots: int, seed: int, episodes: int) -> FloatArray:
         course = np.arctan2(goal[1] - box[1], goal[0] - box[0])
         errors.append(abs(wrap(course - box[2])))
     return np.degrees(errors)
+
+
+def one_sided(robots: int) -> float:
+    """Return the greatest heading error that pushing from one side can make good [deg].
+
+    Robots push obliquely, within the friction cone, and half of them turn the box: per metre by
+    their lever over the square of its friction radius, of which half counts on the way. Both
+    constants are the scripted controller's.
+    """
+    box = BoxPushingSettings(robots=robots).build().box
+    turned = LEVER * box.width[1] / box.friction_radius**2 * STARTS["medium"].distance
+    return float(np.degrees(CONE + turned / 2))
+
+
+def sides(robots: int, name: str, phase: str, condition: str) -> list[str]:
+    """Return that angle, and how many of how many episodes succeeded within it and beyond."""
+    results = published.load(ROWS / f"{name}.json").results
+    successes = results.success(condition, phase) == 1
+    errors = [heading_errors(robots, s, successes.shape[1]) for s in results.seeds(condition)]
+    within = np.array(errors) <= one_sided(robots)
+    counted = [f"{successes[part].sum()} of {part.sum()}" for part in (within, ~within)]
+    return [f"{one_sided(robots):.0f}", *counted]
 
 
 def trained(robots: int, name: str, phase: str, condition: str) -> list[str]:
@@ -107,14 +132,14 @@ def counts(robots: int, seeds: Iterable[int], successes: IntArray) -> list[str]:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.steering", description=__doc__)
     parser.add_argument("--scripted", type=int, nargs="+", default=(), metavar="N", help="robots")
     parser.add_argument("--seeds", type=int, default=3, help="of its worlds")
     parser.add_argument("--episodes", type=int, default=10, help="of each seed")
     options = parser.parse_args()
     bins = [f"{low:.0f}-{high:.0f}" for low, high in pairwise(EDGES)]
-    table = Table("robots", *bins, title="Successes by initial heading error [deg]")
+    table = Table("robots", *bins, title="Successes by initial heading error \\[deg]")
     console = Console(width=80)
     for robots in options.scripted:
         cells, words = scripted(robots, options.seeds, options.episodes)
@@ -122,6 +147,10 @@ def main() -> None:
         console.print(words, highlight=False, soft_wrap=True)
     for title, *of_results in TEAMS:
         table.add_row(title, *trained(*of_results))
+    console.print(table)
+    table = Table("robots", "one side \\[deg]", "within", "beyond", title="Successes by side")
+    for title, *of_results in TEAMS:
+        table.add_row(title, *sides(*of_results))
     console.print(table)
     for title, _, *of_results in TEAMS:
         console.print(f"{title}: {failures(*of_results)}", highlight=False, soft_wrap=True)

@@ -68,7 +68,12 @@ SEEN = (ALREADY, "signals")
 """Tasks on whose rows the way of predicting was chosen."""
 UNSEEN = ("permutation", "small_boxes", "votes")
 """Tasks that were opened after the rule of the best hierarchy was committed."""
-QUALITIES = {"signals": "right", "signals_learned": "right", "games": "share_of_best"}
+QUALITIES = {
+    "signals": "right",
+    "signals_learned": "right",
+    "games": "share_of_best",
+    "rings": "share_of_best",
+}
 """By what hierarchies of a task are ranked; of other tasks by success."""
 
 

@@ -22,6 +22,7 @@ class FaultCost(NamedTuple):
 
     task: str
     hierarchy: str
+    learner: str
     size: int
     fault: str
     measure: str
@@ -31,13 +32,19 @@ class FaultCost(NamedTuple):
     """Adjusted by Holm over a task's comparisons."""
 
     def __str__(self) -> str:
-        head = f"{self.task}, {self.hierarchy}, {self.size} agents, {self.fault}"
+        head = ", ".join([*self[:3], f"{self.size} agents", self.fault])
         shown = bracketed(self.difference, signed)
         return f"{head}: {MEASURES[self.measure]} {shown}, p {format_p(self.p)}"
 
 
 def fault_costs(rows: pd.DataFrame) -> list[FaultCost]:
-    """Return what faults cost in the quality of a task, at the largest size, by hierarchy."""
+    """Return what faults cost in the quality of a task, at the largest size, by hierarchy.
+
+    Raises
+    ------
+    ValueError
+        If a team has a seed twice: rows of two studies.
+    """
     lines = []
     for task, own in rows.groupby("task", sort=False):
         measure = quality(str(task))
@@ -52,13 +59,14 @@ def _fault_costs(task: str, rows: pd.DataFrame, measure: str) -> Iterator[FaultC
     for (hierarchy, learner, fault), own in failing.groupby(list(TeamKind._fields[1:]), sort=False):
         size = int(own["size"].max())
         places = (whole["hierarchy"] == hierarchy) & (whole["size"] == size)
-        base = whole[places & (whole["learner"] == learner)].set_index("seed")[measure]
-        at = own[own["size"] == size].set_index("seed")[measure]
-        each = (at - base).dropna().to_numpy(dtype=float)
+        same = whole[places & (whole["learner"] == learner)]
+        pairs = own[own["size"] == size].merge(same, on="seed", validate="1:1")
+        each = (pairs[f"{measure}_x"] - pairs[f"{measure}_y"]).dropna().to_numpy(dtype=float)
         if len(each) < 2 or not each.any():  # no messages, which could fail
             continue
         p = float(stats.ttest_1samp(each, 0.0).pvalue) if np.ptp(each) > 0.0 else 1.0
-        yield FaultCost(task, str(hierarchy), size, str(fault), measure, bootstrap(each), p)
+        names = str(hierarchy), str(learner), size, str(fault)
+        yield FaultCost(task, *names, measure, bootstrap(each), p)
 
 
 def _holm(lines: Sequence[FaultCost]) -> list[FaultCost]:
@@ -70,19 +78,20 @@ def _holm(lines: Sequence[FaultCost]) -> list[FaultCost]:
 
 def thresholds(costs: Sequence[FaultCost]) -> list[str]:
     """Return from which share on a fault costs significantly, of those that were run."""
-    doses = dict[tuple[str, str, int, str], list[tuple[float, float]]]()
+    doses = dict[tuple[str, str, str, int, str], list[tuple[float, float]]]()
     for cost in costs:
         kind, _, share = cost.fault.partition(" ")
         if kind in DOSES:
-            key = cost.task, cost.hierarchy, cost.size, kind
+            key = *cost[:4], kind
             doses.setdefault(key, []).append((float(share), cost.p))
     lines = []
-    for (task, hierarchy, size, kind), own in doses.items():
+    for (task, hierarchy, learner, size, kind), own in doses.items():
         own.sort()
         costly = [share for share, p in own if p < LEVEL]
         free = [share for share, _ in own if not costly or share < costly[0]]
         ends = f"not up to {two_figures(free[-1])}" if free else ""
         begins = f"from {two_figures(costly[0])} on" if costly else ""
         text = ", ".join(part for part in (begins, ends) if part)
-        lines.append(f"{task}, {hierarchy}, {size} agents, {DOSES[kind]}: costs {text}")
+        head = ", ".join([task, hierarchy, learner, f"{size} agents", DOSES[kind]])
+        lines.append(f"{head}: costs {text}")
     return lines

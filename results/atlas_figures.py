@@ -11,40 +11,42 @@ from matplotlib.figure import Figure
 from ..core.numerics import pd
 from ..studies.presentation import figures
 from ..studies.results.statistics import Estimate, bootstrap, stack_estimates
-from .atlas import ALREADY, MEASURES, NO_FAULT, TeamKind
+from .atlas import ALREADY, MEASURES, NO_FAULT, TeamKind, quality
 from .atlas_predictions import SMALL, Check, checks, exponents
 
 PANEL = (5.0, 2.4)
 """Width and height of a panel [inch]."""
 MARGIN = (0.4, 0.4)
+MOST = 100.0
+"""The greatest ratio of what was predicted to what was measured that is drawn."""
 
 
 def draw_success(rows: pd.DataFrame) -> Figure:
-    """Return who succeeds where: by task, success against size; a line for each team.
+    """Return who wins where: by task, what it is ranked by against size; a line for each team.
 
     What fails at several sizes has a panel of its own.
     """
-    known = rows[rows["success"].notna()]
-    sizes_of = known.groupby(["task", "fault"])["size"].transform("nunique")
-    is_own = (known["fault"] != NO_FAULT) & (sizes_of > 1)
-    titles = known["task"].mask(is_own, known["task"] + ", " + known["fault"])
+    sizes_of = rows.groupby(["task", "fault"])["size"].transform("nunique")
+    is_own = (rows["fault"] != NO_FAULT) & (sizes_of > 1)
+    titles = rows["task"].mask(is_own, rows["task"] + ", " + rows["fault"])
     tasks = list(dict.fromkeys(titles))
     figure, panels = figures.grid(len(tasks), 2, PANEL, MARGIN, sharey=True)
     for axes, task in zip(panels.flat, tasks, strict=False):
-        own = known[titles == task]
+        own = rows[titles == task]
+        measure = quality(str(own["task"].iloc[0]))
         teams = list(own.groupby(list(TeamKind._fields), sort=False))
         handles = []
         for index, (team, of_team) in enumerate(teams):
-            by_size = of_team.groupby("size")["success"]
+            by_size = of_team.groupby("size")[measure]
             sizes = [int(n) for n, _ in by_size]
             values = [bootstrap(v.to_numpy(dtype=float), bounds=(0.0, 1.0)) for _, v in by_size]
             figures.draw_line(axes, sizes, values, index, len(teams))
             handles.append(figures.handle(name_of(team), **figures.style(index)))
         figures.scale_axis(axes, sorted(int(n) for n in own["size"].unique()))
         figures.as_rates(axes)
-        axes.set_title(task, loc="left")
+        axes.set_title(f"{task}: {MEASURES[measure]}", loc="left")
         axes.legend(handles=handles, fontsize=6, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.supxlabel("number of agents, success in evaluation with 95 % intervals", fontsize=8)
+    figure.supxlabel("number of agents; evaluation with 95 % intervals", fontsize=8)
     return figure
 
 
@@ -78,8 +80,10 @@ def draw_checks(checked: Sequence[Check]) -> Figure:
         known = stack_estimates(ratios)
         places = np.arange(len(own))
         colours = ["C0" if check.is_inside else "C3" for check in own]
-        axes.vlines(places, known.low, known.high, color=colours, lw=1.2)
-        axes.scatter(places, known.value, c=colours, s=12)
+        low, middle, high = np.clip((known.low, known.value, known.high), 1.0 / MOST, MOST)
+        axes.vlines(places, low, high, color=colours, lw=1.2)
+        axes.scatter(places, middle, c=colours, s=12)
+        axes.update_datalim([(0.0, 0.5), (0.0, 2.0)])
         axes.axhline(1.0, color="#888888", lw=0.8, ls=":")
         figures.log_axis(axes)
         every = 1 + len(own) // 25  # labels that do not lie over each other
@@ -87,7 +91,8 @@ def draw_checks(checked: Sequence[Check]) -> Figure:
         axes.set_xticks(places[::every], shown, fontsize=6, rotation=90)
         axes.set_title(MEASURES[name], loc="left")
     figure.supylabel("predicted / measured", fontsize=8)
-    figure.supxlabel("number of agents; red: outside the 90 % interval", fontsize=8)
+    text = f"number of agents; red: outside the 90 % interval; beyond {MOST:g} times: at the edge"
+    figure.supxlabel(text, fontsize=8)
     return figure
 
 

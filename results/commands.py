@@ -132,14 +132,15 @@ def atlas(
             continue
         print_text("", f"{title}: teams larger than {most} in 90 % intervals")
         print_lines(coverage(checks(own, most)))
-    chosen = choices(frame[frame["source"] != ALREADY])
+    of_tasks = frame[frame["source"] != ALREADY]
+    chosen = choices(of_tasks)
     for title, is_unseen in {"not seen before": True, "seen": False}.items():
         cases = [choice for choice in chosen if (choice.case[0] in UNSEEN) == is_unseen]
         print_text("", f"Best hierarchy of the largest teams, tasks {title}")
         print_lines([*shares_right(cases), *map(str, cases)])
     print_text("", "Best hierarchy of the largest teams, all tasks")
     print_lines(shares_right(chosen))
-    costs = fault_costs(frame)
+    costs = fault_costs(of_tasks)
     if costs:
         print_text("", "What faults cost")
         print_lines([*map(str, costs), *thresholds(costs)])

@@ -23,6 +23,7 @@ The number of joint actions tried grows linearly with the number of bodies.
 
 from abc import abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -31,7 +32,8 @@ from pydantic import Field
 from ..interface.prediction import Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
-from ..rules.rule_base import RuleBase
+from ..rules.rule_base import Pooled, RuleBase
+from .drawing import drawn_equal
 from .enumeration import combinations
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
 
@@ -41,9 +43,29 @@ CUTS = (0.25, 0.5, 0.75)
 """Where a team is cut in two, as shares of its bodies in the order of decision."""
 
 
-Responses = Callable[[FloatArray, IntArray, IntArray, Exploring, np.random.Generator], IntArray]
-"""Returns the joint action ``(n,)`` by the agents' weights ``(n, n_rules)``, a plan ``(n,)`` to
-start from, the order of decision ``(n,)``, how they explore, and a source of randomness."""
+class Search(NamedTuple):
+    """What all agents look for their best responses by, who hear all."""
+
+    pooled: Pooled
+    """The weights of all."""
+    starts: IntArray
+    """``(m, n)`` the joint actions of which the best is improved."""
+    worth: Callable[[IntArray], FloatArray]
+    """Values joint actions."""
+    order: IntArray
+    """``(n,)`` the agents in the order of decision."""
+    exploring: Exploring
+    """How they explore."""
+    rng: np.random.Generator
+    """Source of randomness."""
+
+    def begun(self) -> IntArray:
+        """Return the best of the joint actions that it starts from."""
+        return self.starts[greatest(self.worth(self.starts), self.rng)]
+
+
+Responses = Callable[[Search], IntArray]
+"""Returns the joint action ``(n,)`` that a search comes to."""
 
 
 class RespondingPrediction(Prediction):
@@ -53,8 +75,8 @@ class RespondingPrediction(Prediction):
     def best_responses(self, rules: RuleBase) -> Responses | None:
         """Return what `BestResponse` comes to by such rules, but sooner; None if it cannot.
 
-        Asked for where all agents are bodies of their own that hear all and decide by the value of
-        the team: the very same joint actions, with the same draws.
+        Asked for where all agents hear all, decide body by body and by the value of the team: the
+        very same joint actions, with the same draws.
         """
 
 
@@ -154,6 +176,16 @@ class BestResponse(Aggregation):
         bodies = [own for i in hierarchy.order if (own := self._own[i]) in whole]
         self._bodies = bodies if problem.value_of == "team" else []
         self._rank = {agents: k for k, agents in enumerate(self._bodies)}
+        # Whether all can decide at once: by one plan that is kept up, and body by body.
+        self._order = np.array(hierarchy.order)
+        self._at_once = (
+            {*self._planner} == {hierarchy.order[0]}
+            and all(self._kept_up)
+            and problem.rule == "value"
+            and sweeps == 1
+            and [i for own in self._bodies for i in own] == [*hierarchy.order]
+            and len({*map(len, groups)}) == 1
+        )
         self._plans: dict[int, IntArray] = {}
         self._known: _Known | None = None
         self._ahead: _Ahead | None = None
@@ -190,20 +222,24 @@ class BestResponse(Aggregation):
 
         None where the prediction has no way to it but to ask every agent in its turn.
         """
+        if not self._at_once:
+            return None
+        if self.indifferent(first):
+            return drawn_equal(self._order, self.n_actions, exploring, first.rng)
         prediction = first.prediction
-        by_team = self.problem.rule == "value" and self.problem.value_of == "team"
-        one_plan = {*self._planner} == {first.agent} and self._widest == self._sweeps == 1
-        if not (by_team and one_plan and isinstance(prediction, RespondingPrediction)):
+        if not isinstance(prediction, RespondingPrediction):
             return None
         respond = prediction.best_responses(self.rules)
-        if respond is None or self.indifferent(first):
+        if respond is None:
             return None
-        plan = self._started(first, self._free[first.agent])
-        order, weights = np.array(self.hierarchy.order), self._pooled(first).weights[0]
-        alike = self._numbers[: self.n_actions] if prediction.alike is None else prediction.alike
-        tried = int(np.count_nonzero(alike == np.arange(self.n_actions)))
-        self.count(first.agent, tried + self.n_actions * len(order))
-        return respond(weights, plan, order, exploring, first.rng)
+        starts = self._with_starts(first, self._free[first.agent])
+        each = self._numbers[: self.n_actions**self._widest]
+        alike = each if prediction.alike is None else prediction.alike
+        distinct = np.count_nonzero(np.broadcast_to(alike, (len(self._bodies), len(each))) == each)
+        self.count(first.agent, len(starts) + int(distinct) + len(each) * len(self._bodies))
+        worth = partial(self.predicted_worth, first)
+        pooled = self._pooled(first)
+        return respond(Search(pooled, starts, worth, self._order, exploring, first.rng))
 
     def _plan(self, deliberation: Deliberation) -> IntArray:
         """Return the plan ``(n,)`` as the deciding agent knows it."""
@@ -304,10 +340,14 @@ class BestResponse(Aggregation):
 
     def _started(self, deliberation: Deliberation, free: tuple[int, ...]) -> IntArray:
         """Return the plan ``(n,)`` that the round of best responses starts from."""
+        tried = self._with_starts(deliberation, free)
+        return tried[greatest(self.worth(deliberation, tried), deliberation.rng)]
+
+    def _with_starts(self, deliberation: Deliberation, free: tuple[int, ...]) -> IntArray:
+        """Return the joint actions ``(m, n)`` of which the best is taken for a plan to improve."""
         if free not in self._starts:
             self._starts[free] = self._starting(free)
-        tried = _with(deliberation.joint_action, [(free, self._starts[free])])
-        return tried[greatest(self.worth(deliberation, tried), deliberation.rng)]
+        return _with(deliberation.joint_action, [(free, self._starts[free])])
 
     def _starting(self, free: tuple[int, ...]) -> IntArray:
         """Return actions ``(m, k)`` of the k free agents, in the order of decision."""

@@ -17,8 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.evaluators.drawing import draw, explored
 from ...core.interface.prediction import Exploring
-from ...core.numerics import SAME, FloatArray, IntArray, njit
+from ...core.numerics import FloatArray, IntArray, njit
 
 SMALL = 0.1
 """A change of a bearing [rad] below which it passes one centre at most, and its tangent's series
@@ -205,22 +206,6 @@ def _accept(
 
 
 @njit(cache=True)
-def _draw(worths: FloatArray, rng: np.random.Generator) -> int:
-    """Return the action that is worth most as `greatest` does."""
-    top = worths.max()
-    least, ties = top - SAME * max(1.0, abs(top)), 0
-    for worth in worths:
-        ties += 1 if worth >= least else 0
-    place = rng.integers(0, ties) if ties > 1 else 0
-    for a in range(len(worths)):
-        if worths[a] >= least:
-            if place == 0:
-                return a
-            place -= 1
-    return -1
-
-
-@njit(cache=True)
 def respond(
     places: FloatArray,
     goal: FloatArray,
@@ -273,9 +258,9 @@ def respond(
             if not decides:
                 for a in range(n_actions):
                     worths[a] = worths[a] if options.alike[j, a] == a else -np.inf
-            action = _draw(worths, rng)
+            action = draw(worths, rng)
             if decides:
-                action = _explored(j, worths, exploring, rng)
+                action = explored(j, worths, exploring, rng)
             turn = options.turns[j, action] - options.turns[j, plan[j]]
             _accept(x, y, goal, j, turn, options, bearings)
             plan[j] = action
@@ -311,21 +296,3 @@ def _compare(
         gain += _between(away, options.distances[0], options.distances[1])
         gain += _between(before - away, options.approaches[0], options.approaches[1])
         worths[a] = gain / n
-
-
-@njit(cache=True)
-def _explored(
-    joint: int, worths: FloatArray, exploring: Exploring, rng: np.random.Generator
-) -> int:
-    """Return the action that a joint takes, as `Bursts.choose` does."""
-    (memory, chance, stop), at = exploring, 1 + 2 * joint
-    if chance >= 0.0:
-        if memory[at] > 0.0:
-            memory[at] -= 1.0
-            return int(memory[at + 1])
-        if rng.random() < chance:
-            action = rng.integers(0, len(worths))
-            memory[at] = rng.geometric(stop) - 1
-            memory[at + 1] = action
-            return action  # type: ignore[return-value]  # compiled: an int
-    return _draw(worths, rng)

@@ -15,9 +15,9 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core.evaluators.best_response import RespondingPrediction, Responses
+from ...core.evaluators.best_response import RespondingPrediction, Responses, Search
 from ...core.interface.measures import SUCCESS, Measure
-from ...core.interface.prediction import EmbodiedPrediction, Exploring, first_alike
+from ...core.interface.prediction import EmbodiedPrediction, first_alike
 from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedWorlds
@@ -352,18 +352,11 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         alone = alone and all(len(term) == 1 for term in rules.terms)
         return partial(self._respond, rules) if simple and alone else None
 
-    def _respond(
-        self,
-        rules: RuleBase,
-        weights: FloatArray,
-        plan: IntArray,
-        order: IntArray,
-        exploring: Exploring,
-        rng: np.random.Generator,
-    ) -> IntArray:
+    def _respond(self, rules: RuleBase, search: Search) -> IntArray:
+        plan = search.begun()
         speed, *others = rules.partitions
         cuts = np.cumsum(rules.sizes)[:-1]
-        of_speed, of_bearing, *common = np.split(weights, cuts, axis=1)
+        of_speed, of_bearing, *common = np.split(search.pooled.weights[0], cuts, axis=1)
         distances, approaches = (
             np.stack([partition.centres, values.sum(axis=0)])
             for partition, values in zip(others[1:], common, strict=True)
@@ -378,7 +371,8 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
             approaches,
         )
         places = ends_of(self.angles + self.turns[self._joints, plan], self.arm.length)
-        return respond(places, self.goal, self.before, plan.copy(), order, options, exploring, rng)
+        order, exploring, rng = search.order, search.exploring, search.rng
+        return respond(places, self.goal, self.before, plan, order, options, exploring, rng)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the joint speeds ``(n,)`` that a joint action ``(n,)`` would command [rad/s]."""

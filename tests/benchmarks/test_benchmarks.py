@@ -89,6 +89,12 @@ def test_decisions_of_every_size_are_timed(run: Run) -> None:
     )
 
 
+def test_boxes_decide_at_once_as_one_by_one(run: Run) -> None:
+    heading, line = run("benchmarks.responses", "--robots", "3", "--number", "3").splitlines()
+    assert heading.endswith("same joint actions")
+    assert line.endswith("True")
+
+
 @pytest.mark.slow
 def test_what_can_be_solved_at_a_size_is_told(run: Run) -> None:
     few = ["--robots", "3", "--seeds", "2", "--scalings", "similar", "--grows", "width"]
@@ -105,7 +111,7 @@ def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
     rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in lines]
     page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
     told = [f"| {' | '.join(row)} |" for row in rows if row]
-    assert len(told) == 7
+    assert len(told) == 14
     assert [row for row in told if row not in page] == []
     wide = next(line for line in lines if line.startswith("64, wide box first: "))
     assert wide.startswith("64, wide box first: 38 failures, 17 with the box too far from the goal")

@@ -52,7 +52,12 @@ def test_what_losing_messages_costs_is_paired_by_seed() -> None:
     lines = faults.fault_costs(pd.concat([rows_of(), lost]))
     assert len(lines) == 2
     assert all(float(one.difference.value) == pytest.approx(-0.22) for one in lines)
-    assert str(lines[0]).startswith("line_up, chain, 64 agents, lost 0.3: success -.22 [")
+    assert str(lines[0]).startswith("line_up, chain, batch-td, 64 agents, lost 0.3: success -.22 [")
+
+
+def test_rows_of_two_studies_are_not_taken_for_one() -> None:
+    with pytest.raises(ValueError, match="not unique"):
+        faults.fault_costs(pd.concat([rows_of(), rows_of(), rows_of(fault="lost 0.3")]))
 
 
 def test_thresholds_are_between_shares_that_were_run() -> None:
@@ -61,8 +66,10 @@ def test_thresholds_are_between_shares_that_were_run() -> None:
         failing = rows_of(fault=f"lost {share}")
         failing["success"] -= cost - 0.02 * (failing["seed"] - 2.0)
         frames.append(failing)
-    lines = faults.thresholds(faults.fault_costs(pd.concat(frames)))
-    assert lines[0] == "line_up, chain, 64 agents, messages lost: costs from .50 on, not up to .20"
+    first, *_ = faults.thresholds(faults.fault_costs(pd.concat(frames)))
+    head, _, text = first.partition(": ")
+    assert head == "line_up, chain, batch-td, 64 agents, messages lost"
+    assert text == "costs from .50 on, not up to .20"
 
 
 def test_committed_rows_are_made_again_from_published_ones() -> None:

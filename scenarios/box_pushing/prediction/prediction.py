@@ -8,21 +8,32 @@ own block is the wheel speed that is exact.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import pi
 from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables, first_alike
+from ....core.evaluators.best_response import RespondingPrediction, Responses, Search
+from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
+from ....core.rules.rule_base import RuleBase
 from ..states.relational import View
+from ..states.relational_lanes import Columns
 from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline
 from ..world.settings import InfraredSettings, Task, reward
 from .push import PushBelief, PushModel, outcomes, push
-from .wheel_commands import WheelCommands, choices_of, speeds_of, twist_table, wheel_commands_of
+from .responses import Outlook, respond
+from .wheel_commands import (
+    WheelCommands,
+    choices_of,
+    first_actions,
+    speeds_of,
+    twist_table,
+    wheel_commands_of,
+)
 
 CONTACT_GAP = 0.002
 """Predicted gap [m] below which a robot counts as touching."""
@@ -72,7 +83,7 @@ class Premises:
     """How far predictions look ahead [s]."""
 
 
-class BoxPrediction(EmbodiedPrediction, Tables):
+class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
     """Predicts from one situation.
 
     Parameters
@@ -144,7 +155,54 @@ class BoxPrediction(EmbodiedPrediction, Tables):
     @cached_property
     def alike(self) -> IntArray:
         """The first robot-action index ``(M, A ** w)`` that gives the same wheel speeds."""
-        return first_alike(self.wheel_commands.which)
+        return first_actions(self.wheel_commands.which)
+
+    def best_responses(self, rules: RuleBase) -> Responses | None:
+        """Return best responses of all robots by one compiled call, see `responses`.
+
+        None where a state variable, or a rule base of all rules, is not of what is compiled.
+        """
+        space = self.premises.space
+        simple = space.is_built_in and not space.own_needs_pose and rules.compact
+        alone = len(self.situation.speeds) == 1
+        if space.columns is None or alone or not simple:
+            return None
+        return partial(self._respond, rules, space.columns)
+
+    def _respond(self, rules: RuleBase, columns: Columns, search: Search) -> IntArray:
+        now = self.situation
+        premises = self.premises
+        commands = self.wheel_commands
+        wheels = len(self.groups[0])
+        weights, agents, _, firsts = search.pooled
+        outlook = Outlook(
+            robots=now.robots,
+            box=now.box,
+            goal=now.goal,
+            before=float(np.hypot(now.goal[0] - now.box[0], now.goal[1] - now.box[1])),
+            seconds=premises.seconds,
+            periods=premises.seconds / premises.hold,
+            model=self.model,
+            twists=commands.twists,
+            speeds=commands.speeds,
+            which=commands.which,
+            alike=self.alike,
+            every=np.arange(len(self.groups)),
+            columns=columns.rows,
+            weights=weights,
+            agents=agents,
+            firsts=firsts,
+            kinds=rules.kinds,
+            packed=rules.layout,
+        )
+        order = search.order[::wheels] // wheels
+        n_actions = len(premises.action_set)
+        wanted = columns.wanted
+        exploring = search.exploring
+        joint = respond(search.starts, order, n_actions, outlook, wanted, exploring, search.rng)
+        if not len(joint):
+            raise ArithmeticError("no joint action is worth most: not all values are numbers")
+        return joint
 
     @cached_property
     def _table(self) -> tuple[View, IntArray]:

@@ -21,6 +21,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray
+from ....core.rules.rule_base import RuleBase
 from ..states.relational import View
 from ..world.boxes import BoxSpec
 from ..world.robots import compliance
@@ -109,6 +110,9 @@ class ExactPrediction(BoxPrediction):
     ) -> None:
         super().__init__(situation, model, premises)
         self.future = future
+
+    def best_responses(self, rules: RuleBase) -> None:
+        """Return that every joint action is to be played."""
 
     def _after(self, choices: IntArray, seconds: float) -> View:
         periods = round(seconds / CONTROL_PERIOD)

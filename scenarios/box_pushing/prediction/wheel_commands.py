@@ -122,6 +122,20 @@ def _find(twists: FloatArray, command: int, first: IntArray) -> int:
 
 
 @njit(cache=True)
+def first_actions(which: IntArray) -> IntArray:
+    """Return for every robot-action index ``(M, A ** w)`` the first that gives its command."""
+    first = np.empty_like(which)
+    for r in range(len(which)):
+        for c in range(which.shape[1]):
+            first[r, c] = c
+            for former in range(c):
+                if which[r, former] == which[r, c]:
+                    first[r, c] = former
+                    break
+    return first
+
+
+@njit(cache=True)
 def choices_of(joint_actions: IntArray, which: IntArray, n_actions: int) -> IntArray:
     """Return the wheel command ``(m, M)`` of each robot in joint actions ``(m, n)``."""
     m, n = len(joint_actions), len(which)

@@ -9,6 +9,7 @@ functions.
 
 from collections.abc import Sequence
 from math import pi
+from typing import TypeAlias
 
 import numpy as np
 
@@ -53,6 +54,9 @@ _OF_PUSH = (PUSH, CROSS_TRACK)
 _OF_CONTACT = (CONTACT_PUSH, CONTACT_CROSS_TRACK, PATH, PATH_CROSS_TRACK)
 _OF_PATH = (PATH, PATH_CROSS_TRACK)
 
+Wanted: TypeAlias = tuple[bool | None, bool | None, bool | None, bool | None]
+"""Of push, contact push, path and face: True or None, see `relational`."""
+
 
 class Columns:
     """Compiled variables, one column each.
@@ -71,15 +75,15 @@ class Columns:
     def __init__(self, names: Sequence[str]) -> None:
         places = [COMPILED.index(name) if name in COMPILED else 0 for name in names]
         self.rows: IntArray = LANES * np.array(places, dtype=np.int64)
-        # Of push, contact push, path and face: True or None, see `_relational`.
-        self._groups = tuple(
+        push, contact, path, face = (
             bool(np.isin(self.rows, group).any()) or None
             for group in (_OF_PUSH, _OF_CONTACT, _OF_PATH, FACE_BEARING)
         )
+        self.wanted: Wanted = (push, contact, path, face)
 
     def of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the variables ``(len(robots), m, columns)`` of robots in the view's situations."""
-        return _relational(
+        return relational(
             np.ascontiguousarray(view.robots.transpose(1, 2, 0)),
             np.ascontiguousarray(view.box.T),
             np.ascontiguousarray(view.gaps.T),
@@ -91,7 +95,7 @@ class Columns:
             view.friction_radius,
             np.fromiter(robots, np.int64),
             self.rows,
-            *self._groups,
+            *self.wanted,
         )
 
 
@@ -330,7 +334,7 @@ def _of_others(
 
 
 @njit(cache=True)
-def _relational(
+def relational(
     robots: FloatArray,
     box: FloatArray,
     gaps: FloatArray,

@@ -1,0 +1,54 @@
+"""How compiled evaluators draw: the very actions of `greatest` and of `Bursts.choose`."""
+
+import numpy as np
+
+from ..interface.prediction import Exploring
+from ..numerics import SAME, FloatArray, IntArray, njit
+
+
+@njit(cache=True)
+def draw(worths: FloatArray, rng: np.random.Generator) -> int:
+    """Return the action that is worth most as `greatest` does; -1 where that refuses."""
+    top = worths[0]
+    for worth in worths:
+        top = worth if worth > top else top
+    least = top - SAME * max(1.0, abs(top))
+    ties = 0
+    for worth in worths:
+        ties += 1 if worth >= least else 0
+    place = rng.integers(0, ties) if ties > 1 else 0
+    for a in range(len(worths)):
+        if worths[a] >= least:
+            if place == 0:
+                return a
+            place -= 1
+    return -1
+
+
+@njit(cache=True)
+def explored(agent: int, worths: FloatArray, exploring: Exploring, rng: np.random.Generator) -> int:
+    """Return the action that an agent takes, as `Bursts.choose` does."""
+    memory, chance, stop = exploring
+    at = 1 + 2 * agent
+    if chance >= 0.0:
+        if memory[at] > 0.0:
+            memory[at] -= 1.0
+            return int(memory[at + 1])
+        if rng.random() < chance:
+            action = rng.integers(0, len(worths))
+            memory[at] = rng.geometric(stop) - 1
+            memory[at + 1] = action
+            return action  # type: ignore[return-value]  # compiled: an int
+    return draw(worths, rng)
+
+
+@njit(cache=True)
+def drawn_equal(
+    order: IntArray, n_actions: int, exploring: Exploring, rng: np.random.Generator
+) -> IntArray:
+    """Return the actions ``(n,)`` of agents to whom all are worth the same."""
+    joint = np.empty_like(order)
+    worths = np.zeros(n_actions)
+    for agent in order:
+        joint[agent] = explored(agent, worths, exploring, rng)
+    return joint

@@ -1,0 +1,238 @@
+"""Best responses of all robots in one compiled call.
+
+A joint action is worth the same whenever it is asked for: what the actions of a robot are worth is
+kept until another robot's wheel commands change, and in the round of decisions it is often known
+from the round before. Otherwise the robots that come next are valued with it, the more of them the
+more in a row have kept to the plan. The very joint actions of `BestResponse` come out, by the same
+random numbers; `tests/scenarios/box_pushing/prediction` holds one against the other.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ....core.evaluators.best_response import MOST_AHEAD
+from ....core.evaluators.drawing import draw, explored
+from ....core.interface.prediction import Exploring
+from ....core.numerics import FloatArray, IntArray, njit
+from ....core.rules.kernels.compact_states import total_compact
+from ....core.rules.kernels.fuzzy import Packed
+from ..states.relational_lanes import Wanted, relational
+from .push import PushModel, pushed
+from .wheel_commands import choices_of, speeds_of
+
+
+class Outlook(NamedTuple):
+    """What is predicted, and what that is worth; M robots of w wheels with A actions each."""
+
+    robots: FloatArray
+    """``(M, 3)`` present poses."""
+    box: FloatArray
+    """``(3,)`` pose."""
+    goal: FloatArray
+    """``(3,)`` pose."""
+    before: float
+    """Distance of the box from the goal [m]."""
+    seconds: float
+    """How far it is predicted [s]."""
+    periods: float
+    """How many decision periods that is."""
+    model: PushModel
+    """What is believed of robots and box."""
+    twists: FloatArray
+    """``(M, K, 3)`` of every wheel command [m/s, m/s, rad/s]."""
+    speeds: FloatArray
+    """``(M, K, w)`` wheel speeds of every command [m/s]."""
+    which: IntArray
+    """``(M, A ** w)`` the wheel command of every robot action."""
+    alike: IntArray
+    """``(M, A ** w)`` the first robot action that gives the same."""
+    every: IntArray
+    """``(M,)`` numbers of all robots."""
+    columns: IntArray
+    """Of the state variables, see `Columns`."""
+    weights: tuple[FloatArray, FloatArray, FloatArray]
+    """Consequent weights, see `total_compact`, as what follows."""
+    agents: IntArray
+    firsts: IntArray
+    kinds: tuple[IntArray, IntArray, IntArray]
+    packed: Packed
+
+
+class _Plan(NamedTuple):
+    """What all robots are to do."""
+
+    commands: IntArray
+    """``(M,)`` their wheel commands."""
+    worths: FloatArray
+    """``(M, A ** w)`` what the actions of each robot were worth when last computed."""
+    around: IntArray
+    """``(M, M)`` the wheel commands of all robots then; -1 before."""
+
+
+@njit(cache=True)
+def _worths(choices: IntArray, outlook: Outlook, wanted: Wanted) -> FloatArray:
+    """Return what wheel commands ``(m, M)`` are worth to the mean agent ``(m,)``."""
+    robots, box, gaps = pushed(
+        outlook.robots, outlook.box, outlook.twists, choices, outlook.seconds, outlook.model
+    )
+    shared = relational(
+        robots,
+        box,
+        gaps,
+        outlook.goal,
+        outlook.box,
+        outlook.before,
+        outlook.periods,
+        outlook.model.edges,
+        outlook.model.friction_radius,
+        outlook.every,
+        outlook.columns,
+        *wanted,
+    )
+    own = np.expand_dims(speeds_of(choices, outlook.speeds), 2)
+    weights, agents, firsts = outlook.weights, outlook.agents, outlook.firsts
+    total = total_compact(weights, agents, firsts, outlook.kinds, own, shared, outlook.packed)
+    return total / len(agents)
+
+
+@njit(cache=True)
+def _holds(plan: _Plan, robot: int) -> bool:
+    """Return whether no other robot's wheel command is another than when it was last valued."""
+    around = plan.around[robot]
+    same = True
+    for i in range(len(around)):
+        same = same and (i == robot or around[i] == plan.commands[i])
+    return same
+
+
+@njit(cache=True)
+def _value(robots: IntArray, value: float, plan: _Plan, outlook: Outlook, wanted: Wanted) -> None:
+    """Value the actions of some robots around a plan that is worth `value`."""
+    n_actions = outlook.which.shape[1]
+    rows = np.empty((len(robots) * n_actions, len(plan.commands)), np.int64)
+    m = 0
+    for r in robots:
+        for a in range(n_actions):
+            if outlook.alike[r, a] == a and outlook.which[r, a] != plan.commands[r]:
+                rows[m] = plan.commands
+                rows[m, r] = outlook.which[r, a]
+                m += 1
+    worths: FloatArray = np.empty(0)
+    if m > 0:
+        worths = _worths(rows[:m], outlook, wanted)
+    m = 0
+    for r in robots:
+        plan.around[r] = plan.commands
+        for a in range(n_actions):
+            first = outlook.alike[r, a]
+            if outlook.which[r, a] == plan.commands[r]:
+                plan.worths[r, a] = value
+            elif first == a:
+                plan.worths[r, a] = worths[m]
+                m += 1
+            else:
+                plan.worths[r, a] = plan.worths[r, first]
+
+
+@njit(cache=True)
+def _improve(worths: FloatArray, alike: IntArray, rng: np.random.Generator) -> int:
+    """Return the best of the actions that come to different commands; -1 if there is none."""
+    distinct = np.empty(len(worths), np.int64)
+    count = 0
+    for a in range(len(worths)):
+        if alike[a] == a:
+            distinct[count] = a
+            count += 1
+    best = draw(worths[distinct[:count]], rng)
+    return distinct[best] if best >= 0 else -1
+
+
+@njit(cache=True)
+def _decide(
+    robot: int,
+    worths: FloatArray,
+    joint: IntArray,
+    n_actions: int,
+    exploring: Exploring,
+    rng: np.random.Generator,
+) -> int:
+    """Let the wheels of a robot decide, one after the other; return its action, -1 if none is."""
+    wheels = len(joint)
+    values = np.empty(n_actions)
+    action = 0
+    for j in range(wheels):
+        places = n_actions ** (wheels - 1 - j)
+        left = worths[action * n_actions * places : (action + 1) * n_actions * places]
+        if draw(left, rng) < 0:  # what the robot would do in the end, which may be told
+            return -1
+        for a in range(n_actions):
+            values[a] = left[a * places : (a + 1) * places].max()
+        joint[j] = explored(robot * wheels + j, values, exploring, rng)
+        if joint[j] < 0:
+            return -1
+        action = action * n_actions + joint[j]
+    return action
+
+
+@njit(cache=True)
+def respond(
+    starts: IntArray,
+    order: IntArray,
+    n_actions: int,
+    outlook: Outlook,
+    wanted: Wanted,
+    exploring: Exploring,
+    rng: np.random.Generator,
+) -> IntArray:
+    """Improve the best start by one round of best responses, then let all wheels decide.
+
+    Parameters
+    ----------
+    starts
+        ``(m, n)`` joint actions.
+    order
+        ``(M,)`` the robots in the order of decision.
+    n_actions
+        A.
+    outlook, wanted
+        What is predicted, and which state variables, see `Columns`.
+    exploring
+        How agents explore.
+    rng
+        Source of randomness.
+
+    Returns
+    -------
+    IntArray
+        ``(n,)`` the joint action, empty where none is worth most: not all values are numbers.
+    """
+    n, n_indices = outlook.which.shape
+    wheels = starts.shape[1] // n
+    choices = choices_of(starts, outlook.which, n_actions)
+    worths = _worths(choices, outlook, wanted)
+    best = draw(worths, rng)
+    joint = starts[best].copy()
+    plan = _Plan(choices[best], np.empty((n, n_indices)), np.full((n, n), -1))
+    value = worths[best]
+    reach = 0
+    depth = 1
+    for decides in (False, True):
+        for k in range(n):
+            if best < 0:
+                return joint[:0]
+            r = order[k]
+            if not _holds(plan, r):
+                depth = min(2 * depth, MOST_AHEAD) if k == reach else 1
+                reach = min(k + depth, n)
+                _value(order[k:reach], value, plan, outlook, wanted)
+            if decides:
+                own = joint[r * wheels : (r + 1) * wheels]
+                best = _decide(r, plan.worths[r], own, n_actions, exploring, rng)
+            else:
+                best = _improve(plan.worths[r], outlook.alike[r], rng)
+            plan.commands[r] = outlook.which[r, best]
+            value = plan.worths[r, best]
+    return joint
