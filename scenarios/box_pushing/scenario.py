@@ -20,6 +20,7 @@ from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedWorlds
 from ...core.interface.worlds import Transitions
 from ...core.numerics import FloatArray, IntArray, stream_of, wrap
+from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES, Measurements
 from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
@@ -70,6 +71,7 @@ class BoxPushing(Scenario, Embodiment):
     recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
+        expect("settings of box pushing", BoxPushingSettings, settings=settings)
         self.settings = settings
         self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
