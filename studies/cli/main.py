@@ -65,6 +65,14 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "claims": (PUBLISHED, "Print the claims of the paper and the verdict on each."),
 }
 """The module of each command, imported when it is asked for, and what the help says of it."""
+FORMER = {
+    "watch": "nested-agents status DIR --watch",
+    "course": "python examples/course/grade.py",
+    "--log": "--track tensorboard, mlflow or wandb",
+    "--publish": "nested-agents export DIR --format json",
+    "--wheels": "--agents, of which a robot has two, and --robots",
+}
+"""Commands and options of version 0.3.0, and what has taken their place."""
 
 
 def load_command(name: str) -> click.Command | None:
@@ -96,6 +104,8 @@ class _Commands(click.Group):
                 f"{args[0]}: is a command on published results, which are in the repository, in "
                 "results/, not in the installed package"
             )
+        if command is None and args[0] in FORMER:
+            raise SpecError(f"{args[0]}: of version 0.3.0; now {FORMER[args[0]]}")
         if command is None:
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
         parts = command.commands if isinstance(command, click.Group) else {}
@@ -195,6 +205,9 @@ def _run(arguments: list[str]) -> int:
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
     except click.UsageError as error:
+        option = error.option_name if isinstance(error, click.NoSuchOption) else ""
+        if option in FORMER:
+            raise SpecError(f"{option}: of version 0.3.0; now {FORMER[option]}") from None
         command = error.ctx.command_path if error.ctx else f"{PROGRAM} {arguments[0]}"
         raise SpecError(f"{error.format_message().rstrip('.')}; see {command} --help") from None
     except SystemExit as error:

@@ -392,7 +392,7 @@ class Spec(Settings):
         if left_out:
             kinds = dict.fromkeys(kind for c in self.conditions() for kind in c.other_kinds)
             keys = join_names(left_out, FEW_KEYS)
-            lines.append(f"{keys}: of the preset, left out for {join_names(kinds, FEW_KEYS)}")
+            lines.append(f"{keys}: set by default, left out for {join_names(kinds, FEW_KEYS)}")
         lines += self._of_controls()
         for condition in self.conditions():
             lines += condition.settings.warnings()

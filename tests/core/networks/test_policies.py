@@ -342,7 +342,7 @@ def test_what_cannot_be_passed_down_is_refused() -> None:
 
 def remarks(spec: Spec) -> list[str]:
     """Return what is said of a spec, beside what of its preset is left out."""
-    return [line for line in spec.warnings() if ": of the preset, left out" not in line]
+    return [line for line in spec.warnings() if ": set by default, left out" not in line]
 
 
 def test_a_topology_that_says_nothing_to_the_learner_is_remarked() -> None:

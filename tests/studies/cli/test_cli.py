@@ -252,6 +252,9 @@ BAD = {
     "rum": "error: rum: unknown command; did you mean 'run'? known: atlas, benchmark",
     "--versio": "'--versio'. Did you mean '--version'?",
     "demo --job 3": "No such option '--job'. (Did you mean one of: '--jobs', '--out'?)",
+    "watch out": "error: watch: of version 0.3.0; now nested-agents status DIR --watch",
+    "run {spec} --log x": "error: --log: of version 0.3.0; now --track tensorboard",
+    "topology show chain --wheels 4": "error: --wheels: of version 0.3.0; now --agents, of which",
     "demo extra": "unexpected extra argument (extra); see nested-agents demo --help",
 }
 

@@ -36,7 +36,7 @@ def test_every_learner_is_chosen_by_its_kind_alone(kind: str) -> None:
     spec = build(table) if kind in BUILT else Spec.of(table)
     (condition,) = spec.conditions()
     assert condition.settings.learner.kind == kind
-    remarks = [line for line in spec.warnings() if "of the preset, left out" in line]
+    remarks = [line for line in spec.warnings() if "set by default, left out" in line]
     assert len(remarks) == (kind != "batch-td")
     assert all(line.endswith(f"left out for learner.kind = {kind!r}") for line in remarks)
 
@@ -82,7 +82,7 @@ def test_what_the_user_did_not_write_gives_way_with_one_remark() -> None:
     assert condition.settings.learner.decision.value_of == "own"
     assert condition.settings.learner.weights == "own"  # the scenario's, for two robots
     assert spec.warnings() == (
-        "learner.decision.value_of, learner.regression_iterations: of the preset, left out for "
+        "learner.decision.value_of, learner.regression_iterations: set by default, left out for "
         "learner.kind = 'fitted-q'",
     )
     swept = Spec.of({"sweep": {"learner.kind": ["batch-td", "fitted-q", "td-lambda"]}})
@@ -124,7 +124,7 @@ def test_the_kind_of_a_part_drops_what_is_another_ones() -> None:
         assert bool(spec.warnings()) == (kind != "burst")
     paper = build({"preset": "paper", "learner": {"decision": {"evaluator": "best-response"}}})
     assert paper.warnings() == (
-        "learner.decision.teammates: of the preset, left out for "
+        "learner.decision.teammates: set by default, left out for "
         "learner.decision.evaluator.kind = 'best-response'",
     )
     assert not build({"scenario": {"kind": "line-up"}}).warnings()
