@@ -24,7 +24,7 @@ from ..core.numerics import nx
 from ..core.plugins import sources
 from ..core.plugins.registry import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
-from ..core.plugins.words import closest
+from ..core.plugins.words import closest, expect
 from .builders import Bodies, Names, check_names, from_networkx, quote
 from .files import read_file
 from .strings import ARGUMENTS, Keys
@@ -208,6 +208,8 @@ def build(
     """
     if not isinstance(settings, TopologySettings):
         settings = parse(settings)
+    expect("the names of agents", Sequence, agents=agents)
+    expect("sequences of indices", Sequence | None, bodies=bodies, interactions=interactions)
     title = settings.title
     named: Bodies = [(a,) for a in agents]
     try:

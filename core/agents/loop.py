@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from numbers import Integral
 from time import perf_counter
 from typing import NamedTuple
 
@@ -20,6 +21,7 @@ from ..interface.experience import Experience, Observation
 from ..interface.plain import as_scenario
 from ..interface.scenario import Transition, check_reward
 from ..numerics import FloatArray, IntArray
+from ..plugins.words import expect
 from .team import Team
 
 
@@ -64,6 +66,7 @@ def world_seed(seed: int, episode: int) -> np.random.SeedSequence:
 
 def policy_seed(seed: int) -> np.random.SeedSequence:
     """Return the seed of a team, independent of all worlds."""
+    expect("a whole number from 0", Integral, seed=seed)
     return np.random.SeedSequence(seed, spawn_key=(1,))
 
 
@@ -104,6 +107,8 @@ def control_loop(
         If the scenario does not predict what the team decides by, see `Team.check`, or its states
         or rewards cannot be learned from, see `StateSpace.checked` and `check_reward`.
     """
+    expect("a team", Team, team=team)
+    expect("whole numbers", Integral, episodes=episodes, steps=steps, seed=seed)
     first_world = first_episode if first_world is None else first_world
     explore = learn if explore is None else explore
     world = as_scenario(scenario)

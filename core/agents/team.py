@@ -21,6 +21,8 @@ from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
 from ..interface.worlds import Transitions
 from ..numerics import AnyArray, BoolArray, IntArray
+from ..plugins.settings import Settings
+from ..plugins.words import expect
 from .kept import begin_with
 
 if TYPE_CHECKING:
@@ -75,6 +77,9 @@ class Team:
         seed: np.random.SeedSequence,
         failures: Sequence[MessageFailure] = (),
     ) -> None:
+        expect("settings of a team or of a learner", Settings, settings=settings)
+        expect("a hierarchy", Hierarchy, hierarchy=hierarchy)
+        expect("what policy_seed returns", np.random.SeedSequence, seed=seed)
         world = as_scenario(scenario)
         if hierarchy.agents != tuple(world.agents):
             raise ValueError(

@@ -33,6 +33,7 @@ from ..interface.prediction import Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
 from ..rules.rule_base import Pooled, RuleBase
+from .drawing import drawn_equal
 from .enumeration import combinations
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
 
@@ -221,11 +222,15 @@ class BestResponse(Aggregation):
 
         None where the prediction has no way to it but to ask every agent in its turn.
         """
+        if not self._at_once:
+            return None
+        if self.indifferent(first):
+            return drawn_equal(self._order, self.n_actions, exploring, first.rng)
         prediction = first.prediction
-        if not (self._at_once and isinstance(prediction, RespondingPrediction)):
+        if not isinstance(prediction, RespondingPrediction):
             return None
         respond = prediction.best_responses(self.rules)
-        if respond is None or self.indifferent(first):
+        if respond is None:
             return None
         starts = self._with_starts(first, self._free[first.agent])
         each = self._numbers[: self.n_actions**self._widest]

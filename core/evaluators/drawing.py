@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..interface.prediction import Exploring
-from ..numerics import SAME, FloatArray, njit
+from ..numerics import SAME, FloatArray, IntArray, njit
 
 
 @njit(cache=True)
@@ -40,3 +40,15 @@ def explored(agent: int, worths: FloatArray, exploring: Exploring, rng: np.rando
             memory[at + 1] = action
             return action  # type: ignore[return-value]  # compiled: an int
     return draw(worths, rng)
+
+
+@njit(cache=True)
+def drawn_equal(
+    order: IntArray, n_actions: int, exploring: Exploring, rng: np.random.Generator
+) -> IntArray:
+    """Return the actions ``(n,)`` of agents to whom all are worth the same."""
+    joint = np.empty_like(order)
+    worths = np.zeros(n_actions)
+    for agent in order:
+        joint[agent] = explored(agent, worths, exploring, rng)
+    return joint

@@ -24,12 +24,13 @@ joint-action learners (everybody is everybody's neighbour) and coordination grap
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator
 
 from ..numerics import nx
+from ..plugins.words import expect
 from .picture import svg
 
 ARROW, LINE = "{} -> {}", "{} - {}"
@@ -97,6 +98,8 @@ class Hierarchy:
         considers: Considers = "descendants",
         bodies: Iterable[Sequence[str]] = (),
     ) -> None:
+        expect("the names of agents", Collection, agents=agents)
+        expect("pairs of names", Iterable, edges=edges, neighbours=neighbours, bodies=bodies)
         agents, edges = tuple(agents), [(str(a), str(b)) for a, b in edges]
         if not agents:
             raise ValueError("hierarchy: no agents")

@@ -25,6 +25,27 @@ from .worlds import Worlds
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Twists = FloatArray | Callable[[], FloatArray | None] | None
+"""Those of a transition, what measures them, or nothing."""
+
+
+class DeferredTwists:
+    """The twists of a transition: given, or measured when they are first asked for."""
+
+    def __get__(self, transition: Transition | None, owner: type[Transition]) -> FloatArray | None:
+        """Return them; None, which is the default, of no transition."""
+        if transition is None:
+            return None
+        twists: Twists = vars(transition)["twists"]
+        if callable(twists):
+            twists = twists()
+            vars(transition)["twists"] = twists
+        return twists
+
+    def __set__(self, transition: Transition, twists: Twists) -> None:
+        """Keep them, or what measures them."""
+        vars(transition)["twists"] = twists
+
 
 @dataclass(frozen=True)
 class Transition:
@@ -40,10 +61,11 @@ class Transition:
     """Whether the episode ends for lack of time."""
     info: Mapping[str, Any]
     """Measurements of the step by name, scalars or small arrays; for records, not for learners."""
-    twists: FloatArray | None = None
+    twists: DeferredTwists = DeferredTwists()
     """``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], where bodies
     measure it; ``(K + M, 3)`` where they also measure what they move, its twists standing first,
-    and nothing else than these bodies moved it."""
+    and nothing else than these bodies moved it. Given is also a function that returns them, which
+    is called if they are asked for."""
     absorbing: bool = True
     """Whether a terminal state is as if entered again for ever, as where a box stands at its goal;
     if not, its reward is received once, as in Gymnasium."""

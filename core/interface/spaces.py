@@ -227,4 +227,4 @@ class ActionSet:
         """
         gains, increments = self._arrays
         wanted = gains[actions] * speeds + increments[actions] * unit
-        return np.clip(wanted, -limit, limit)
+        return np.minimum(np.maximum(wanted, -limit), limit)

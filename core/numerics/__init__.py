@@ -9,6 +9,7 @@ from .arrays import (
     greatest,
     quadrature,
     wrap,
+    wrap_each,
 )
 from .compiler import INNER, LOCK, Kernel, interpreted, njit, serve, stamp
 from .libraries import Deferred, nx, optimize, pd, special, stats
@@ -39,4 +40,5 @@ __all__ = [
     "stream_of",
     "words_of",
     "wrap",
+    "wrap_each",
 ]

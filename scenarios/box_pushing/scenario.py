@@ -7,6 +7,7 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedWorlds
 from ...core.interface.worlds import Transitions
 from ...core.numerics import FloatArray, IntArray, stream_of, wrap
+from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES, Measurements
 from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
@@ -30,7 +32,7 @@ from .states.state_spaces import state_space_for
 from .world.boxes import box_for, growth
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD, Task, reward
-from .world.starts import GOAL, place
+from .world.starts import place
 from .world.stepping import step_address
 from .world.world import TOUCHING, WheelFailures, World
 
@@ -69,6 +71,7 @@ class BoxPushing(Scenario, Embodiment):
     recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
+        expect("settings of box pushing", BoxPushingSettings, settings=settings)
         self.settings = settings
         self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
@@ -88,6 +91,10 @@ class BoxPushing(Scenario, Embodiment):
         self.world = World(robots, self.box, infrared=settings.infrared)
         self.space = state_space_for(settings.state_space, self.robot.max_speed)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
+        self._unit_speeds = settings.speed_increment * self._limits
+        self._period = settings.period
+        self._is_noisy = settings.infrared.noise > 0.0
+        self._pays_robots = settings.reward.of == "robot"
         self.state_space = self.space.space
         self.nominal_effects = (nominal_effect(self.robot),) * settings.robots
         """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
@@ -157,35 +164,31 @@ class BoxPushing(Scenario, Embodiment):
 
     def commanded(self, speeds: FloatArray, joint_actions: IntArray) -> FloatArray:
         """Return the wheel speeds ``(..., n)`` that joint actions command, given those before."""
-        unit = self.settings.speed_increment * self._limits
-        return self.action_set.apply(speeds, joint_actions, unit, self._limits)
+        return self.action_set.apply(speeds, joint_actions, self._unit_speeds, self._limits)
 
     def step(self, joint_action: IntArray) -> Transition:
         """Command the wheels, let the world go on for one decision period, observe and reward."""
         self._speeds = self.commanded(self._speeds, joint_action)
-        before = self._distance()
-        poses = np.concatenate([self.world.box_pose[None], self.world.robot_poses])
-        box = poses[0]
-        radius = self.robot.radius
+        before = self.world.poses
         begin = perf_counter()
         self._advance(self._speeds)
         moved = perf_counter()
-        states = self._observe(box)
-        period = self.settings.period
-        there = self.world.robot_poses
-        twists = mean_twists(poses, np.concatenate([self.world.box_pose[None], there]), period)
-        if min(least_gap(poses[1:], radius), least_gap(there, radius)) <= APART:
-            twists = twists[1:]  # what the box does tells nothing of the push then
-        measured = self.measure()
-        readings = self.settings.infrared.noisy(self.world.infrared()[0], self._sensing)
-        away = measured["distance_m"]
-        distance, way, turn = np.array([[away], [away - before], [measured["orientation_rad"]]])
-        terminated = bool(self.task.reached(distance, turn)[0])
+        view = self._view(before[0])
+        states = self.states_at(view, self._speeds[None])[0]
+        readings = self.world.infrared()[0]
+        if self._is_noisy:
+            readings = self.settings.infrared.noisy(readings, self._sensing)
+        distance = view.distance
         contact = self.world.contact[None]
-        strongest = readings.max(axis=1)[None]
-        gained = reward(self.task, distance, way, turn, contact, strongest)[0]
-        received = gained[self.body] if self.settings.reward.of == "robot" else float(gained[0])
+        strongest = np.maximum.reduce(readings, axis=1)[None]
+        way = distance - view.before
+        gained = reward(self.task, distance, way, view.turn, contact, strongest)[0]
+        received = gained[self.body] if self._pays_robots else float(gained[0])
+        away = float(distance[0])
+        measured = self._measured(away, float(view.turn[0]))
+        terminated = bool(self.task.reached(distance, view.turn)[0])
         sensed = perf_counter()
+        twists = partial(_twists, before, self.world.poses, self._period, self.robot.radius)
         if terminated:
             # Does the box come to rest within the tolerance when all wheels stop?
             self._advance(np.zeros(len(self.agents)))
@@ -272,17 +275,20 @@ class BoxPushing(Scenario, Embodiment):
 
     def measure(self) -> Measurements:
         """Return poses, speeds, contact and errors of the present state."""
-        orientation = self._orientation()
+        return self._measured(self._distance(), self._orientation())
+
+    def _measured(self, distance: float, orientation: float) -> Measurements:
+        times = self.world.contact_time
         return {
             "robot_poses": self.world.robot_poses.copy(),
             "box_pose": self.world.box_pose.copy(),
             "goal_pose": self._goal,
             "wheel_speeds": self._speeds,
             "contact": self.world.contact.copy(),
-            "contact_time": self.world.contact_time.copy(),
-            "contact_fraction": float(self.world.contact_time.mean()),
+            "contact_time": times.copy(),
+            "contact_fraction": float(np.add.reduce(times) / len(times)),
             "failed": self._failures.failed,
-            "distance_m": self._distance(),
+            "distance_m": distance,
             "orientation_rad": orientation,
             "orientation_error_rad": abs(orientation),
             "stopped_at_goal": False,
@@ -308,25 +314,35 @@ class BoxPushing(Scenario, Embodiment):
 
         `origin` is the pose ``(3,)`` of the box one decision period ago.
         """
-        world = self.world
-        poses = world.robot_poses[None]
-        here = world.box_pose[None]
-        return self.states_at(poses, here, world.gaps[None], origin, self._speeds[None])[0]
+        return self.states_at(self._view(origin), self._speeds[None])[0]
 
-    def states_at(
-        self, robots: FloatArray, box: FloatArray, gaps: FloatArray, origin: FloatArray,
-        speeds: FloatArray,
-    ) -> FloatArray:  # fmt: skip
-        """Return the states ``(m, n, d)`` of all agents in m situations, see `View`.
+    def _view(self, origin: FloatArray) -> View:
+        world = self.world
+        return self.view_of(world.robot_poses[None], world.box_pose[None], world.gaps[None], origin)
+
+    def view_of(
+        self, robots: FloatArray, box: FloatArray, gaps: FloatArray, origin: FloatArray
+    ) -> View:
+        """Return m situations a decision period after the box was at `origin`, see `View`."""
+        outline = self.box.outline
+        return View(robots, box, gaps, self._goal, origin, 1.0, outline, self.box.friction_radius)
+
+    def states_at(self, view: View, speeds: FloatArray) -> FloatArray:
+        """Return the states ``(m, n, d)`` of all agents in m situations.
 
         `speeds` are those commanded ``(m, n)`` [m/s].
         """
-        view = View(
-            robots, box, gaps, self._goal, origin, 1.0, self.box.outline, self.box.friction_radius
-        )
-        poses = robots[:, self.body].reshape(-1, 3)
-        own = self.space.own(poses, speeds.reshape(-1), self._goal).reshape(*speeds.shape, -1)
-        return np.concatenate([own, self.space.observe(view)[:, self.body]], axis=2)
+        shared = self.space.observe(view)
+        m, n_robots, _ = shared.shape
+        n_own = self.state_space.n_own
+        poses = view.robots
+        if self.space.own_needs_pose:
+            poses = poses[:, self.body]
+        states = np.empty((m, n_robots, len(self.groups[0]), self.state_space.n_variables))
+        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), self._goal)
+        states[..., :n_own] = own.reshape(*states.shape[:3], -1)
+        states[..., n_own:] = shared[:, :, None]
+        return states.reshape(*speeds.shape, -1)
 
 
 class BoxWorlds(StackedWorlds[BoxPushing]):
@@ -370,13 +386,22 @@ class BoxWorlds(StackedWorlds[BoxPushing]):
         )
         boxes = np.ascontiguousarray(poses[:, 0])
         self._boxes = boxes
-        states = one.states_at(poses[:, 1:], boxes, gaps, before, self._speeds)
-        away = np.hypot(*(GOAL[:2] - boxes[:, :2]).T)
-        way = away - np.hypot(*(GOAL[:2] - before[:, :2]).T)
-        turn = wrap(boxes[:, 2] - GOAL[2])
-        reached = one.task.reached(away, turn)
-        paid = reward(one.task, away, way, turn, gaps < TOUCHING, readings)
+        view = one.view_of(poses[:, 1:], boxes, gaps, before)
+        states = one.states_at(view, self._speeds)
+        away = view.distance
+        reached = one.task.reached(away, view.turn)
+        paid = reward(one.task, away, away - view.before, view.turn, gaps < TOUCHING, readings)
         if one.settings.reward.of == "robot":
             paid = paid[:, one.body]
         rewards = np.broadcast_to(paid, joint_actions.shape)
         return Transitions(states, rewards, reached, ~reached & (away > one.farthest))
+
+
+def _twists(before: FloatArray, after: FloatArray, seconds: float, radius: float) -> FloatArray:
+    """Return the mean twists of robots between poses ``(M + 1, 3)``, the box's standing first.
+
+    Without the box's where two robots were close: what it does tells nothing of the push then.
+    """
+    twists = mean_twists(before, after, seconds)
+    close = min(least_gap(before[1:], radius), least_gap(after[1:], radius)) <= APART
+    return twists[1:] if close else twists

@@ -11,6 +11,7 @@ then sensed; of others it is shown by how much they are off. A further check is 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from math import isnan
+from numbers import Integral
 from pathlib import Path
 from textwrap import fill
 from traceback import extract_tb
@@ -18,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.plugins.words import expect, show
 from .frames import Examination
 from .promises import (
     check_form,
@@ -128,6 +130,10 @@ def check_scenario(
     >>> [(v.name, v.low, v.high) for v in findings.variables]
     [('distance', -1.0, 1.0), ('lead', -0.8, 0.8), ('reward', nan, nan)]
     """
+    if not callable(factory):
+        raise ValueError(f"factory = {show(factory)}, allowed: what makes a scenario")
+    expect("whole numbers", Integral, steps=steps)
+    expect("lists of whole numbers", Sequence, seeds=seeds, episodes=episodes)
     if steps < LEAST_STEPS:
         raise ValueError(f"steps = {steps}: must be at least {LEAST_STEPS}")
     for name, numbers, least in (("seeds", seeds, 2), ("episodes", episodes, 1)):

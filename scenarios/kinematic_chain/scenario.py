@@ -23,6 +23,7 @@ from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedWorlds
 from ...core.interface.worlds import Transitions
 from ...core.numerics import FloatArray, IntArray
+from ...core.plugins.words import expect
 from ...core.rules.rule_base import RuleBase
 from ..faults.settings import Failures
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
@@ -66,6 +67,7 @@ class KinematicChain(Scenario, Embodiment):
     recorded = ("angles", "speeds", "failed")
 
     def __init__(self, settings: KinematicChainSettings) -> None:
+        expect("settings of an arm", KinematicChainSettings, settings=settings)
         self.settings = settings
         n = settings.joints
         self.agents = tuple(f"joint{i + 1}" for i in range(n))

@@ -8,13 +8,13 @@ from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING
 
+from ...core.plugins.words import expect
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import scaling_law as laws_of_results
+from .study import StudyResults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from .study import StudyResults
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,7 @@ def scaling_law(
     SpecError
         If there is no such measure, phase or size.
     """
+    expect("what load or run returned", StudyResults, study=study)
     results = study.results
     name = results.measures[0].name if measure is None else measure
     law = laws_of_results.scaling_law(

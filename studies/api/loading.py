@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
 from typing import Literal
 
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
+from ...core.plugins.words import expect
 from ..errors import SpecError
 from ..results import foreign, published
 from ..results.parts import join_parts
@@ -46,6 +48,8 @@ def load(
     """
     if not places:
         raise SpecError("load: needs a directory at least")
+    for place in places:
+        expect("paths of studies or files", str | PathLike, places=place)
     paths = [Path(place) for place in places]
     _check_distinct(paths)
     is_table = [path.suffix in foreign.SUFFIXES for path in paths]
@@ -104,6 +108,7 @@ def compare_table(
     >>> round(float(comparison.differences[0].estimate.value), 2)
     -0.23
     """
+    expect("a table of pandas or the path of a file", pd.DataFrame | str | PathLike, table=table)
     frame = table if isinstance(table, pd.DataFrame) else foreign.read_table(Path(table))
     names = foreign.ScoreColumns(_several(condition), _several(score), seed, item)
     return _of_table(foreign.results_of(frame, names, better)).compare(by, reference=reference)

@@ -9,11 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from math import inf
+from os import PathLike
 from pathlib import Path
 
 from ...core.functions.recorded import AnswersError, RecordedAnswers
 from ...core.interface.measures import Measure
 from ...core.plugins.sources import ANSWERS, Answers, Checkpoints, is_reference
+from ...core.plugins.words import expect
 from ..catalogue.study import load_study, measure_by_name
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
@@ -226,6 +228,7 @@ def run(
     SpecError
         If the study cannot be run or continued; one line says why.
     """
+    expect("the path of a folder", str | PathLike, out=out)
     out = Path(out)
     spec = Spec.read(spec, study=out)
     listener = observer or (Terminal() if progress else Observer())

@@ -32,9 +32,10 @@ from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
 from ..presentation.headlines import headlines
 from ..presentation.tables import SummaryTable, tabulate
+from ..results.choices import choose_trials
 from ..results.contrasts import contrasts, power_with_first
 from ..results.notation import wrapped
-from ..results.results import Results, choose_trials, read
+from ..results.results import Results, read
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..spec.tables import TomlTable

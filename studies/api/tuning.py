@@ -19,7 +19,7 @@ import numpy as np
 
 from ...core.learners import LearnerSettings
 from ...core.numerics import pd
-from ...core.plugins.words import show
+from ...core.plugins.words import expect, show
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..results.results import Results, read
@@ -155,6 +155,7 @@ def tune(
     SpecError
         If there is nothing to tune, or it cannot be run; one line says why.
     """
+    expect("the path of a folder", str | PathLike, out=out)
     out = Path(out)
     spec = Spec.read(spec, study=out)
     _check_request(spec, trials, seeds, first_seed, draw)

@@ -17,6 +17,7 @@ from typing import Literal
 from ...core.agents.cost import Problem, is_chain
 from ...core.evaluators.enumeration import AutoSettings
 from ...core.numerics import pd
+from ...core.plugins.words import expect
 from ...topologies.view import align, format_count
 from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex
@@ -277,6 +278,9 @@ def cost_table(
     ValueError
         If there is no topology, one or a number is refused, or two have one label; one line.
     """
+    expect("names of topologies", Sequence | None, topologies=topologies)
+    expect("numbers of agents", Iterable, agents=agents)
+    expect("a Problem", Problem, problem=problem)
     if not 1 <= repeats <= MOST_REPEATS:
         raise ValueError(f"repeats = {repeats}, allowed: 1 to {MOST_REPEATS}")
     if not topologies:

@@ -10,11 +10,13 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cache
 from itertools import combinations
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.numerics import quadrature, special
+from ...core.plugins.words import expect
 from .notation import two_figures, wrapped
 from .statistics import EXACT, LEVEL, Array
 
@@ -87,6 +89,8 @@ def power(effect: float, deviation: float, seeds: int, comparisons: int = 1) -> 
     >>> power(0.2, 0.25, 5), round(power(0.2, 0.25, 15), 2)
     (0.0, 0.82)
     """
+    expect("numbers", Real, effect=effect, deviation=deviation)
+    expect("whole numbers", Integral, seeds=seeds, comparisons=comparisons)
     if not deviation > 0.0 or seeds < 1 or comparisons < 1:
         raise ValueError(
             f"power: deviation = {deviation}, seeds = {seeds}, comparisons = {comparisons}, "
@@ -114,6 +118,8 @@ def detectable(deviation: float, seeds: int, comparisons: int = 1, wanted: float
     >>> round(detectable(0.25, 15), 2), detectable(0.25, 5)
     (0.19, inf)
     """
+    expect("numbers", Real, deviation=deviation, wanted=wanted)
+    expect("whole numbers", Integral, seeds=seeds, comparisons=comparisons)
     if seeds < seeds_needed(comparisons):
         return math.inf
     low = 0.0
@@ -140,6 +146,8 @@ def seeds_for(
     >>> seeds_for(0.2, 0.25), seeds_for(0.2, 0.25, comparisons=10)
     (15, 25)
     """
+    expect("numbers", Real, effect=effect, deviation=deviation, wanted=wanted)
+    expect("whole numbers", Integral, comparisons=comparisons)
     low = seeds_needed(comparisons)
     high = low
     while power(effect, deviation, high, comparisons) < wanted:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,8 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
-from ...core.plugins import sources
-from ..errors import SpecError
 from ..spec.tables import SpecTable, flat, label
 from ..store.database import EVALUATION
 from ..store.store import Store
@@ -337,49 +335,6 @@ def describe_number(name: str) -> tuple[Measure, float]:
 
 DIRECTORY = "directory"
 """Column that tells from which study a condition came, where there are several."""
-
-
-def choose_trials(results: Results, choice: str, settings: SpecTable) -> Results:
-    """Return the results of the trials of a choice, such as ``robots == 8 and box == "circle"``.
-
-    Parameters
-    ----------
-    results
-        Of any studies.
-    choice
-        As `pandas.DataFrame.query` has it, over `condition`, `seed`, and what is set and swept: by
-        the last part of the key, or, where several keys end so, by the whole in backticks.
-    settings
-        By condition, as tables; what is swept goes before them.
-
-    Raises
-    ------
-    SpecError
-        If it is no choice, or names what trials have not; one line.
-    """
-    trials = results.trials[["condition", "seed"]]
-    truths = {"true": True, "false": False}  # as they stand in a column
-    known = [
-        dict(flat(settings.get(c, {})))
-        | {k: truths.get(v, v) for k, v in results.columns.get(c, {}).items() if v != ""}
-        for c in trials["condition"]
-    ]
-    frame = pd.DataFrame(known, index=trials.index).assign(**trials)
-    ends = [name.rpartition(".")[2] for name in frame]
-    names = {end: name for end, name in zip(ends, frame, strict=True) if ends.count(end) == 1}
-    frame = frame.assign(**{end: frame[name] for end, name in names.items()})
-    try:
-        keep = frame.query(choice).index
-    except Exception as error:  # of pandas, of Python's parser, of what is compared
-        problem = f"{sources.message(error)}; must be such as robots == 8 and box == 'circle'"
-        raise SpecError(f"where = {choice!r}: {problem}") from None
-    keys = ["condition", "seed"]
-    trials = results.trials.loc[keep].reset_index(drop=True)
-    kept = pd.MultiIndex.from_frame(trials[keys])
-    is_kept = pd.MultiIndex.from_frame(results.episodes[keys]).isin(kept)
-    episodes = results.episodes[is_kept].reset_index(drop=True)
-    columns = {c: results.columns[c] for c in results.columns if c in set(trials["condition"])}
-    return replace(results, episodes=episodes, trials=trials, columns=columns)
 
 
 def _distinguish(name: str, tables: Sequence[SpecTable]) -> list[str]:

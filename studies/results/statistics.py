@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.numerics import special, stats
+from ...core.plugins.words import show
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,13 @@ def exactly(value: ArrayLike) -> Estimate:
     """Return numbers without an interval, as counts are."""
     unknown = np.full(np.shape(value), np.nan)
     return Estimate(np.asarray(value), unknown, unknown)
+
+
+def _numbers(values: ArrayLike, name: str) -> Array:
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {show(values)}, allowed: numbers in rows") from None
 
 
 def bootstrap(
@@ -90,7 +98,7 @@ def bootstrap(
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '2.50 [0.45, 4.55]'
     """
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, "values")
     if array.ndim not in (1, 2) or len(array) == 0:
         raise ValueError(
             f"bootstrap: values of shape {array.shape}, allowed (n_runs,) or (n_runs, n_points)"
@@ -185,7 +193,9 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '0.75 [0.30, 0.95]'
     """
-    array = np.asarray(outcomes, dtype=float)
+    array = _numbers(outcomes, "outcomes")
+    if array.ndim != 2 or array.size == 0:
+        raise ValueError(f"outcomes of shape {array.shape}, allowed: (n_runs, n_episodes)")
     n_runs, n_episodes = array.shape
     p = array.mean()
     if n_runs < 2:

@@ -24,7 +24,7 @@ from ...core.functions.settings import FunctionSettings
 from ...core.plugins.models import kinds_at, models_of
 from ...core.plugins.registry import Plugged, SettingsRegistry
 from ...core.plugins.settings import Settings
-from ...core.plugins.words import near
+from ...core.plugins.words import expect, near
 from .conditions import ConditionSettings, Override, StageSettings
 from .presets import PRESETS
 from .spec import Spec
@@ -120,6 +120,7 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
     >>> [key.default for table in keys_below("topology.order") for key in table.keys]
     ['"listed"']
     """
+    expect("a dotted prefix of keys", str, prefix=prefix)
     below = []
     for table in (*tables(), of_functions()):
         kept = tuple(

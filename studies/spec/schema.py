@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, PlainValidator, TypeAdapter, WrapValidator
 from pydantic.fields import FieldInfo
 
 from ...core.plugins.settings import Settings
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, expect
 from ..errors import SpecError
 from .conditions import ConditionSettings, Override, StageSettings
 from .keys import kinds_of, meaning, registry_of, settings_of
@@ -151,6 +151,7 @@ def schema(kind: str = "spec") -> Schema:
     >>> schema("scenario.line-up")["properties"]["carts"]["minimum"]
     1
     """
+    expect("the name of a kind", str, kind=kind)
     writer = SchemaWriter()
     whole = _spec(writer)
     if kind == "spec":

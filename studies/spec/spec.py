@@ -33,7 +33,7 @@ from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, mentions
 from ...core.plugins.trust import modules_in
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, expect
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ...topologies.builders import join_names
@@ -320,9 +320,9 @@ class Spec(Settings):
     @classmethod
     def read(cls, spec: Spec | SpecTable | str | PathLike[str], study: Path | None = None) -> Spec:
         """Return the spec that a table or the path of a TOML file stands for; see `of`, `load`."""
-        if isinstance(spec, Spec):
-            return spec
-        return cls.of(spec) if isinstance(spec, Mapping) else cls.load(spec, study=study)
+        expect("a Spec, a table or the path of a file", Spec | Mapping | str | PathLike, spec=spec)
+        given = cls.of(spec) if isinstance(spec, Mapping) else spec
+        return given if isinstance(given, Spec) else cls.load(given, study=study)
 
     @classmethod
     def load(

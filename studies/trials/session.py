@@ -26,6 +26,7 @@ from ...core.interface.plain import as_scenario
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario
 from ...core.interface.stacked import LoopedWorlds
+from ...core.plugins.words import expect
 from ..spec.controls import LEARN_NOTHING
 from ..store.database import EVALUATION, STAGE
 from ..store.durable import TEAM, Recording
@@ -101,6 +102,7 @@ class Session:
     """
 
     def __init__(self, trial: Trial, whole_episode: WholeEpisode | None = None) -> None:
+        expect("a trial", Trial, trial=trial)
         self.trial = trial
         self._whole_episode = whole_episode
         self._own = arrange(trial.settings, trial.seed)

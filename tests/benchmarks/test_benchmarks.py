@@ -89,6 +89,12 @@ def test_decisions_of_every_size_are_timed(run: Run) -> None:
     )
 
 
+def test_boxes_decide_at_once_as_one_by_one(run: Run) -> None:
+    heading, line = run("benchmarks.responses", "--robots", "3", "--number", "3").splitlines()
+    assert heading.endswith("same joint actions")
+    assert line.endswith("True")
+
+
 @pytest.mark.slow
 def test_what_can_be_solved_at_a_size_is_told(run: Run) -> None:
     few = ["--robots", "3", "--seeds", "2", "--scalings", "similar", "--grows", "width"]

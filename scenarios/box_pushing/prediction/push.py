@@ -178,7 +178,7 @@ def _substep(
     """
     rho2 = model.friction_radius**2
     lanes.head(box, width)
-    lanes.rest(box, model.friction_force, width)
+    lanes.rest(box, rho2, model.friction_force, width)
     touching = False
     for r in range(len(bodies)):
         body, radius, compliance = bodies[r], model.radii[r], model.compliance[r]
@@ -196,7 +196,7 @@ def _substep(
         for _ in range(SWEEPS):
             for r in range(len(bodies)):
                 if near[r]:
-                    lanes.answer(bodies[r], box, rho2, model.contact_friction, width)
+                    lanes.answer(bodies[r], box, model.contact_friction, width)
             lanes.drag(box, rho2, model.friction_force, width)
     return moved + lanes.carry(box, model.reach, dt, width)
 

@@ -37,10 +37,10 @@ BODY_SIZE = ACTIVE + LANES
 # Those of the box: pose and heading as for a robot, velocity, how readily it moves, the wrench of
 # all contacts on it.
 (
-    U_X, U_Y, U_W, MOBILITY,
+    U_X, U_Y, U_W, MOBILITY, SPIN,  # the last one over the square of the friction radius
     FORCE_X, FORCE_Y, TORQUE,
     NEAREST,  # rows of `nearest_points`, of one robot at a time in the frame of the box
-) = range(AHEAD, AHEAD + 8 * LANES, LANES)  # fmt: skip
+) = range(AHEAD, AHEAD + 9 * LANES, LANES)  # fmt: skip
 LOCAL_X, LOCAL_Y, SQUARE, NEAR_X, NEAR_Y, SIDE, EDGE_X, EDGE_Y = range(
     NEAREST, NEAREST + NEAREST_SIZE, LANES
 )
@@ -149,12 +149,13 @@ def touch(
 
 
 @njit(cache=True, fastmath=_EXACT)
-def rest(box: FloatArray, force: float, lanes: int) -> None:
+def rest(box: FloatArray, rho2: float, force: float, lanes: int) -> None:
     """Begin the sweeps: no forces, and a box that moves as readily as at `START_SPEED`."""
     for k in range(lanes):
         box[U_X + k] = box[U_Y + k] = box[U_W + k] = 0.0
         box[FORCE_X + k] = box[FORCE_Y + k] = box[TORQUE + k] = 0.0
-        box[MOBILITY + k] = START_SPEED / force
+        mobility = START_SPEED / force
+        box[MOBILITY + k], box[SPIN + k] = mobility, mobility / rho2
 
 
 @njit(cache=True, fastmath=_EXACT)
@@ -165,7 +166,7 @@ def release(body: FloatArray, lanes: int) -> None:
 
 
 @njit(cache=True, fastmath=_EXACT)
-def answer(body: FloatArray, box: FloatArray, rho2: float, friction: float, lanes: int) -> None:
+def answer(body: FloatArray, box: FloatArray, friction: float, lanes: int) -> None:
     """Let one robot find its contact force, the others' given."""
     for k in range(lanes):
         ix, iy = body[NX + k], body[NY + k]
@@ -177,7 +178,7 @@ def answer(body: FloatArray, box: FloatArray, rho2: float, friction: float, lane
         fy = box[FORCE_Y + k] - (before_n * iy + before_t * ix)
         torque = box[TORQUE + k] - (before_n * pn + before_t * pt)
         # What is left to give by this robot once the others' forces have acted.
-        lever = mobility / rho2
+        lever = box[SPIN + k]
         want_n = body[WANT_N + k] - mobility * (fx * ix + fy * iy) - lever * torque * pn
         want_t = body[WANT_T + k] - mobility * (fy * ix - fx * iy) - lever * torque * pt
         nn = body[YIELD_NN + k] + mobility + lever * pn * pn
@@ -212,7 +213,8 @@ def drag(box: FloatArray, rho2: float, force: float, lanes: int) -> None:
         uw = mobility * box[TORQUE + k] / rho2
         speed = np.sqrt(ux * ux + uy * uy + rho2 * uw * uw)
         box[U_X + k], box[U_Y + k], box[U_W + k] = ux, uy, uw
-        box[MOBILITY + k] = (speed if speed > CREEP else CREEP) / force
+        mobility = (speed if speed > CREEP else CREEP) / force
+        box[MOBILITY + k], box[SPIN + k] = mobility, mobility / rho2
 
 
 @njit(cache=True, fastmath=_EXACT)

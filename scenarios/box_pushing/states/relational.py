@@ -22,15 +22,22 @@ here, the decision of a team of two e-Pucks takes about a third longer.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from math import pi
 
 import numpy as np
 
-from ....core.numerics import FloatArray, IntArray, njit, wrap
+from ....core.numerics import FloatArray, IntArray, njit, wrap_each
 from ....core.plugins.registry import Registry
-from ...state_variables import Situations, StateFunction, StateVariable, freeze, state_variable
+from ...state_variables import (
+    Body,
+    Situations,
+    StateFunction,
+    StateVariable,
+    freeze,
+    state_variable,
+)
 from ..world.geometry import Outline, surface
 
 CLOSE = 0.02
@@ -143,32 +150,35 @@ class View(Situations):
     @cached_property
     def turn(self) -> FloatArray:
         """Turn ``(m,)`` of the box from the goal pose [rad]."""
-        return freeze(wrap(self.box[:, 2] - self.goal[2]))
+        return freeze(wrap_each(self.box[:, 2] - self.goal[2]))
 
-    def seen_by_each(self) -> View:
-        """Return every situation ``M`` times: in the k-th one robot k is the first.
+    @cached_property
+    def _azimuths(self) -> FloatArray:
+        """Directions ``(M, m)`` from every robot to the box [rad]."""
+        x = self.box[:, 0] - self.robots[:, :, 0].T
+        y = self.box[:, 1] - self.robots[:, :, 1].T
+        return np.arctan2(y, x)
 
-        The other robots follow in their order.
-        """
-        m, n_robots = self.gaps.shape
-        order = _each_first(n_robots)
-        origin = self.origin if self.origin.ndim == 1 else np.repeat(self.origin, n_robots, axis=0)
-        return replace(
-            self,
-            robots=np.take(self.robots, order, axis=1).reshape(m * n_robots, n_robots, 3),
-            box=np.repeat(self.box, n_robots, axis=0),
-            gaps=np.take(self.gaps, order, axis=1).reshape(m * n_robots, n_robots),
-            origin=origin,
-        )
-
-    def azimuth(self, robot: int) -> FloatArray:
+    def azimuth(self, robot: Body) -> FloatArray:
         """Direction ``(m,)`` from a robot to the box [rad]."""
-        pose = self.robots[:, robot]
-        return np.arctan2(self.box[:, 1] - pose[:, 1], self.box[:, 0] - pose[:, 0])
+        azimuths: FloatArray = self._azimuths[robot]
+        return azimuths
 
-    def inward(self, robot: int) -> FloatArray:
+    def heading(self, robot: Body) -> FloatArray:
+        """Heading ``(m,)`` of a robot [rad]."""
+        return self.robots[:, robot, 2].T
+
+    def inward(self, robot: Body) -> FloatArray:
         """Direction ``(m,)`` into the box at the point of its surface next to a robot [rad]."""
-        return self._into_box(self.robots[:, robot])
+        points = self.robots[:, robot]
+        return self._into_box(points.reshape(-1, 3)).reshape(points.shape[:-1]).T
+
+    def gaps_of_others(self, robot: Body) -> FloatArray:
+        """Gaps ``(m, M - 1)`` of the robots beside one, of one that is alone its own ``(m, 1)``.
+
+        They lie in order of situations, so that sums are rounded alike however many there are.
+        """
+        return np.take(self.gaps, _others(self.gaps.shape[1])[robot], axis=1)
 
     def _into_box(self, points: FloatArray) -> FloatArray:
         points = np.ascontiguousarray(points)
@@ -177,10 +187,15 @@ class View(Situations):
 
 
 @cache
-def _each_first(number: int) -> IntArray:
-    """Return the orders ``(number, number)`` of robots in which each is the first."""
-    others = [[r for r in range(number) if r != first] for first in range(number)]
-    return np.array([[first, *behind] for first, behind in enumerate(others)])
+def _others(number: int) -> IntArray:
+    """Return the other robots of each one ``(number, number - 1)``, in order; of one alone it."""
+    others = [[r for r in range(number) if r != one or number == 1] for one in range(number)]
+    return np.array(others)
+
+
+def _wrap(angles: FloatArray) -> FloatArray:
+    """Return angles of any shape, mapped to [-pi, pi)."""
+    return wrap_each(angles.ravel()).reshape(angles.shape)
 
 
 def _direction(ways: FloatArray) -> FloatArray:
@@ -192,13 +207,17 @@ def _direction(ways: FloatArray) -> FloatArray:
 def _inward(
     robots: FloatArray, boxes: FloatArray, edges: FloatArray, rounding: float
 ) -> FloatArray:
-    """Return the direction into the box ``(m,)`` at the point next to each robot, world frame."""
+    """Return the direction into a box ``(m,)`` at the point next to each robot, world frame.
+
+    The same number of robots, in order, are beside each box.
+    """
     directions = np.empty(len(robots))
     for c in range(len(robots)):
-        cos, sin = np.cos(boxes[c, 2]), np.sin(boxes[c, 2])
-        dx, dy = robots[c, 0] - boxes[c, 0], robots[c, 1] - boxes[c, 1]
+        box = boxes[c * len(boxes) // len(robots)]
+        cos, sin = np.cos(box[2]), np.sin(box[2])
+        dx, dy = robots[c, 0] - box[0], robots[c, 1] - box[1]
         near = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)
-        directions[c] = boxes[c, 2] + np.arctan2(-near[2], -near[1])
+        directions[c] = box[2] + np.arctan2(-near[2], -near[1])
     return directions
 
 
@@ -231,34 +250,33 @@ def _missed(view: View, bearing: FloatArray) -> FloatArray:
 
 
 @state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS, mirrored="same")
-def gap(view: View, robot: int) -> FloatArray:
+def gap(view: View, robot: Body) -> FloatArray:
     """Gap between robot and box."""
-    return view.gaps[:, robot]
+    return view.gaps[:, robot].T
 
 
 @_angle(SIDES)
-def box_bearing(view: View, robot: int) -> FloatArray:
+def box_bearing(view: View, robot: Body) -> FloatArray:
     """Bearing of the box in the frame of the robot."""
-    return wrap(view.azimuth(robot) - view.robots[:, robot, 2])
+    return _wrap(view.azimuth(robot) - view.heading(robot))
 
 
 @_angle(SIDES, ("far left", "left", "behind", "right", "far right"))
-def side(view: View, robot: int) -> FloatArray:
+def side(view: View, robot: Body) -> FloatArray:
     """Where round the box the robot stands, as seen along the course to the goal."""
-    return wrap(view.azimuth(robot) - view.course)
+    return _wrap(view.azimuth(robot) - view.course)
 
 
 @state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS, mirrored="same")
-def others_gap(view: View, robot: int) -> FloatArray:
+def others_gap(view: View, robot: Body) -> FloatArray:
     """Greatest gap of the other robots; of the robot itself if it is alone."""
-    others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
-    return view.gaps[:, others].max(axis=1)
+    return np.maximum.reduce(view.gaps_of_others(robot), axis=-1).T
 
 
 @_angle(SIDES, common=True)
-def push_bearing(view: View, robot: int) -> FloatArray:
+def push_bearing(view: View, robot: Body) -> FloatArray:
     """Where the robots' middle would push the box, off the course."""
-    return wrap(view.push - view.course)
+    return _wrap(view.push - view.course)
 
 
 @state_variable(
@@ -270,7 +288,7 @@ def push_bearing(view: View, robot: int) -> FloatArray:
     common=True,
     mirrored="opposite",
 )
-def cross_track_error(view: View, robot: int) -> FloatArray:
+def cross_track_error(view: View, robot: Body) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
     return _missed(view, push_bearing(view, robot))
 
@@ -284,7 +302,7 @@ def cross_track_error(view: View, robot: int) -> FloatArray:
     common=True,
     mirrored="same",
 )
-def box_distance(view: View, robot: int) -> FloatArray:
+def box_distance(view: View, robot: Body) -> FloatArray:
     """Distance of the box from the goal."""
     return view.distance
 
@@ -298,27 +316,27 @@ def box_distance(view: View, robot: int) -> FloatArray:
     common=True,
     mirrored="same",
 )
-def approach(view: View, robot: int) -> FloatArray:
+def approach(view: View, robot: Body) -> FloatArray:
     """By how much the box came nearer per decision period: -Delta D of Conditions 1, 2."""
     return view.approach
 
 
 @_angle((-0.8, -0.2, 0.0, 0.2, 0.8), common=True)
-def box_turn(view: View, robot: int) -> FloatArray:
+def box_turn(view: View, robot: Body) -> FloatArray:
     """Turn of the box from the goal pose."""
     return view.turn
 
 
 @_angle((-0.8, -0.15, 0.0, 0.15, 0.8), common=True)
-def bend(view: View, robot: int) -> FloatArray:
+def bend(view: View, robot: Body) -> FloatArray:
     """By how much the box is turned off the arc that ends in the goal pose."""
-    return wrap(view.turn - 2.0 * wrap(view.course - view.goal[2]))
+    return _wrap(view.turn - 2.0 * _wrap(view.course - view.goal[2]))
 
 
 @_angle(SIDES)
-def face_bearing(view: View, robot: int) -> FloatArray:
+def face_bearing(view: View, robot: Body) -> FloatArray:
     """Bearing, in the frame of the robot, of the way straight into the nearest face of the box."""
-    return wrap(view.inward(robot) - view.robots[:, robot, 2])
+    return _wrap(view.inward(robot) - view.heading(robot))
 
 
 @state_variable(
@@ -329,21 +347,20 @@ def face_bearing(view: View, robot: int) -> FloatArray:
     labels=("none", "some", "half", "most", "all"),
     mirrored="same",
 )
-def others_away(view: View, robot: int) -> FloatArray:
+def others_away(view: View, robot: Body) -> FloatArray:
     """How many of the other robots are away from the box, as a share: gaps up to `AWAY` in part.
 
     Of a robot that is alone, its own.
     """
-    others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
-    gaps = np.ascontiguousarray(view.gaps[:, others])  # added up alike however many situations
+    gaps = view.gaps_of_others(robot)
     away = np.minimum(np.maximum(gaps / AWAY, 0.0), 1.0)
-    return np.add.reduce(away, axis=1) / len(others)
+    return (np.add.reduce(away, axis=-1) / gaps.shape[-1]).T
 
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)
-def contact_push_bearing(view: View, robot: int) -> FloatArray:
+def contact_push_bearing(view: View, robot: Body) -> FloatArray:
     """Where the robots in contact push the box, off the course."""
-    return wrap(view.contact_push - view.course)
+    return _wrap(view.contact_push - view.course)
 
 
 _wide_error = state_variable(
@@ -358,19 +375,19 @@ _wide_error = state_variable(
 
 
 @_wide_error
-def contact_cross_track_error(view: View, robot: int) -> FloatArray:
+def contact_cross_track_error(view: View, robot: Body) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
     return _missed(view, contact_push_bearing(view, robot))
 
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)
-def path_bearing(view: View, robot: int) -> FloatArray:
+def path_bearing(view: View, robot: Body) -> FloatArray:
     """Where the box is going, off the course."""
-    return wrap(view.path - view.course)
+    return _wrap(view.path - view.course)
 
 
 @_wide_error
-def path_cross_track_error(view: View, robot: int) -> FloatArray:
+def path_cross_track_error(view: View, robot: Body) -> FloatArray:
     """By how much that path would miss the goal; beyond it the whole distance."""
     return _missed(view, path_bearing(view, robot))
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics import FloatArray, wrap
-from ...state_variables import StateVariable, find_variable, sense, space_of
+from ...state_variables import EVERY, StateVariable, find_variable, sense, space_of
 from .relational import STATE_VARIABLES, View
 from .relational_lanes import Columns
 
@@ -55,10 +55,8 @@ class BoxStateSpace:
             shared[:, :, others] = of_others.swapaxes(0, 1)
         for column in common:
             shared[:, :, column] = self.functions[column](view, 0)[:, None]
-        if at_once:
-            each = view.seen_by_each()
-            for column in at_once:
-                shared[:, :, column] = self.functions[column](each, 0).reshape(shape)
+        for column in at_once:
+            shared[:, :, column] = self.functions[column](view, EVERY).T
         return shared
 
     @property

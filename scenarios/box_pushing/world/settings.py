@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ....core.numerics import BoolArray, FloatArray
+from ....core.numerics import BoolArray, FloatArray, njit
 from ....core.plugins.settings import Names, NonNegative, Positive, Settings, unwritten
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
 
@@ -271,28 +271,56 @@ def reward(
     [[-0.002]]
     """
     settings = task.reward
-    at = np.s_[:, None] if settings.of == "team" else np.s_[:, :, None]
-    # Of robots: (m, parties, members).
-    contact = contact[at]
-    readings = readings[at]
-    distance = distance[:, None]
-    approach = approach[:, None]
-    orientation = orientation[:, None]
-    r1 = settings.c1 * np.exp(-settings.r1 * distance)
-    r2_r3 = np.add.reduce(settings.c2 * np.exp(-settings.r2 * readings), axis=2)
-    r4 = settings.c4 * np.abs(orientation)
-    touching = np.logical_and.reduce(contact, axis=2)
-    within = readings > 0.0
-    near = -r2_r3 + (r1 if settings.attraction_without_contact else 0.0)
-    nearer = approach < -settings.least_approach
-    there = task.reached(distance, orientation) & settings.pays_at_goal
-    gained = np.full(near.shape, settings.some_out_of_range)
-    for condition, pay in (  # from the least specific on
-        (~np.logical_or.reduce(within, axis=2), settings.all_out_of_range),
-        (np.logical_and.reduce(within, axis=2), near),
-        (touching, settings.receding),
-        (touching & nearer, r1 - r2_r3 - r4),
-        (there, settings.c1),
-    ):
-        gained = np.where(condition, pay, gained)
-    return gained
+    penalties = settings.c2 * np.exp(-settings.r2 * readings)
+    return _gained(
+        settings.c1 * np.exp(-settings.r1 * distance),
+        np.add.reduce(penalties, axis=1, keepdims=True) if settings.of == "team" else penalties,
+        settings.c4 * np.abs(orientation),
+        approach < -settings.least_approach,
+        task.reached(distance, orientation) & settings.pays_at_goal,
+        np.ascontiguousarray(contact),
+        np.ascontiguousarray(readings > 0.0),
+        settings.attraction_without_contact,
+        settings.receding,
+        settings.some_out_of_range,
+        settings.all_out_of_range,
+        settings.c1,
+    )
+
+
+@njit(cache=True)
+def _gained(
+    r1: FloatArray,
+    r2_r3: FloatArray,
+    r4: FloatArray,
+    nearer: BoolArray,
+    there: BoolArray,
+    contact: BoolArray,
+    within: BoolArray,
+    attracts: bool,
+    receding: float,
+    some_out: float,
+    all_out: float,
+    at_goal: float,
+) -> FloatArray:
+    """Return the reward ``(m, parties)`` by the conditions; see `reward`.
+
+    A party is the team, or each robot; `r2_r3` is ``(m, parties)``, `contact` and `within` are
+    ``(m, M)``, the others ``(m,)``.
+    """
+    n_situations, n_parties = r2_r3.shape
+    members = contact.shape[1] // n_parties
+    out = np.empty((n_situations, n_parties))
+    for s in range(n_situations):
+        for party in range(n_parties):
+            touch = contact[s, party * members : (party + 1) * members].all()
+            near = within[s, party * members : (party + 1) * members]
+            if there[s]:
+                out[s, party] = at_goal
+            elif touch:
+                out[s, party] = r1[s] - r2_r3[s, party] - r4[s] if nearer[s] else receding
+            elif near.all():
+                out[s, party] = -r2_r3[s, party] + (r1[s] if attracts else 0.0)
+            else:
+                out[s, party] = some_out if near.any() else all_out
+    return out

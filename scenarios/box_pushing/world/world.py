@@ -89,6 +89,8 @@ class World:
 
     Attributes
     ----------
+    poses
+        ``(M + 1, 3)`` of the box and the robots [m, m, rad]; another array after every step.
     robot_poses
         ``(M, 3)`` [m, m, rad].
     box_pose
@@ -344,6 +346,7 @@ class World:
 
     def _know(self, poses: FloatArray) -> None:
         """Take poses ``(M + 1, 3)`` of box and robots for the present ones."""
+        self.poses = poses
         self.contact: BoolArray = self.gaps < TOUCHING
         self.box_pose = poses[0]
         self.robot_poses = poses[1:]

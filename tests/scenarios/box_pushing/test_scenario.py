@@ -16,6 +16,7 @@ from nested_agents.core.interface.measures import measures_of
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build, parse
 
@@ -41,6 +42,22 @@ def test_equal_seeds_give_equal_episodes() -> None:
 
     np.testing.assert_array_equal(episode(5), episode(5))
     assert np.any(episode(5) != episode(6))
+
+
+@pytest.mark.parametrize(("apart", "first"), [(0.3, 0), (0.072, 1)])
+def test_twists_are_those_of_their_step_whenever_they_are_asked_for(
+    apart: float, first: int
+) -> None:
+    scenario = BoxPushing(BoxPushingSettings())
+    scenario.reset(0)
+    scenario.world.place(np.array([[0.0, 0.0, 0.4], [0.0, apart, 0.4]]), np.array([0.5, 0, 0.1]))
+    before = scenario.world.poses.copy()
+    transition = scenario.step(np.array([0, 2, 0, 2]))
+    after = scenario.world.poses.copy()
+    scenario.step(np.zeros(4, int))
+    expected = mean_twists(before, after, scenario.settings.period)[first:]
+    np.testing.assert_array_equal(transition.twists, expected)
+    assert np.any(expected[1 - first] != 0.0)
 
 
 def with_box_at(x: float, settings: BoxPushingSettings) -> BoxPushing:

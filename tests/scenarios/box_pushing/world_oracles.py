@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from nested_agents.core.numerics import FloatArray
+from nested_agents.core.numerics import BoolArray, FloatArray
 from nested_agents.scenarios.box_pushing.world.geometry import ON_SURFACE, Outline
 from nested_agents.scenarios.box_pushing.world.robots import WheelModel
-from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
+from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings, Task
 
 
 def surface_numpy(
@@ -114,3 +114,35 @@ def wheel_wrenches_numpy(
         size = np.linalg.norm(forces, axis=1)
         forces *= np.minimum(1.0, model.limit[own] / np.maximum(size, 1e-300))[:, None]
         out[r] = turn @ (ahead.T @ forces[:, 0] + sideways.T @ forces[:, 1])
+
+
+def reward_numpy(
+    task: Task,
+    distance: FloatArray,
+    approach: FloatArray,
+    orientation: FloatArray,
+    contact: BoolArray,
+    readings: FloatArray,
+) -> FloatArray:
+    """Return what `reward` returns, condition by condition, from the least specific on."""
+    settings = task.reward
+    at = np.s_[:, None] if settings.of == "team" else np.s_[:, :, None]
+    contact, readings = contact[at], readings[at]  # (m, parties, members)
+    r1 = settings.c1 * np.exp(-settings.r1 * distance[:, None])
+    r2_r3 = np.add.reduce(settings.c2 * np.exp(-settings.r2 * readings), axis=2)
+    r4 = settings.c4 * np.abs(orientation[:, None])
+    nearer = approach[:, None] < -settings.least_approach
+    there = task.reached(distance, orientation)[:, None] & settings.pays_at_goal
+    gained = np.full(r2_r3.shape, settings.some_out_of_range)
+    for condition, pay in (
+        (~(readings > 0.0).any(axis=2), settings.all_out_of_range),
+        (
+            (readings > 0.0).all(axis=2),
+            -r2_r3 + (r1 if settings.attraction_without_contact else 0.0),
+        ),
+        (contact.all(axis=2), settings.receding),
+        (contact.all(axis=2) & nearer, r1 - r2_r3 - r4),
+        (there, settings.c1),
+    ):
+        gained = np.where(condition, pay, gained)
+    return gained

@@ -8,6 +8,8 @@ from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.loop import policy_seed, world_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.evaluators.best_response import BestResponse
+from nested_agents.core.evaluators.evaluator import Evaluator
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.rules.rule_base import RuleBaseSettings
@@ -84,6 +86,16 @@ def test_the_same_joint_actions(settings, options, monkeypatch) -> None:
 )
 def test_all_else_is_asked_one_by_one(settings, options, monkeypatch) -> None:
     assert at_once_and_one_by_one(monkeypatch, settings, options, 2)[2] == 0
+
+
+@pytest.mark.parametrize("explore", [True, False])
+def test_before_anything_is_learned_all_draw_at_once(explore, monkeypatch) -> None:
+    nothing = {"digits": 0, "explore": explore}
+    at_once = decisions({"robots": 3}, 20, **nothing)
+    monkeypatch.setattr(BestResponse, "decide", Evaluator.decide)
+    one_by_one = decisions({"robots": 3}, 20, **nothing)
+    for one, other in zip(at_once, one_by_one, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_values_that_are_no_numbers_are_refused() -> None:

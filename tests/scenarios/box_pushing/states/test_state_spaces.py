@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.numerics import FloatArray, wrap
+from nested_agents.core.numerics import FloatArray, wrap, wrap_each
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -134,6 +134,7 @@ def test_angles_wrap() -> None:
 def test_wrap_is_the_remainder_to_the_last_bit() -> None:
     angles = np.random.default_rng(0).uniform(-300, 300, 100_000)
     np.testing.assert_array_equal(wrap(angles), (angles + pi) % (2 * pi) - pi)
+    np.testing.assert_array_equal(wrap_each(angles), wrap(angles))
 
 
 @pytest.mark.parametrize("name", STATE_SPACES)
@@ -258,6 +259,18 @@ def test_observing_has_the_bits_of_sensing_robot_by_robot(
     seen = View(poses, poses[:, 0] + 0.3, gaps, GOAL, ORIGIN, 1.0, SQUARE, 0.08)
     expected = space.sense(seen, range(robots))[:, 0]
     assert space.observe(seen)[0].tobytes() == expected.tobytes()
+
+
+def test_many_situations_are_observed_as_each_is() -> None:
+    rng = np.random.default_rng(3)
+    poses, gaps = 0.3 * rng.normal(size=(5, 10, 3)), 0.02 * np.abs(rng.normal(size=(5, 10)))
+    boxes, origins = poses[:, 0] + 0.3, rng.normal(size=(5, 3))
+    space = build_space("all", *STATE_VARIABLES.built_in)
+    many = space.observe(View(poses, boxes, gaps, GOAL, origins, 1.0, SQUARE, 0.08))
+    for k, origin in enumerate(origins):
+        one = np.s_[k : k + 1]
+        seen = View(poses[one], boxes[one], gaps[one], GOAL, origin, 1.0, SQUARE, 0.08)
+        assert space.observe(seen)[0].tobytes() == many[k].tobytes()
 
 
 def test_what_is_common_is_sensed_once() -> None:

@@ -4,6 +4,7 @@ from math import exp
 
 import numpy as np
 import pytest
+from world_oracles import reward_numpy
 
 from nested_agents.scenarios.box_pushing.world.settings import RewardSettings, Task, reward
 
@@ -80,3 +81,24 @@ def test_of_robots_the_conditions_hold_for_each_by_itself() -> None:
     )  # fmt: skip
     first = 0.01 * exp(-1.5 * 0.5) - penalties(1.0) - 0.0003 * 0.2
     np.testing.assert_allclose(found, [[first, -penalties(0.4), -0.002]], rtol=1e-12)
+
+
+@pytest.mark.parametrize("robots", [1, 2, 3, 9, 64])
+@pytest.mark.parametrize("of", ["team", "robot"])
+@pytest.mark.parametrize("as_printed", [False, True])
+def test_it_has_the_bits_of_the_conditions_one_by_one(
+    robots: int, of: str, as_printed: bool
+) -> None:
+    rng = np.random.default_rng(robots)
+    constants = {"attraction_without_contact": as_printed, "pays_at_goal": not as_printed}
+    task = TASK._replace(reward=RewardSettings(of=of, **constants))
+    for m in (1, 40):
+        shares = rng.choice([0.0, 0.2, 0.9, 1.0], size=(2, m, 1))
+        contact = rng.random((m, robots)) < shares[0]
+        readings = np.where(rng.random((m, robots)) < shares[1], rng.random((m, robots)), 0.0)
+        situations = (
+            rng.choice([0.04, 0.5, 0.9], size=m), rng.normal(size=m) * 0.01,
+            rng.normal(size=m), contact, readings,
+        )  # fmt: skip
+        expected = reward_numpy(task, *situations)
+        assert reward(task, *situations).tobytes() == expected.tobytes()

@@ -1,0 +1,102 @@
+"""Whatever stands for an argument of a public function: one line names it, and what is allowed."""
+
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from traceback import walk_tb
+
+import pytest
+
+import nested_agents as na
+
+WRONG = (None, 3, [], object())
+SCENARIO = na.BoxPushingSettings().build()
+HIERARCHY = na.build_hierarchy("chain", SCENARIO.agents)
+SEED = na.policy_seed(0)
+SPEC = {"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 1, "scenario": {"kind": "line-up"}}
+SCORES = [[1.0, 0.0], [1.0, 1.0]]
+VALID: dict[str, dict[str, object]] = {
+    "BoxPushing": {"settings": na.BoxPushingSettings()},
+    "Hierarchy": {"agents": ("a", "b"), "edges": [("a", "b")]},
+    "KinematicChain": {"settings": na.KinematicChainSettings()},
+    "Session": {"trial": None},
+    "Team": {
+        "settings": na.BatchTDSettings(), "scenario": SCENARIO, "hierarchy": HIERARCHY,
+        "seed": SEED,
+    },
+    "bootstrap": {"values": SCORES},
+    "build_hierarchy": {"settings": "tree:2", "agents": ["a", "b", "c"], "bodies": None},
+    "check_scenario": {"factory": na.LineUpSettings().build, "steps": 3, "seeds": (0, 1)},
+    "compare_table": {"table": "none.csv"},
+    "cost_table": {"topologies": ["chain"], "agents": [2], "problem": None},
+    "control_loop": {
+        "scenario": SCENARIO, "team": None, "episodes": 1, "steps": 1, "seed": 0,
+    },
+    "detectable": {"deviation": 0.25, "seeds": 15, "comparisons": 1},
+    "from_gymnasium": {"env": None},
+    "from_pettingzoo": {"env": None},
+    "keys": {"prefix": "scenario"},
+    "load": {"places": None},
+    "parse_topology": {"text": "chain"},
+    "plan": {"spec": SPEC},
+    "policy_seed": {"seed": 0},
+    "power": {"effect": 0.2, "deviation": 0.25, "seeds": 5, "comparisons": 1},
+    "profile": {"spec": SPEC},
+    "rate": {"outcomes": SCORES},
+    "reevaluate": {"study": "none"},
+    "run": {"spec": SPEC, "out": "out"},
+    "run_trial": {"trial": None},
+    "scaling_law": {"study": None},
+    "schema": {"kind": "scenario.line-up"},
+    "seeds_for": {"effect": 0.2, "deviation": 0.25, "comparisons": 1},
+    "state_variable": {"unit": "m", "low": 0.0, "high": 1.0},
+    "tune": {"spec": SPEC, "out": "out"},
+}  # fmt: skip
+"""What a call may be given, by function; None where only wrong values are tried."""
+INNER = {"greatest"}
+"""Called at every decision: it trusts who calls it."""
+
+
+def test_every_public_function_is_tried() -> None:
+    functions = {name for name in na.__all__ if inspect.isfunction(getattr(na, name))}
+    assert functions - INNER <= set(VALID)
+
+
+def calls() -> Iterator[tuple[str, str, object]]:
+    for name, arguments in VALID.items():
+        for argument in arguments:
+            for wrong in WRONG:
+                yield name, argument, wrong
+
+
+def refusal(name: str, argument: str, wrong: object) -> Exception | None:
+    """Return what a call with a wrong argument raises; None if the argument is fine after all."""
+    function = getattr(na, name)
+    try:
+        result = (
+            function(wrong) if argument == "places" else function(**VALID[name] | {argument: wrong})
+        )
+        if inspect.isgenerator(result):
+            next(result)
+    except (ValueError, TypeError) as error:
+        return error
+    return None
+
+
+@pytest.mark.parametrize(("name", "argument", "wrong"), [*calls()])
+def test_a_wrong_argument_is_one_line(
+    name: str, argument: str, wrong: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    error = refusal(name, argument, wrong)
+    if isinstance(error, TypeError):  # of the call itself, not of what it came to
+        assert len([*walk_tb(error.__traceback__)]) == 1, error
+    elif error is not None:
+        assert re.search("allowed|must|needs|known|no agents|lacks|missing", str(error)), error
+        assert "\n" not in str(error)
+
+
+def test_the_argument_its_value_and_what_is_allowed_are_named() -> None:
+    with pytest.raises(ValueError, match=r"^agents = 6, allowed: the names of agents$"):
+        na.build_hierarchy("tree:2", **{"agents": 6})
