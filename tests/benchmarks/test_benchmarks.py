@@ -118,6 +118,15 @@ def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
     assert wide.endswith("(after 81 decisions in the median), 21 out of decisions")
 
 
+def test_values_and_predictors_are_crossed(run: Run) -> None:
+    short = "scenario.robots=3", "episodes=1", "evaluation=1", "steps=12"
+    told = run("benchmarks.learned_decisions", "--seeds", "0", "--set", *short).splitlines()
+    assert told[0].split() == ["0", "mean"]
+    assert told[7].split() == ["values", "learned,", "robots", "given", "0.0", "0.0"]
+    assert told[8].split() == ["learned", "as", "it", "is"]
+    assert len(told) == 18
+
+
 @pytest.mark.slow
 def test_a_batch_of_mujoco_is_timed(run: Run) -> None:
     pytest.importorskip("mujoco", reason="extra [mujoco]")

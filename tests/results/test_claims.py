@@ -339,6 +339,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "peers-arm-long",
         "peers-predictors",
         "predictors",
+        "predictors-again",
         "predictors-arm",
         "predictors-controls",
         "predictors-teams",
