@@ -4,9 +4,10 @@ numba takes a second to import and a kernel seconds to compile, so that neither 
 kernel is called: commands that only read never do. Of several processes that need the same kernel
 one compiles it and the others take it from the cache.
 
-Without the lock numba's cache is not safe: it numbers a file of code by an index that it has read
+Without a lock numba's cache is not safe: it numbers a file of code by an index that it has read
 before, so that of two processes that compile one kernel for different types each may leave the
-other's code under its own type.
+other's code under its own type. That lock is held while code is read or written, and not while it
+is compiled: who takes a kernel from the cache does not wait for who compiles another one.
 
 A kernel is compiled by a process that does nothing else, and then taken from the cache. A process
 that compiles a kernel itself holds several versions of the kernels that it calls, each rounded in
@@ -30,7 +31,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache, cached_property, update_wrapper
+from functools import cache, cached_property, update_wrapper, wraps
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import IO, Any, TypeVar, cast
@@ -44,6 +45,9 @@ IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
 
 LOCK = "compiling.lock"
 """The file beside cached kernels that a process holds while it compiles."""
+
+CACHE_LOCK = "cache.lock"
+"""The file beside them that a process holds while it reads or writes one."""
 
 INNER = "-inner"
 """What tells cached kernels for kernels from those for Python."""
@@ -126,6 +130,8 @@ class Kernel:
         if file is not None:  # interpreted kernels, NUMBA_DISABLE_JIT=1, have none
             source = Path(function.__code__.co_filename)
             file._source_stamp = (file._source_stamp, stamp(source))
+            file.load = _in_turns(file, file.load)
+            file.save = _in_turns(file, file.save)
         return compiled
 
     def __call__(self, *args: object) -> Any:
@@ -135,18 +141,22 @@ class Kernel:
         with _threads:
             compiled = self.compiled
             file = _cache_file(compiled)
-            with _alone(file):
-                if file is not None:
+            if file is not None and not self._is_cached(compiled, args):
+                with _alone(file, LOCK):
                     self._compile_apart(compiled, args)
-                result = compiled(*args)
+            result = compiled(*args)
             self._ready = compiled
         return result
+
+    def _is_cached(self, compiled: Any, args: tuple[object, ...]) -> bool:
+        types = tuple(map(compiled.typeof_pyval, args))
+        key = compiled._cache._index_key(types, compiled.targetctx.codegen())
+        return key in compiled._cache._cache_file._load_index()
 
     def _compile_apart(self, compiled: Any, args: tuple[object, ...]) -> None:
         """See to it that the cache has the function for arguments of these types, if it can be."""
         types = tuple(map(compiled.typeof_pyval, args))
-        key = compiled._cache._index_key(types, compiled.targetctx.codegen())
-        if key not in compiled._cache._cache_file._load_index():
+        if not self._is_cached(compiled, args):  # by who held the lock before
             with contextlib.suppress(OSError, pickle.PicklingError, AttributeError, TypeError):
                 requests, answers = _child(os.getpid())
                 place = self.py_func.__module__, self.py_func.__name__
@@ -222,16 +232,26 @@ def _cache_file(compiled: Any) -> Any:
 
 
 @contextlib.contextmanager
-def _alone(file: Any) -> Iterator[None]:
-    """Let no other process compile; without a folder that can be written to, all may."""
+def _alone(file: Any, name: str) -> Iterator[None]:
+    """Hold a lock beside a cached kernel; without a folder that can be written to, none."""
     with contextlib.ExitStack() as stack:
-        if file is not None:
-            with contextlib.suppress(OSError):
-                folder = Path(file._cache_path)
-                folder.mkdir(parents=True, exist_ok=True)
-                lock = stack.enter_context((folder / LOCK).open("w"))
-                locks.lock(lock, wait=True)
+        with contextlib.suppress(OSError):
+            folder = Path(file._cache_path)
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = stack.enter_context((folder / name).open("w"))
+            locks.lock(lock, wait=True)
         yield
+
+
+def _in_turns(file: Any, access: F) -> F:
+    """Return what reads or writes a cached kernel while no other process does."""
+
+    @wraps(access)
+    def alone(*args: object) -> Any:
+        with _alone(file, CACHE_LOCK):
+            return access(*args)
+
+    return cast(F, alone)
 
 
 def stamp(path: Path) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.core.numerics import stamp
+from nested_agents.core import locks
+from nested_agents.core.numerics import LOCK, stamp
 
 ROOT = Path(__file__).resolve().parents[3]
 NJIT = "from nested_agents.core.numerics import njit\n"
@@ -69,6 +70,36 @@ def test_an_edit_of_what_is_called_or_read_is_noticed(
     assert called(package) == (5, 1, True)
     (package / "constants.py").write_text("FACTOR = 7\n")
     assert called(package) == (10, 1, True)
+
+
+def test_who_takes_a_kernel_from_the_cache_waits_for_no_compilation(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    assert called(package) == (6, 1, True)
+    held = [path.open("w") for path in package.rglob(LOCK)]
+    assert held
+    for file in held:
+        locks.lock(file)
+    assert called(package) == (6, 1, False)
+    for file in held:
+        file.close()
+
+
+def test_kernels_for_several_types_are_compiled_at_once(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    code = "from package.caller import caller; print(caller({}))"
+    for _ in range(2):  # compiled, then taken from the cache
+        begun = [
+            subprocess.Popen(
+                [sys.executable, "-c", code.format(value)], cwd=package.parent,
+                stdout=subprocess.PIPE, text=True,
+            )
+            for value in ("3", "1.5", "2j", "True")
+        ]  # fmt: skip
+        assert [process.communicate()[0].strip() for process in begun] == ["6", "3.0", "4j", "2"]
 
 
 def test_what_cannot_be_compiled_apart_is_compiled_all_the_same(
