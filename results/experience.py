@@ -2,9 +2,10 @@
 
 ``python -m nested_agents.results.experience`` prints the tables of docs/peers.md from the rows
 of `TASKS` that are there; with directories of kept studies ``experience`` it prints their rows, as
-they are committed. A comparison is of the condition with edges, less that without: *helps* if it is
-better with p < .05, adjusted over all comparisons with it (Holm), *equal* if the whole interval
-lies within the margin, which each spec named before its runs.
+they are committed (returns if the last word is ``return``). A comparison is of the condition with
+edges, less that without: *helps* if it is better with p < .05, adjusted over all comparisons with
+it (Holm), *equal* if the whole interval lies within the margin, which each spec named before its
+runs.
 """
 
 import sys
@@ -27,6 +28,7 @@ from . import ROWS
 RANDOM = "random"
 RETURN = "return"
 FUZZY = "fuzzy TD"
+FITTED = "fitted-q"
 CHAIN = "hierarchy-ppo, chain"
 SPAN = 0.1
 """Margin of returns: this share of the way from random to the best at the end."""
@@ -50,8 +52,11 @@ class PublishedCourse(NamedTuple):
 
 
 TASKS = {
-    "spread": PublishedCourse((1000, 10_000, 100_000, 400_000), 100, 1.0),
+    "spread": PublishedCourse((1000, 10_000, 100_000, 300_000, 1_000_000), 100, 1.0),
     "vmas": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 4, None),
+    "aloha": PublishedCourse(
+        (1000, 3000, 10_000, 30_000, 100_000), 50, 0.5, edges="hierarchy-ppo, neighbours' edges"
+    ),
     "landmarks": PublishedCourse((1000, 3000, 10_000, 30_000), 100),
     "ring": PublishedCourse((1000, 3000, 10_000, 30_000), 1, edges="hierarchy-ppo, own edges"),
     "arm": PublishedCourse((1000, 10_000, 30_000, 100_000, 400_000), 25, 0.05),
@@ -72,14 +77,15 @@ def committed() -> list[str]:
     return [name for name in TASKS if (ROWS / f"{name}-experience.csv").is_file()]
 
 
-def rows_of(results: Results, budget: int) -> pd.DataFrame:
+def rows_of(results: Results, budget: int, measure: str = SUCCESS.name) -> pd.DataFrame:
     """Return means of evaluations by condition, decisions and seed, as they are committed.
 
-    The last one counts as after the `budget`, which a whole rollout may exceed.
+    The last one counts as after the `budget`, which a whole rollout may exceed. If nobody ever
+    succeeds, the return is measured.
     """
     conditions = sorted(results.of_phase("evaluation"))
-    is_rate = any(results.success(condition, "evaluation").any() for condition in conditions)
-    measure = SUCCESS.name if is_rate else RETURN
+    if not any(results.success(condition, "evaluation").any() for condition in conditions):
+        measure = RETURN
     rows = []
     for condition in conditions:
         stops = evaluated_after(results, condition) | {budget: "evaluation"}
@@ -132,7 +138,7 @@ def edge(name: str) -> EdgeWorth:
     task = TASKS[name]
     rows = read(name)
     measure = rows.columns[-1]
-    of_networks = rows[~rows["condition"].str.startswith(FUZZY)]
+    of_networks = rows[~rows["condition"].str.startswith((FUZZY, FITTED))]
     last = of_networks[of_networks["decisions"] == task.shown[-1]]
     ends = last.pivot_table(index="seed", columns="condition", values=measure)
     pairs = [(c, measure, ends[task.edges], ends[c]) for c in ends if c != task.edges]
@@ -161,8 +167,8 @@ def edge_lines() -> Iterator[str]:
         yield f"| {' | '.join(cells)} |"
 
 
-class PredictorWorth(NamedTuple):
-    """How many times as many decisions networks need as agents with a predictor."""
+class RulesWorth(NamedTuple):
+    """How many times as many decisions networks need as agents with fuzzy rules."""
 
     times: Estimate
     """The ratio; geometric mean over seeds."""
@@ -195,23 +201,24 @@ def decisions_to(own: pd.DataFrame, criterion: float = HALF) -> tuple[pd.Series,
     return pd.Series(np.exp(reached), wide.index), missed
 
 
-def foresight(name: str, fuzzy: str = FUZZY, networks: str = CHAIN) -> PredictorWorth:
-    """Return what a predictor saves in a task."""
+def foresight(name: str, fuzzy: str = FUZZY) -> RulesWorth:
+    """Return what fuzzy rules save in a task, with a predictor or, by `FITTED`, without."""
     rows = read(name)
-    needed, missed = decisions_to(rows[rows["condition"] == networks])
+    needed, missed = decisions_to(rows[rows["condition"] == TASKS[name].edges])
     own, _ = decisions_to(rows[rows["condition"] == fuzzy])
     estimate = bootstrap(np.log(needed / own).dropna().to_numpy())
-    return PredictorWorth(Estimate(*map(np.exp, estimate)), missed)
+    return RulesWorth(Estimate(*map(np.exp, estimate)), missed)
 
 
 def foresight_lines() -> Iterator[str]:
-    """Yield a table of what foresight saves, a line for every task and kind of predictor."""
-    until = f"decisions of a chain of networks, until success is {two_figures(HALF)}"
+    """Yield a table of what fuzzy rules save, a line for every task and kind of predictor."""
+    until = f"decisions of networks with edges, until success is {two_figures(HALF)}"
     yield f"| rows | condition | {until} |"
     yield "|---|---|---|"
     for name in committed():
         conditions = read(name)["condition"].unique()
-        for fuzzy in sorted(c for c in conditions if c.startswith(FUZZY)):
+        without_predictor = TASKS[name].edges.replace("hierarchy-ppo", FITTED)
+        for fuzzy in sorted(c for c in conditions if c.startswith((FUZZY, without_predictor))):
             times, missed = foresight(name, fuzzy)
             never = f", {missed} seeds never" if missed else ""
             yield f"| {name} | {fuzzy} | {bracketed(times)} times{never} |"
@@ -220,8 +227,9 @@ def foresight_lines() -> Iterator[str]:
 def main(places: list[str]) -> None:
     """Print the rows of kept studies, or the tables of committed ones."""
     if places:
+        measure = places.pop() if places[-1] == RETURN else SUCCESS.name
         kept = [load(place) for place in places]
-        frames = [rows_of(one.results, one.outline.table["decisions"]) for one in kept]
+        frames = [rows_of(one.results, one.outline.table["decisions"], measure) for one in kept]
         print_text(pd.concat(frames).to_csv(index=False).strip())
         return
     for name in committed():

@@ -43,7 +43,7 @@ def test_differences_on_the_way_are_those_of_the_rows(name, decisions, text) -> 
 
 
 def test_in_simple_spread_all_are_ahead_of_random() -> None:
-    last = experience.read("spread").query("decisions == 400000")
+    last = experience.read("spread").query("decisions == 1000000")
     compared = na.compare_table(last, score="return", seed="seed", reference="random")
     assert [d.p < 0.05 for d in compared.differences] == [True] * 4
 
