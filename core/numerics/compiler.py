@@ -129,7 +129,8 @@ class Kernel:
         file = _cache_file(compiled)
         if file is not None:  # interpreted kernels, NUMBA_DISABLE_JIT=1, have none
             source = Path(function.__code__.co_filename)
-            file._source_stamp = (file._source_stamp, stamp(source))
+            # Compared before the rest of an index is read, which may name classes that are gone.
+            file._version = (file._version, stamp(source))
             file.load = _in_turns(file, file.load)
             file.save = _in_turns(file, file.save)
         return compiled

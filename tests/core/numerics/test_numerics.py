@@ -72,6 +72,20 @@ def test_an_edit_of_what_is_called_or_read_is_noticed(
     assert called(package) == (10, 1, True)
 
 
+def test_a_class_that_is_renamed_spoils_no_cache(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    for name in ("Model", "Renamed"):
+        text = f"from typing import NamedTuple\n\n\nclass {name}(NamedTuple):\n    n: int\n"
+        (package / "model.py").write_text(text)
+        caller = "@njit(cache=True)\ndef caller(model):\n    return model.n\n"
+        (package / "caller.py").write_text(f"{NJIT}from .model import {name}\n\n\n{caller}")
+        code = f"from package.caller import {name}, caller; print(caller({name}(3)))"
+        command = [sys.executable, "-c", code]
+        assert subprocess.check_output(command, cwd=package.parent, text=True) == "3\n"
+
+
 def test_who_takes_a_kernel_from_the_cache_waits_for_no_compilation(
     package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
