@@ -13,7 +13,7 @@ many decisions as the trained teams had.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import pairwise, product
 from statistics import median
@@ -80,18 +80,16 @@ def one_sided(robots: int) -> float:
 
 def sides(robots: int, name: str, phase: str, condition: str) -> list[str]:
     """Return that angle, and how many of how many episodes succeeded within it and beyond."""
-    results = published.load(ROWS / f"{name}.json").results
-    successes = results.success(condition, phase) == 1
-    errors = [heading_errors(robots, s, successes.shape[1]) for s in results.seeds(condition)]
-    within = np.array(errors) <= one_sided(robots)
-    counted = [f"{successes[part].sum()} of {part.sum()}" for part in (within, ~within)]
-    return [f"{one_sided(robots):.0f}", *counted]
+    angle = one_sided(robots)
+    return [f"{angle:.0f}", *trained(robots, name, phase, condition, (angle,))]
 
 
-def trained(robots: int, name: str, phase: str, condition: str) -> list[str]:
+def trained(
+    robots: int, name: str, phase: str, condition: str, between: Sequence[float] = EDGES[1:-1]
+) -> list[str]:
     """Return by bin how many of how many episodes of published results succeeded."""
     results = published.load(ROWS / f"{name}.json").results
-    return counts(robots, results.seeds(condition), results.success(condition, phase))
+    return counts(robots, results.seeds(condition), results.success(condition, phase), between)
 
 
 def failures(name: str, phase: str, condition: str) -> str:
@@ -122,13 +120,17 @@ def scripted(robots: int, seeds: int, episodes: int) -> tuple[list[str], str]:
     return counts(robots, range(seeds), successes.reshape(seeds, episodes)), words
 
 
-def counts(robots: int, seeds: Iterable[int], successes: IntArray) -> list[str]:
-    """Return by bin how many of how many episodes succeeded, of ``(n_seeds, n_episodes)``."""
+def counts(
+    robots: int, seeds: Iterable[int], successes: IntArray, between: Sequence[float] = EDGES[1:-1]
+) -> list[str]:
+    """Return by bin how many of how many episodes succeeded, of ``(n_seeds, n_episodes)``.
+
+    Bins lie below, between and above the angles `between` [deg].
+    """
     errors = [heading_errors(robots, seed, successes.shape[1]) for seed in seeds]
-    which = np.digitize(errors, EDGES[1:-1])
-    return [
-        f"{successes[which == k].sum():.0f} of {(which == k).sum()}" for k in range(len(EDGES) - 1)
-    ]
+    which = np.digitize(errors, between)
+    bins = [which == k for k in range(len(between) + 1)]
+    return [f"{successes[own].sum():.0f} of {own.sum()}" for own in bins]
 
 
 def main() -> None:

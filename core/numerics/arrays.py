@@ -52,14 +52,15 @@ def wrap(angle: Any) -> Any:
     return shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi
 
 
+_wrap = njit(cache=True)(wrap)
+
+
 @njit(cache=True)
 def wrap_each(angles: FloatArray) -> FloatArray:
     """Return `wrap` of angles ``(k,)`` in the same bits, of few in a fifth of the time."""
     out = np.empty(len(angles))
     for k in range(len(angles)):
-        shifted = angles[k] + pi
-        turns = np.floor(shifted / _TURN)
-        out[k] = shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi
+        out[k] = _wrap(angles[k])
     return out
 
 

@@ -142,22 +142,18 @@ class Kernel:
         with _threads:
             compiled = self.compiled
             file = _cache_file(compiled)
-            if file is not None and not self._is_cached(compiled, args):
-                with _alone(file, LOCK):
-                    self._compile_apart(compiled, args)
+            if file is not None:
+                types = tuple(map(compiled.typeof_pyval, args))
+                if not _is_cached(compiled, types):
+                    with _alone(file, LOCK):
+                        self._compile_apart(compiled, types)
             result = compiled(*args)
             self._ready = compiled
         return result
 
-    def _is_cached(self, compiled: Any, args: tuple[object, ...]) -> bool:
-        types = tuple(map(compiled.typeof_pyval, args))
-        key = compiled._cache._index_key(types, compiled.targetctx.codegen())
-        return key in compiled._cache._cache_file._load_index()
-
-    def _compile_apart(self, compiled: Any, args: tuple[object, ...]) -> None:
+    def _compile_apart(self, compiled: Any, types: tuple[object, ...]) -> None:
         """See to it that the cache has the function for arguments of these types, if it can be."""
-        types = tuple(map(compiled.typeof_pyval, args))
-        if not self._is_cached(compiled, args):  # by who held the lock before
+        if not _is_cached(compiled, types):  # by who held the lock before
             with contextlib.suppress(OSError, pickle.PicklingError, AttributeError, TypeError):
                 requests, answers = _child(os.getpid())
                 place = self.py_func.__module__, self.py_func.__name__
@@ -230,6 +226,12 @@ def _names(code: CodeType) -> Iterator[str]:
 def _cache_file(compiled: Any) -> Any:
     """Return numba's index of cached versions; interpreted and uncached functions have none."""
     return None if isinstance(compiled, FunctionType) else vars(compiled._cache).get("_cache_file")
+
+
+def _is_cached(compiled: Any, types: tuple[object, ...]) -> bool:
+    """Return whether the cache has a function for arguments of these types."""
+    key = compiled._cache._index_key(types, compiled.targetctx.codegen())
+    return key in compiled._cache._cache_file._load_index()
 
 
 @contextlib.contextmanager
