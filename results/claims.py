@@ -14,17 +14,19 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..studies.results.notation import bracketed, two_decimals
+from ..studies.cli.display import print_text, print_wrapped
+from ..studies.results.notation import bracketed, two_decimals, two_figures
 from ..studies.results.results import NOTHING, Results
+from ..studies.results.statistics import LEVEL
 from .measures import MEASURES, Measured
 
-Verdict = Literal["holds", "does not hold", "not decided"]
+Verdict = Literal["holds", "does not hold", "not decided", "helps", "harms", "equal"]
 
 LEAST_SEEDS = 5
 """Seeds below which no interval is trusted with a verdict."""
@@ -46,13 +48,54 @@ class Criterion:
     """The lower bound, included."""
     high: float = inf
     """The upper bound, included."""
+    legend: ClassVar = (
+        "A claim holds if the whole interval meets the criterion, does not if none of it does, "
+        "and is not decided in between or by under 5 seeds."
+    )
+    notation: ClassVar = staticmethod(two_decimals)
 
     def decide(self, measured: Measured) -> Verdict:
         """Compare the whole interval with the bounds, and p with .05."""
         e = measured.estimate
-        if e.high < self.low or e.low > self.high or (measured.p is not None and measured.p < 0.05):
+        if (
+            e.high < self.low
+            or e.low > self.high
+            or (measured.p is not None and measured.p < LEVEL)
+        ):
             return "does not hold"
         return "holds" if e.low >= self.low and e.high <= self.high else "not decided"
+
+
+@dataclass(frozen=True)
+class Benefit:
+    """A difference helps or harms if p < .05, and is none if it lies within a margin.
+
+    Examples
+    --------
+    >>> Benefit(0.1).text
+    'p < .05, or equal within .10'
+    """
+
+    margin: float
+    """Within which a difference is none that matters, named before the runs."""
+    legend: ClassVar = (
+        "It helps or harms by p < .05, adjusted over all comparisons of a study (Holm), is equal "
+        "if the whole interval lies within the margin, which its spec named before the runs, and "
+        "is not decided otherwise."
+    )
+    notation: ClassVar = staticmethod(two_figures)
+
+    @property
+    def text(self) -> str:
+        """The criterion in words."""
+        return f"p < .05, or equal within {two_figures(self.margin)}"
+
+    def decide(self, measured: Measured) -> Verdict:
+        """Compare p with .05, and the whole interval with the margin."""
+        value, low, high = map(float, measured.estimate)
+        if measured.p is not None and measured.p < LEVEL:
+            return "helps" if value > 0.0 else "harms"
+        return "equal" if -self.margin <= low and high <= self.margin else "not decided"
 
 
 def at_least(threshold: float) -> Criterion:
@@ -72,25 +115,31 @@ def within(margin: float) -> Criterion:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of a paper, as it stands in ``claims.toml``."""
+    """A claim, by what it is decided."""
 
     name: str
     """For programs."""
     text: str
     """What is claimed."""
     place: str
-    """Where."""
+    """Where; empty: in no paper."""
     study: str
     """The study that measures it."""
     measure: str
     """What is measured."""
-    compute: Callable[[Results], Measured | None]
-    """Measures it; none of the study's results: it cannot be decided."""
-    criterion: Criterion
+    criterion: Criterion | Benefit
     """What the measure must be."""
 
+
+@dataclass(frozen=True)
+class PaperClaim(Claim):
+    """A claim of a paper, as it stands in ``claims.toml``."""
+
+    compute: Callable[[Results], Measured | None]
+    """Measures it; none of the study's results: it cannot be decided."""
+
     @classmethod
-    def of(cls, table: Mapping[str, Any]) -> "Claim":
+    def of(cls, table: Mapping[str, Any]) -> "PaperClaim":
         """Return the claim of a table: its measure is one of `MEASURES`, with arguments."""
         (name,) = CRITERIA.keys() & table.keys()
         return cls(
@@ -99,14 +148,14 @@ class Claim:
             table["place"],
             table["study"],
             table["measure"],
-            partial(MEASURES[table["compute"]], **table.get("of", {})),
             CRITERIA[name](table[name]),
+            partial(MEASURES[table["compute"]], **table.get("of", {})),
         )
 
 
 CRITERIA = {"at_least": at_least, "at_most": at_most, "within": within}
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-PAPERS = {paper: tuple(map(Claim.of, tables)) for paper, tables in _TABLE.items()}
+PAPERS = {paper: tuple(map(PaperClaim.of, tables)) for paper, tables in _TABLE.items()}
 """Every claim that is decided, by the paper that makes it."""
 OWN = "nested-agents"
 """The paper that all this is of."""
@@ -139,7 +188,8 @@ class Finding:
         value = float(self.measured.estimate.value)
         text = f"{value:.2g}, computed"
         if self.measured.seeds:
-            text = f"{bracketed(self.measured.estimate, two_decimals)}, {self.measured.seeds} seeds"
+            estimate = bracketed(self.measured.estimate, self.claim.criterion.notation)
+            text = f"{estimate}, {self.measured.seeds} seeds"
         if self.measured.p is not None:
             text += f", p = {self.measured.p:.2g}"
         return text + (f", {self.measured.note}" if self.measured.note else "")
@@ -159,7 +209,8 @@ def judge(results: Mapping[str, Results], paper: str = OWN) -> tuple[Finding, ..
 
 Format = Literal["table", "json", "markdown"]
 
-COLOURS = {"holds": "green", "does not hold": "red", "not decided": "yellow"}
+COLOURS = {"not decided": "yellow"} | dict.fromkeys(("holds", "helps"), "green")
+COLOURS |= dict.fromkeys(("does not hold", "harms"), "red") | {"equal": "blue"}
 
 
 def print_claims(findings: Sequence[Finding], form: Format) -> None:
@@ -177,14 +228,14 @@ def print_claims(findings: Sequence[Finding], form: Format) -> None:
         claim = finding.claim
         colour = COLOURS[finding.verdict]
         table.add_row(
-            f"{claim.text} [dim]({claim.place})[/]",
+            claim.text + (f" [dim]({claim.place})[/]" if claim.place else ""),
             f"{claim.measure}: [dim]{claim.criterion.text}[/]",
             finding.result,
             f"[{colour}]{finding.verdict}[/]",
         )
     Console().print(table)
-    print("\nWith 95 % intervals. A claim holds if the whole interval meets the criterion,")
-    print("does not if none of it does, and is not decided in between or by under 5 seeds.")
+    print_text("")
+    print_wrapped(f"With 95 % intervals. {findings[0].claim.criterion.legend}", indent=0)
 
 
 def markdown(findings: Sequence[Finding]) -> str:

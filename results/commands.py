@@ -9,6 +9,7 @@ import click
 from ..core.plugins.words import closest
 from ..studies import catalogue
 from ..studies.api.running import run as run_study
+from ..studies.api.study import StudyResults
 from ..studies.cli import options
 from ..studies.cli.display import (
     Form,
@@ -25,9 +26,11 @@ from ..studies.presentation.tables import tabulate
 from ..studies.results import published
 from ..studies.store import durable
 from . import QUICK, ROWS
-from .claims import OWN, PAPERS, Format, judge, print_claims, studies_of
+from .claims import OWN, PAPERS, Finding, Format, judge, print_claims, studies_of
 from .push_n import SIZES, Entry, Given, committed_entries, load_entry, run_spec, table_of
 
+NETWORKS = "networks"
+"""Of what claims are decided by the rows of docs/peers.md."""
 CATALOGUE = Path(catalogue.__file__).parent
 """Where the specs of the studies are, one folder for each."""
 
@@ -44,7 +47,8 @@ CATALOGUE = Path(catalogue.__file__).parent
     "--of",
     default=OWN,
     metavar="PAPER",
-    help="Whose claims: this paper's, or those of action-dependency-graphs (arXiv 2506.00797).",
+    help="Whose claims: this paper's, those of action-dependency-graphs (arXiv 2506.00797), or "
+    "networks: whether edges help them at budgets of up to a million decisions.",
 )
 @options.jobs
 @options.formats("table", "json", "markdown")
@@ -53,14 +57,17 @@ def claims(out: Path | None, quick: bool, of: str, jobs: int | None, form: Forma
 
     Without --out the table is made from the results that are committed in the repository.
     """
-    if of not in PAPERS:
-        raise SpecError(f"--of = {of!r}: {closest(of, PAPERS)}")
-    if out is not None:
-        results = _run(out, of, quick=quick, jobs=jobs)
-    elif quick or jobs is not None:
+    if of not in (*PAPERS, NETWORKS):
+        raise SpecError(f"--of = {of!r}: {closest(of, (*PAPERS, NETWORKS))}")
+    if out is None and (quick or jobs is not None):
         raise SpecError(
             f"{'--quick' if quick else '--jobs'}: needs --out, where to run the studies"
         )
+    if of == NETWORKS:
+        print_claims(_of_networks(out, quick=quick, jobs=jobs), form)
+        return 0
+    if out is not None:
+        results = _run(out, of, quick=quick, jobs=jobs)
     else:
         results = published.read(ROWS, studies_of(of))
     for study, of_study in results.items():
@@ -76,14 +83,33 @@ def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, publ
     for study in studies_of(of):
         name = study.replace("-", "_")
         folder = QUICK if quick else CATALOGUE / name
-        ran = run_study(folder / f"{name}.toml", out / study, jobs=jobs, observer=Terminal())
-        if ran.failed:
-            raise SpecError(
-                f"{out / study}: {len(ran.failed)} trials failed: nested-agents status "
-                f"{out / study}"
-            )
+        ran = _run_one(folder / f"{name}.toml", out / study, jobs)
         results[study] = published.loads(published.dumps(ran.outline, ran.results))
     return results
+
+
+def _run_one(spec: Path, folder: Path, jobs: int | None) -> StudyResults:
+    """Run a study, or what is left of it, of which no trial may fail."""
+    ran = run_study(spec, folder, jobs=jobs, observer=Terminal())
+    if ran.failed:
+        raise SpecError(f"{folder}: {len(ran.failed)} trials failed: nested-agents status {folder}")
+    return ran
+
+
+def _of_networks(out: Path | None, *, quick: bool, jobs: int | None) -> list[Finding]:
+    """Decide whether edges help networks, by committed rows or by studies run for it."""
+    from .experience import TASKS, edge, edges, read, rows_of, spec_of
+
+    if out is None:
+        return [worth.finding for worth in edges()]
+    if quick:
+        raise SpecError(f"--quick: --of {NETWORKS} has no small versions")
+    findings = []
+    for name, task in TASKS.items():
+        ran = _run_one(spec_of(name), out / f"{name}-experience", jobs)
+        rows = rows_of(ran.results, task.shown[-1], read(name).columns[-1])
+        findings.append(edge(name, rows).finding)
+    return findings
 
 
 @click.command()

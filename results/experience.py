@@ -3,13 +3,13 @@
 ``python -m nested_agents.results.experience`` prints the tables of docs/peers.md from the rows
 of `TASKS` that are there; with directories of kept studies ``experience`` it prints their rows, as
 they are committed (returns if the last word is ``return``). A comparison is of the condition with
-edges, less that without: *helps* if it is better with p < .05, adjusted over all comparisons with
-it (Holm), *equal* if the whole interval lies within the margin, which each spec named before its
-runs.
+edges, less that without, and is judged as ``nested-agents claims --of networks`` does, see
+`nested_agents.results.claims.Benefit`.
 """
 
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +22,10 @@ from ..studies.cli.display import print_text
 from ..studies.results.analysis import Difference, differences, format_p
 from ..studies.results.notation import bracketed, two_figures
 from ..studies.results.results import Results
-from ..studies.results.statistics import LEVEL, Estimate, bootstrap, rate
-from . import ROWS
+from ..studies.results.statistics import Estimate, bootstrap, rate
+from . import FOLDER, ROWS, SPECS
+from .claims import Benefit, Claim, Finding
+from .measures import Measured
 
 RANDOM = "random"
 RETURN = "return"
@@ -39,6 +41,8 @@ HALF = 0.5
 class PublishedCourse(NamedTuple):
     """A task whose rows are published."""
 
+    title: str
+    """In claims."""
     shown: tuple[int, ...]
     """Decisions of training after which its table has a column."""
     episodes: int
@@ -52,17 +56,25 @@ class PublishedCourse(NamedTuple):
 
 
 TASKS = {
-    "spread": PublishedCourse((1000, 10_000, 100_000, 300_000, 1_000_000), 100, 1.0),
-    "vmas": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 4, None),
-    "aloha": PublishedCourse(
-        (1000, 3000, 10_000, 30_000, 100_000), 50, 0.5, edges="hierarchy-ppo, neighbours' edges"
+    "spread": PublishedCourse(
+        "simple_spread", (1000, 10_000, 100_000, 300_000, 1_000_000), 100, 1.0
     ),
-    "landmarks": PublishedCourse((1000, 3000, 10_000, 30_000), 100),
-    "ring": PublishedCourse((1000, 3000, 10_000, 30_000), 1, edges="hierarchy-ppo, own edges"),
-    "arm": PublishedCourse((1000, 10_000, 30_000, 100_000, 400_000), 25, 0.05),
-    "arm-16": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 10),
-    "box": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 10),
-    "four-robots": PublishedCourse((1000, 3000, 10_000, 30_000, 100_000), 5),
+    "vmas": PublishedCourse("balance of VMAS", (1000, 3000, 10_000, 30_000, 100_000), 4, None),
+    "aloha": PublishedCourse(
+        "Aloha of MACO",
+        (1000, 3000, 10_000, 30_000, 100_000),
+        50,
+        0.5,
+        edges="hierarchy-ppo, neighbours' edges",
+    ),
+    "landmarks": PublishedCourse("landmarks of five", (1000, 3000, 10_000, 30_000), 100),
+    "ring": PublishedCourse(
+        "a ring of eight", (1000, 3000, 10_000, 30_000), 1, edges="hierarchy-ppo, own edges"
+    ),
+    "arm": PublishedCourse("an arm of four", (1000, 10_000, 30_000, 100_000, 400_000), 25, 0.05),
+    "arm-16": PublishedCourse("an arm of sixteen", (1000, 3000, 10_000, 30_000, 100_000), 10),
+    "box": PublishedCourse("a box, two robots", (1000, 3000, 10_000, 30_000, 100_000), 10),
+    "four-robots": PublishedCourse("a box, four robots", (1000, 3000, 10_000, 30_000, 100_000), 5),
 }
 """By the name of their rows."""
 
@@ -116,53 +128,73 @@ def _estimate(means: FloatArray, measure: str, task: PublishedCourse) -> Estimat
     return rate(np.arange(task.episodes) < reached)
 
 
-class EdgeWorth(NamedTuple):
-    """What an edge is worth to networks at the end of training."""
+def spec_of(name: str) -> Path:
+    """Return where the spec of a task's networks is."""
+    if name == "spread":
+        return FOLDER.parent / "studies" / "catalogue" / "experience" / "experience.toml"
+    return SPECS / "peers" / f"{name.replace('-', '_')}_experience.toml"
 
+
+class EdgeWorth(NamedTuple):
+    """What an edge is worth to networks at the end of training in a task."""
+
+    name: str
+    """Of the task, by that of its rows."""
     compared: Difference
     """With edges less without."""
     margin: float
     """Within which it is nothing."""
 
     @property
-    def verdict(self) -> str:
-        """Whether an edge helps, harms, is worth nothing, or none of these can be said."""
-        value, low, high = map(float, self.compared.estimate)
-        if self.compared.p < LEVEL:
-            return "helps" if value > 0.0 else "harms"
-        return "equal" if -self.margin <= low and high <= self.margin else "not decided"
+    def finding(self) -> Finding:
+        """The claim that edges help, and its verdict."""
+        task = TASKS[self.name]
+        edges = task.edges.partition(", ")[2]
+        claim = Claim(
+            self.name,
+            f"{task.title}: edges help networks",
+            "",
+            f"{self.name}-experience",
+            f"{self.compared.measure} after {task.shown[-1]:,} decisions, {edges} less no edges",
+            Benefit(self.margin),
+        )
+        compared = self.compared
+        return Finding(claim, Measured(compared.estimate, compared.seeds, compared.p))
 
 
-def edge(name: str) -> EdgeWorth:
-    """Return what an edge is worth in a task."""
+def edge(name: str, rows: pd.DataFrame) -> EdgeWorth:
+    """Return what an edge is worth in a task, by its rows."""
     task = TASKS[name]
-    rows = read(name)
     measure = rows.columns[-1]
     of_networks = rows[~rows["condition"].str.startswith((FUZZY, FITTED))]
     last = of_networks[of_networks["decisions"] == task.shown[-1]]
     ends = last.pivot_table(index="seed", columns="condition", values=measure)
     pairs = [(c, measure, ends[task.edges], ends[c]) for c in ends if c != task.edges]
     compared = differences({name: pairs}, of_rates=measure == SUCCESS.name)[name]
+    (worth,) = [d for d in compared if d.condition == task.without]
     means = ends.mean()
     span = SPAN * float(means.max() - means[RANDOM])
-    (without,) = [d for d in compared if d.condition == task.without]
-    return EdgeWorth(without, span if task.margin is None else task.margin)
+    return EdgeWorth(name, worth, span if task.margin is None else task.margin)
+
+
+def edges() -> list[EdgeWorth]:
+    """Return what an edge is worth in every task, by the committed rows."""
+    return [edge(name, read(name)) for name in committed()]
 
 
 def edge_lines() -> Iterator[str]:
     """Yield a table of what edges are worth, a line for every task."""
     yield "| rows | seeds | decisions | with edges less without | p | margin | edge |"
     yield "|---|---|---|---|---|---|---|"
-    for name in committed():
-        worth = edge(name)
+    for worth in edges():
         cells = (
-            name,
+            worth.name,
             str(worth.compared.seeds),
-            f"{TASKS[name].shown[-1]:,}",
+            f"{TASKS[worth.name].shown[-1]:,}",
             bracketed(worth.compared.estimate),
             format_p(worth.compared.p).removeprefix("= ").replace("0.", "."),
             two_figures(worth.margin),
-            worth.verdict,
+            worth.finding.verdict,
         )
         yield f"| {' | '.join(cells)} |"
 

@@ -19,17 +19,13 @@ from ..core.interface.spaces import StateSpace, Variable
 from ..core.numerics import FloatArray
 from ..core.plugins.registry import Registry
 
-Body = int | slice
-"""A body by its number; built-in variables are also asked for `EVERY` one in one call."""
-EVERY = slice(None)
-"""All M bodies: values are ``(M, m)``, then."""
 StateFunction = Callable[[Any, Any], FloatArray]
 """The values ``(m,)`` of a variable for one body in the ``m`` situations of a scenario's view."""
 
 
 @dataclass(frozen=True)
 class Situations(ABC):
-    """Situations to be describe, ``m`` at once: what the view of a scenario inherits."""
+    """Situations to be described, ``m`` at once: what the view of a scenario inherits."""
 
     @property
     @abstractmethod
@@ -53,7 +49,7 @@ class StateVariable:
     trusted: bool = False
     """Whether it is a built-in one, whose values are not checked."""
 
-    def __call__(self, view: Situations, body: Body) -> FloatArray:
+    def __call__(self, view: Situations, body: int) -> FloatArray:
         """Return the values ``(m,)`` for a body.
 
         Raises

@@ -133,17 +133,17 @@ class BatchTD(Learner):
         """Return how many weights have changed: all of them."""
         self._extend()
         s = self.settings
+        outcomes = self._outcomes()
         for row, (taken, strengths) in enumerate(self._active):
-            rewards, follower = self._outcomes(row)
+            rewards, follower = outcomes[row]
             rewards = REWARD_SCALE * rewards
             weights, values_of, solve = self._equations(row, (follower != CUT_OFF).astype(float))
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
             theta = self.theta[row].astype(float) * REWARD_SCALE
+            paid = rewards, follower, weights
+            constants = s.discount, s.trace_decay, low, high
             for _ in range(s.regression_iterations):
-                values = values_of(theta)
-                returns = lambda_returns(values, rewards, follower, s.discount, s.trace_decay)
-                targets = weights * np.clip(returns, low, high)
-                theta = solve(moment(taken, strengths, targets, theta.size))
+                theta = solve(aim(values_of(theta), paid, constants, taken, strengths, theta.size))
             change = theta / REWARD_SCALE - self.theta[row]
             self.theta[row] += s.target_averaging_rate * change
         return self.theta.size
@@ -183,18 +183,21 @@ class BatchTD(Learner):
     def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
         return self.rules.active(states)
 
-    def _outcomes(self, row: int) -> tuple[FloatArray, IntArray]:
-        """Return rewards and followers of all after-states of a row, the earlier ones first.
+    def _outcomes(self) -> list[tuple[FloatArray, IntArray]]:
+        """Return rewards and followers of all after-states by row, the earlier ones first.
 
         Of k agents and N steps, after-state ``s * k + j`` is that of agent j after step s.
         """
-        earlier, members = self._earlier[row], self.members[row]
-        k, before = len(members), len(earlier.states)
         steps = np.array(self._follower, dtype=np.int64)[:, None]
         steps[steps == len(steps)] = CUT_OFF  # of a running episode: not known yet
-        follower = np.where(steps < 0, steps, before + steps * k + np.arange(k)).ravel()
-        rewards = np.array(self._rewards).reshape(-1, self._n_agents)[:, members].ravel()
-        return np.append(earlier.rewards, rewards), np.append(earlier.follower, follower)
+        paid = np.array(self._rewards).reshape(-1, self._n_agents)
+        outcomes = []
+        for earlier, members in zip(self._earlier, self.members, strict=True):
+            k, before = len(members), len(earlier.states)
+            follower = np.where(steps < 0, steps, before + steps * k + np.arange(k)).ravel()
+            rewards = np.append(earlier.rewards, paid[:, members].ravel())
+            outcomes.append((rewards, np.append(earlier.follower, follower)))
+        return outcomes
 
     def states_of(self, row: int, since: int = 0) -> FloatArray:
         """Return the after-states ``(m, d)`` of a row, those since a step of this team alone."""
@@ -236,7 +239,8 @@ class BatchTD(Learner):
     def continue_from(self, former: Self, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
         self.theta = former.theta[rows]
-        self._earlier = [Earlier(former.states_of(row), *former._outcomes(row)) for row in rows]
+        outcomes = former._outcomes()
+        self._earlier = [Earlier(former.states_of(row), *outcomes[row]) for row in rows]
 
 
 @njit(cache=True)
@@ -252,25 +256,58 @@ def add_gram(
                     gram[active[s, a], active[s, b]] += weighted * strengths[s, b]
 
 
+# Unsigned numbers of rules are not looked at for being negative.
+
+
 @njit(cache=True)
 def row_values(theta: FloatArray, active: IntArray, strengths: FloatArray) -> FloatArray:
     """Return f ``(N,)`` of all rows."""
-    values = np.zeros(len(active))
+    values = np.empty(len(active))
     for s in range(len(active)):
+        value = 0.0
         for a in range(active.shape[1]):
-            values[s] += strengths[s, a] * theta[active[s, a]]
+            value += strengths[s, a] * theta[np.uint64(active[s, a])]
+        values[s] = value
     return values
 
 
 @njit(cache=True)
-def moment(
-    active: IntArray, strengths: FloatArray, targets: FloatArray, n_rules: int
+def aim(
+    values: FloatArray,
+    paid: tuple[FloatArray, IntArray, FloatArray],
+    constants: tuple[float, float, float, float],
+    active: IntArray,
+    strengths: FloatArray,
+    n_rules: int,
 ) -> FloatArray:
-    """Return the sum of phi times target over all rows."""
+    """Return the sum of phi times weighted target ``(n_rules,)`` over all rows.
+
+    Parameters
+    ----------
+    values
+        ``(N,)`` f of all rows.
+    paid
+        Rewards, followers and weights of all rows, ``(N,)`` each.
+    constants
+        Discount, trace decay, and the range that targets are clipped to.
+    active, strengths
+        ``(N, k)`` the active rules of all rows.
+    n_rules
+        How many rules there are.
+    """
+    rewards, follower, weights = paid
+    discount, decay, low, high = constants
+    returns = lambda_returns(values, rewards, follower, discount, decay)
     moment = np.zeros(n_rules)
     for s in range(len(active)):
+        target = returns[s]
+        if target < low:
+            target = low
+        elif target > high:
+            target = high
+        target *= weights[s]
         for a in range(active.shape[1]):
-            moment[active[s, a]] += strengths[s, a] * targets[s]
+            moment[np.uint64(active[s, a])] += strengths[s, a] * target
     return moment
 
 

@@ -10,6 +10,7 @@ from .arrays import (
     quadrature,
     wrap,
     wrap_each,
+    wrap_one,
 )
 from .compiler import INNER, LOCK, Kernel, interpreted, njit, serve, stamp
 from .libraries import Deferred, nx, optimize, pd, special, stats
@@ -41,4 +42,5 @@ __all__ = [
     "words_of",
     "wrap",
     "wrap_each",
+    "wrap_one",
 ]

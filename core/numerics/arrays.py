@@ -52,7 +52,8 @@ def wrap(angle: Any) -> Any:
     return shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi
 
 
-_wrap = njit(cache=True)(wrap)
+wrap_one = njit(cache=True)(wrap)
+"""The same for kernels, in the same bits."""
 
 
 @njit(cache=True)
@@ -60,7 +61,7 @@ def wrap_each(angles: FloatArray) -> FloatArray:
     """Return `wrap` of angles ``(k,)`` in the same bits, of few in a fifth of the time."""
     out = np.empty(len(angles))
     for k in range(len(angles)):
-        out[k] = _wrap(angles[k])
+        out[k] = wrap_one(angles[k])
     return out
 
 

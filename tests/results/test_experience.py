@@ -1,12 +1,18 @@
 """Networks at the field's budgets: the page by the rows, verdicts, decisions to a criterion."""
 
+import json
+import re
+from io import StringIO
+
 import numpy as np
 import pandas as pd
 import pytest
 
 import nested_agents as na
-from nested_agents.results import ROWS, SPECS, experience
-from nested_agents.studies.results.analysis import Difference
+from nested_agents.results import ROWS, experience
+from nested_agents.results.claims import Benefit
+from nested_agents.results.measures import Measured
+from nested_agents.studies.cli.main import main
 from nested_agents.studies.results.notation import bracketed
 from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.spec.spec import Spec
@@ -14,6 +20,7 @@ from nested_agents.studies.spec.spec import Spec
 DOCS = ROWS.parents[1] / "docs"
 PEERS = (DOCS / "peers.md").read_text(encoding="utf-8")
 CHAIN = experience.CHAIN
+NETWORKS = (CHAIN, "hierarchy-ppo, no edges")
 
 
 @pytest.mark.parametrize("name", experience.TASKS)
@@ -50,10 +57,8 @@ def test_in_simple_spread_all_are_ahead_of_random() -> None:
 
 @pytest.mark.parametrize("name", experience.TASKS)
 def test_specs_have_the_conditions_and_seeds_of_the_rows(name) -> None:
-    stem = {"arm-16": "arm_16", "four-robots": "four_robots"}.get(name, name)
-    paths = sorted((SPECS / "peers").glob(f"{stem}_experience*.toml"))
-    if name == "spread":
-        paths = [DOCS.parent / "studies" / "catalogue" / "experience" / "experience.toml"]
+    spec_of_networks = experience.spec_of(name)
+    paths = sorted(spec_of_networks.parent.glob(f"{spec_of_networks.stem}*.toml"))
     rows = experience.read(name)
     labels: set[str] = set()
     for spec in map(Spec.load, paths):
@@ -65,12 +70,7 @@ def test_specs_have_the_conditions_and_seeds_of_the_rows(name) -> None:
         assert experience.TASKS[name].episodes == spec.evaluation
     assert set(rows["condition"]) == labels
     reproduce = (DOCS / "reproduce.md").read_text(encoding="utf-8")
-    assert f"| `{name}-experience.csv` | `{paths[0].relative_to(DOCS.parent)}`" in reproduce
-
-
-def compared(value, low, high, p):
-    estimate = Estimate(*map(np.asarray, (value, low, high)))
-    return Difference("none", "success", 8, estimate, p, p, np.zeros(8))
+    assert f"| `{name}-experience.csv` | `{spec_of_networks.relative_to(DOCS.parent)}`" in reproduce
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,66 @@ def compared(value, low, high, p):
     ],
 )
 def test_verdicts_go_by_p_then_by_the_whole_interval(numbers, verdict) -> None:
-    assert experience.EdgeWorth(compared(*numbers), 0.1).verdict == verdict
+    *estimate, p = numbers
+    measured = Measured(Estimate(*map(np.asarray, estimate)), 8, p)
+    assert Benefit(0.1).decide(measured) == verdict
+
+
+def test_claims_of_networks_are_the_lines_of_the_page(capsys, monkeypatch) -> None:
+    assert main(["claims", "--of", "networks", "--format", "markdown"]) == 0
+    _, _, *printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == len(experience.TASKS)
+    for name, line in zip(experience.TASKS, printed, strict=True):
+        study, _, criterion, result, verdict = line.strip("| ").split(" | ")[-5:]
+        estimate, seeds, p = re.fullmatch(r"(.*]), (\d+) seeds, p = (.*)", result).groups()
+        margin = criterion.removeprefix("p < .05, or equal within ")
+        last = f"{experience.TASKS[name].shown[-1]:,}"
+        row = (name, seeds, last, estimate, p.removeprefix("0"), margin, verdict.strip("*"))
+        assert study == f"{name}-experience"
+        assert f"| {' | '.join(row)} |" in PEERS
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["claims", "--of", "networks"]) == 0
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "simple_spread: edges" in out
+
+
+SMALL = """
+study = "experience"
+seeds = 5
+decisions = 200
+steps = 5
+evaluation = 2
+scenario.kind = "spread"
+learner = { kind = "hierarchy-ppo", worlds = 4, rollout = 25, batch_size = 50 }
+[[overrides]]
+name = "hierarchy-ppo, chain"
+topology = { kind = "chain", told = "ancestors" }
+[[overrides]]
+name = "hierarchy-ppo, no edges"
+topology = "independent"
+[[overrides]]
+name = "random"
+preset = "random"
+"""
+
+
+def test_claims_of_networks_are_decided_by_studies_run_for_them(
+    tmp_path, capsys, monkeypatch
+) -> None:
+    (tmp_path / "small.toml").write_text(SMALL)
+    course = experience.PublishedCourse("simple_spread", (100, 200), 2, 1.0)
+    monkeypatch.setattr(experience, "TASKS", {"spread": course})
+    monkeypatch.setattr(experience, "spec_of", lambda name: tmp_path / "small.toml")
+    arguments = ["claims", "--of", "networks", "--jobs", "1", "--out", str(tmp_path / "out")]
+    assert main([*arguments, "--format", "json"]) == 0
+    (record,) = json.loads(capsys.readouterr().out)
+    kept = na.load(tmp_path / "out" / "spread-experience").results
+    chain, none = (kept.means(name, "evaluation", "return") for name in NETWORKS)
+    assert record["value"] == pytest.approx((chain - none).mean(), abs=1e-3)
+    assert (record["seeds"], record["study"]) == (5, "spread-experience")
+    assert main([*arguments, "--quick"]) == 2
+    assert "--quick: --of networks has no small versions" in capsys.readouterr().err
 
 
 def test_decisions_to_a_criterion_by_hand() -> None:
@@ -109,3 +168,16 @@ def test_rows_of_a_kept_study_are_means_of_evaluations(tmp_path, capsys) -> None
     assert [row.split(",")[:3] for row in rows] == [
         ["random", str(n), str(seed)] for n in (1000, 2000) for seed in (0, 1)
     ]
+
+
+def test_the_last_word_return_prints_returns_where_there_is_success_too(tmp_path, capsys) -> None:
+    table = {"study": "experience", "seeds": 2, "decisions": 1000, "steps": 5, "evaluation": 20}
+    table |= {"scenario": {"kind": "matrix-game", "game": "climbing"}, "preset": "random"}
+    kept = na.run(table, tmp_path / "kept", jobs=1)
+    experience.main([str(tmp_path / "kept"), "return"])
+    rows = pd.read_csv(StringIO(capsys.readouterr().out))
+    assert [*rows] == ["condition", "decisions", "seed", "return"]
+    assert kept.results.success("random", "evaluation").any()
+    assert rows["return"].tolist() == kept.results.means("random", "evaluation", "return").tolist()
+    experience.main([str(tmp_path / "kept")])
+    assert capsys.readouterr().out.startswith("condition,decisions,seed,success\n")

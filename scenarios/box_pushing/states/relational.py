@@ -3,7 +3,7 @@
 Where the robot stands (gap, bearing of the box, side of the box as seen along the course to the
 goal), how far off the others are, where the robots' middle would push the box, how the box is
 turned, how far it has to go and whether it gets there. A further variable is one function here, and
-to be fast in prediction one row of `relational_lanes`.
+to be fast one row of `relational_lanes` in prediction and one of `sensing` in the present.
 
 A state variable is a function of a `View` and a robot, see
 `nested_agents.scenarios.state_variables`. One of your own is written as the built-in ones are, and
@@ -30,14 +30,7 @@ import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit, wrap_each
 from ....core.plugins.registry import Registry
-from ...state_variables import (
-    Body,
-    Situations,
-    StateFunction,
-    StateVariable,
-    freeze,
-    state_variable,
-)
+from ...state_variables import Situations, StateFunction, StateVariable, freeze, state_variable
 from ..world.geometry import Outline, surface
 
 CLOSE = 0.02
@@ -114,14 +107,14 @@ class View(Situations):
 
         The weight of a robot is ``exp(-gap / CLOSE) + LEAST``: those that do not push do not count.
         """
-        return _direction(self.box[:, :2] - self._contact)
+        return _direction(self.box[:, :2] - self.contact)
 
     @cached_property
-    def _contact(self) -> FloatArray:
+    def contact(self) -> FloatArray:
         """The middle ``(m, 2)`` of the robots in contact [m], see `contact_push`."""
-        weights = (np.exp(-np.maximum(self.gaps, 0.0) / CLOSE) + LEAST)[:, :, None]
+        weights = (np.exp(np.maximum(self.gaps, 0.0) / -CLOSE) + LEAST)[:, :, None]
         middle = np.add.reduce(weights * self.robots[:, :, :2], axis=1)
-        return middle / np.add.reduce(weights, axis=1)
+        return freeze(middle / np.add.reduce(weights, axis=1))
 
     @cached_property
     def path(self) -> FloatArray:
@@ -133,10 +126,10 @@ class View(Situations):
         friction radius per metre, as in `prediction.push`. The last one is at most the angle at
         which they push the centre of the box, see `contact_push`.
         """
-        inward = self._into_box(self._contact)
+        inward = self._into_box(self.contact)
         x = np.cos(inward)
         y = np.sin(inward)
-        push = self.box[:, :2] - self._contact
+        push = self.box[:, :2] - self.contact
         depth = push[:, 0] * x + push[:, 1] * y
         lever = push[:, 1] * x - push[:, 0] * y
         way = self.box[:, :2] - self.origin[..., :2]
@@ -153,49 +146,38 @@ class View(Situations):
         return freeze(wrap_each(self.box[:, 2] - self.goal[2]))
 
     @cached_property
-    def _azimuths(self) -> FloatArray:
-        """Directions ``(M, m)`` from every robot to the box [rad]."""
-        x = self.box[:, 0] - self.robots[:, :, 0].T
-        y = self.box[:, 1] - self.robots[:, :, 1].T
-        return np.arctan2(y, x)
-
-    def azimuth(self, robot: Body) -> FloatArray:
-        """Direction ``(m,)`` from a robot to the box [rad]."""
-        azimuths: FloatArray = self._azimuths[robot]
-        return azimuths
-
-    def heading(self, robot: Body) -> FloatArray:
-        """Heading ``(m,)`` of a robot [rad]."""
-        return self.robots[:, robot, 2].T
-
-    def inward(self, robot: Body) -> FloatArray:
-        """Direction ``(m,)`` into the box at the point of its surface next to a robot [rad]."""
-        points = self.robots[:, robot]
-        return self._into_box(points.reshape(-1, 3)).reshape(points.shape[:-1]).T
-
-    def gaps_of_others(self, robot: Body) -> FloatArray:
-        """Gaps ``(m, M - 1)`` of the robots beside one, of one that is alone its own ``(m, 1)``.
+    def others_away(self) -> FloatArray:
+        """What share ``(m, M)`` of the robots beside each is away from the box, see the variable.
 
         They lie in order of situations, so that sums are rounded alike however many there are.
         """
-        return np.take(self.gaps, _others(self.gaps.shape[1])[robot], axis=1)
+        away = np.minimum(np.maximum(self.gaps / AWAY, 0.0), 1.0)
+        of_others = np.take(away, others_of(away.shape[1]), axis=1)
+        return freeze(np.add.reduce(of_others, axis=-1) / of_others.shape[-1])
+
+    def azimuth(self, robot: int) -> FloatArray:
+        """Direction ``(m,)`` from a robot to the box [rad]."""
+        return _direction(self.box[:, :2] - self.robots[:, robot, :2])
+
+    def heading(self, robot: int) -> FloatArray:
+        """Heading ``(m,)`` of a robot [rad]."""
+        return self.robots[:, robot, 2]
+
+    def inward(self, robot: int) -> FloatArray:
+        """Direction ``(m,)`` into the box at the point of its surface next to a robot [rad]."""
+        return self._into_box(self.robots[:, robot])
 
     def _into_box(self, points: FloatArray) -> FloatArray:
         points = np.ascontiguousarray(points)
         boxes = np.ascontiguousarray(self.box)
-        return _inward(points, boxes, self.outline.edges, self.outline.rounding)
+        return _all_inward(points, boxes, self.outline.edges, self.outline.rounding)
 
 
 @cache
-def _others(number: int) -> IntArray:
+def others_of(number: int) -> IntArray:
     """Return the other robots of each one ``(number, number - 1)``, in order; of one alone it."""
     others = [[r for r in range(number) if r != one or number == 1] for one in range(number)]
     return np.array(others)
-
-
-def _wrap(angles: FloatArray) -> FloatArray:
-    """Return angles of any shape, mapped to [-pi, pi)."""
-    return wrap_each(angles.ravel()).reshape(angles.shape)
 
 
 def _direction(ways: FloatArray) -> FloatArray:
@@ -204,20 +186,22 @@ def _direction(ways: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def _inward(
-    robots: FloatArray, boxes: FloatArray, edges: FloatArray, rounding: float
-) -> FloatArray:
-    """Return the direction into a box ``(m,)`` at the point next to each robot, world frame.
+def inward(robot: FloatArray, box: FloatArray, edges: FloatArray, rounding: float) -> float:
+    """Return the direction into a box at the point next to a robot [rad], see `View.inward`."""
+    cos, sin = np.cos(box[2]), np.sin(box[2])
+    dx, dy = robot[0] - box[0], robot[1] - box[1]
+    near = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)
+    return box[2] + np.arctan2(-near[2], -near[1])
 
-    The same number of robots, in order, are beside each box.
-    """
-    directions = np.empty(len(robots))
-    for c in range(len(robots)):
-        box = boxes[c * len(boxes) // len(robots)]
-        cos, sin = np.cos(box[2]), np.sin(box[2])
-        dx, dy = robots[c, 0] - box[0], robots[c, 1] - box[1]
-        near = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)
-        directions[c] = box[2] + np.arctan2(-near[2], -near[1])
+
+@njit(cache=True)
+def _all_inward(
+    points: FloatArray, boxes: FloatArray, edges: FloatArray, rounding: float
+) -> FloatArray:
+    """Return the direction into a box ``(m,)`` at the point next to each one, world frame."""
+    directions = np.empty(len(points))
+    for c in range(len(points)):
+        directions[c] = inward(points[c], boxes[c], edges, rounding)
     return directions
 
 
@@ -250,33 +234,34 @@ def _missed(view: View, bearing: FloatArray) -> FloatArray:
 
 
 @state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS, mirrored="same")
-def gap(view: View, robot: Body) -> FloatArray:
+def gap(view: View, robot: int) -> FloatArray:
     """Gap between robot and box."""
-    return view.gaps[:, robot].T
+    return view.gaps[:, robot]
 
 
 @_angle(SIDES)
-def box_bearing(view: View, robot: Body) -> FloatArray:
+def box_bearing(view: View, robot: int) -> FloatArray:
     """Bearing of the box in the frame of the robot."""
-    return _wrap(view.azimuth(robot) - view.heading(robot))
+    return wrap_each(view.azimuth(robot) - view.heading(robot))
 
 
 @_angle(SIDES, ("far left", "left", "behind", "right", "far right"))
-def side(view: View, robot: Body) -> FloatArray:
+def side(view: View, robot: int) -> FloatArray:
     """Where round the box the robot stands, as seen along the course to the goal."""
-    return _wrap(view.azimuth(robot) - view.course)
+    return wrap_each(view.azimuth(robot) - view.course)
 
 
 @state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS, mirrored="same")
-def others_gap(view: View, robot: Body) -> FloatArray:
+def others_gap(view: View, robot: int) -> FloatArray:
     """Greatest gap of the other robots; of the robot itself if it is alone."""
-    return np.maximum.reduce(view.gaps_of_others(robot), axis=-1).T
+    others = others_of(view.gaps.shape[1])[robot]
+    return np.maximum.reduce(np.take(view.gaps, others, axis=1), axis=-1)
 
 
 @_angle(SIDES, common=True)
-def push_bearing(view: View, robot: Body) -> FloatArray:
+def push_bearing(view: View, robot: int) -> FloatArray:
     """Where the robots' middle would push the box, off the course."""
-    return _wrap(view.push - view.course)
+    return wrap_each(view.push - view.course)
 
 
 @state_variable(
@@ -288,7 +273,7 @@ def push_bearing(view: View, robot: Body) -> FloatArray:
     common=True,
     mirrored="opposite",
 )
-def cross_track_error(view: View, robot: Body) -> FloatArray:
+def cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
     return _missed(view, push_bearing(view, robot))
 
@@ -302,7 +287,7 @@ def cross_track_error(view: View, robot: Body) -> FloatArray:
     common=True,
     mirrored="same",
 )
-def box_distance(view: View, robot: Body) -> FloatArray:
+def box_distance(view: View, robot: int) -> FloatArray:
     """Distance of the box from the goal."""
     return view.distance
 
@@ -316,27 +301,27 @@ def box_distance(view: View, robot: Body) -> FloatArray:
     common=True,
     mirrored="same",
 )
-def approach(view: View, robot: Body) -> FloatArray:
+def approach(view: View, robot: int) -> FloatArray:
     """By how much the box came nearer per decision period: -Delta D of Conditions 1, 2."""
     return view.approach
 
 
 @_angle((-0.8, -0.2, 0.0, 0.2, 0.8), common=True)
-def box_turn(view: View, robot: Body) -> FloatArray:
+def box_turn(view: View, robot: int) -> FloatArray:
     """Turn of the box from the goal pose."""
     return view.turn
 
 
 @_angle((-0.8, -0.15, 0.0, 0.15, 0.8), common=True)
-def bend(view: View, robot: Body) -> FloatArray:
+def bend(view: View, robot: int) -> FloatArray:
     """By how much the box is turned off the arc that ends in the goal pose."""
-    return _wrap(view.turn - 2.0 * _wrap(view.course - view.goal[2]))
+    return wrap_each(view.turn - 2.0 * wrap_each(view.course - view.goal[2]))
 
 
 @_angle(SIDES)
-def face_bearing(view: View, robot: Body) -> FloatArray:
+def face_bearing(view: View, robot: int) -> FloatArray:
     """Bearing, in the frame of the robot, of the way straight into the nearest face of the box."""
-    return _wrap(view.inward(robot) - view.heading(robot))
+    return wrap_each(view.inward(robot) - view.heading(robot))
 
 
 @state_variable(
@@ -347,20 +332,18 @@ def face_bearing(view: View, robot: Body) -> FloatArray:
     labels=("none", "some", "half", "most", "all"),
     mirrored="same",
 )
-def others_away(view: View, robot: Body) -> FloatArray:
+def others_away(view: View, robot: int) -> FloatArray:
     """How many of the other robots are away from the box, as a share: gaps up to `AWAY` in part.
 
     Of a robot that is alone, its own.
     """
-    gaps = view.gaps_of_others(robot)
-    away = np.minimum(np.maximum(gaps / AWAY, 0.0), 1.0)
-    return (np.add.reduce(away, axis=-1) / gaps.shape[-1]).T
+    return view.others_away[:, robot]
 
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)
-def contact_push_bearing(view: View, robot: Body) -> FloatArray:
+def contact_push_bearing(view: View, robot: int) -> FloatArray:
     """Where the robots in contact push the box, off the course."""
-    return _wrap(view.contact_push - view.course)
+    return wrap_each(view.contact_push - view.course)
 
 
 _wide_error = state_variable(
@@ -375,19 +358,19 @@ _wide_error = state_variable(
 
 
 @_wide_error
-def contact_cross_track_error(view: View, robot: Body) -> FloatArray:
+def contact_cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
     return _missed(view, contact_push_bearing(view, robot))
 
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)
-def path_bearing(view: View, robot: Body) -> FloatArray:
+def path_bearing(view: View, robot: int) -> FloatArray:
     """Where the box is going, off the course."""
-    return _wrap(view.path - view.course)
+    return wrap_each(view.path - view.course)
 
 
 @_wide_error
-def path_cross_track_error(view: View, robot: Body) -> FloatArray:
+def path_cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that path would miss the goal; beyond it the whole distance."""
     return _missed(view, path_bearing(view, robot))
 

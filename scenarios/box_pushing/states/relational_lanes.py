@@ -80,6 +80,7 @@ class Columns:
             for group in (_OF_PUSH, _OF_CONTACT, _OF_PATH, FACE_BEARING)
         )
         self.wanted: Wanted = (push, contact, path, face)
+        self.of_away = AWAY_OTHERS in self.rows
 
     def of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the variables ``(len(robots), m, columns)`` of robots in the view's situations."""

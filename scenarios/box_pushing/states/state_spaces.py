@@ -11,16 +11,17 @@ The shared blocks of many predicted situations are computed by `relational_lanes
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from math import pi
 
 import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics import FloatArray, wrap
-from ...state_variables import EVERY, StateVariable, find_variable, sense, space_of
+from ...state_variables import StateVariable, find_variable, sense, space_of
 from .relational import STATE_VARIABLES, View
 from .relational_lanes import Columns
+from .sensing import sensed
 
 
 @dataclass(frozen=True)
@@ -43,33 +44,24 @@ class BoxStateSpace:
         return sense(self.functions, view, robots)
 
     def observe(self, view: View) -> FloatArray:
-        """Return the shared blocks ``(m, M, d - n_own)`` of all robots.
+        """Return the shared blocks ``(m, M, d - n_own)`` of all robots, fast for few situations.
 
-        The same as `sense`, each built-in function called once for all robots.
+        They have the bits of `sense`.
         """
-        shape = view.gaps.shape
-        common, at_once, others = self._columns
-        shared = np.empty((*shape, len(self.functions)))
-        if others:
-            of_others = sense([self.functions[c] for c in others], view, range(shape[1]))
-            shared[:, :, others] = of_others.swapaxes(0, 1)
-        for column in common:
-            shared[:, :, column] = self.functions[column](view, 0)[:, None]
-        for column in at_once:
-            shared[:, :, column] = self.functions[column](view, EVERY).T
+        robots = range(view.gaps.shape[1])
+        if self.columns is None:
+            return self.sense(view, robots).swapaxes(0, 1)
+        shared = sensed(view, self.columns)
+        if not self.is_built_in:
+            users = [c for c, thing in enumerate(self.functions) if not thing.trusted]
+            of_users = sense([self.functions[c] for c in users], view, robots)
+            shared[:, :, users] = of_users.swapaxes(0, 1)
         return shared
 
     @property
     def is_built_in(self) -> bool:
         """Whether no variable is a user's."""
         return all(thing.trusted for thing in self.functions)
-
-    @cached_property
-    def _columns(self) -> tuple[list[int], list[int], list[int]]:
-        """Which built-in columns are common, which one call fills for all robots, and users'."""
-        kinds = [(1 - thing.common if thing.trusted else 2) for thing in self.functions]
-        common, at_once, others = ([c for c, k in enumerate(kinds) if k == j] for j in range(3))
-        return common, at_once, others
 
     def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
