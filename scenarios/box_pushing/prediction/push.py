@@ -35,6 +35,17 @@ SUBSTEPS = 4
 SWEEPS = 4
 VECTOR = 8
 """Lanes are used by so many at a time."""
+ASKED = (
+    lanes.AHEAD,
+    lanes.LEFT,
+    lanes.TURN,
+    lanes.WANT_N,
+    lanes.WANT_T,
+    lanes.FORCE_N,
+    lanes.FORCE_T,
+    lanes.ACTIVE,
+)
+"""The rows of a robot that hang on what it is asked for; there are no forces at first."""
 ROUNDED = 1e-9
 """What rounding may make of a gap, or a way [m]."""
 
@@ -68,8 +79,7 @@ class Contacts(NamedTuple):
     gaps: FloatArray
     """``(M,)`` [m]."""
     asked: FloatArray
-    """``(M, K, 6)`` every twist, what the robot then wants at the contact, and whether it may
-    touch."""
+    """``(M, K, 9)`` the rows `ASKED` under every twist, and the greatest way in a substep [m]."""
 
 
 @njit(cache=True)
@@ -78,7 +88,7 @@ def contacts_of(
 ) -> Contacts:
     """Return the contacts of robots ``(M, 3)``, each asked for twists ``(M, K, 3)``."""
     n, count = twists.shape[:2]
-    rows, gaps, asked = np.empty((n, FIXED)), np.empty(n), np.empty((n, count, 6))
+    rows, gaps, asked = np.empty((n, FIXED)), np.empty(n), np.empty((n, count, len(ASKED) + 1))
     bodies, shared = np.zeros((n, BODY_SIZE)), np.zeros((1, BOX_SIZE))
     box_rows, nearest, dt = shared[0], shared[0, lanes.NEAREST :], seconds / SUBSTEPS
     radii, compliance, rounding = model.radii, model.compliance, model.rounding
@@ -94,15 +104,17 @@ def contacts_of(
                 for k in range(width):
                     bodies[r, j * LANES + k] = robots[r, j]
                 for k in range(used):
-                    asked[r, first + k, j] = twists[r, first + k, j]
                     bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, first + k, j]
             lanes.head(bodies, r, width)
             lanes.locate(bodies, r, box_rows, nearest, model.edges, width)
             lanes.touch(bodies, r, box_rows, radii[r], rounding, compliance, dt, width)
             for k in range(used):
-                asked[r, first + k, 3] = bodies[r, lanes.WANT_N + k]
-                asked[r, first + k, 4] = bodies[r, lanes.WANT_T + k]
-                asked[r, first + k, 5] = bodies[r, lanes.ACTIVE + k]
+                for j in range(len(ASKED)):
+                    asked[r, first + k, j] = bodies[r, ASKED[j] + k]
+                ahead, left, turn = twists[r, first + k]
+                half = 0.5 * dt * turn  # makes chords longer, see `lanes.move`
+                square = (1.0 + 0.25 * half**4) * (ahead * ahead + left * left)
+                asked[r, first + k, len(ASKED)] = dt * np.sqrt(square)
             for j in range(FIXED):
                 rows[r, j] = bodies[r, j * LANES]
             gaps[r] = np.sqrt(nearest[SQUARE]) * nearest[SIDE] - rounding - radii[r]
@@ -171,7 +183,7 @@ def pushed_on(
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     dt = seconds / SUBSTEPS
-    bodies, shared = np.zeros((n, BODY_SIZE)), np.zeros((1, BOX_SIZE))
+    bodies, shared = np.empty((n, BODY_SIZE)), np.zeros((1, BOX_SIZE))
     way, spare, near = np.empty(n), np.empty(n), np.empty(n, np.bool_)
     nearest = shared[0, lanes.NEAREST :]
     for first in range(0, m, LANES):
@@ -182,8 +194,7 @@ def pushed_on(
             for k in range(width):
                 shared[0, j * LANES + k] = box[j]
         for r in range(n):
-            fastest = _begin(bodies, r, contacts, choices, first, used, dt, width)
-            way[r] = dt * np.sqrt(fastest)
+            way[r] = _begin(bodies, r, contacts, choices, first, used, width)
             spare[r] = contacts.gaps[r] - 2.0 * way[r] - MARGIN - ROUNDED
         moved = 0.0
         for substep in range(SUBSTEPS):
@@ -212,28 +223,28 @@ def _begin(
     choices: IntArray,
     first: int,
     used: int,
-    dt: float,
     width: int,
 ) -> float:
-    """Let a robot stand as it does at first; return the square of its greatest speed."""
+    """Let a robot stand as it does at first; return how far at most it moves in a substep."""
     rows, asked = contacts.rows, contacts.asked
     for j in range(FIXED):
         row = rows[r, j]
         for k in range(width):
             bodies[r, j * LANES + k] = row
-    fastest, last = 0.0, -1
-    for k in range(width):
-        choice = choices[r, first + min(k, used - 1)]
-        for j in range(3):
-            bodies[r, lanes.AHEAD + j * LANES + k] = asked[r, choice, j]
-        bodies[r, lanes.WANT_N + k] = asked[r, choice, 3]
-        bodies[r, lanes.WANT_T + k] = asked[r, choice, 4]
-        bodies[r, lanes.ACTIVE + k] = asked[r, choice, 5]
-        if choice != last:
-            last, ahead, left = choice, asked[r, choice, 0], asked[r, choice, 1]
-            half = 0.5 * dt * asked[r, choice, 2]  # makes chords longer, see `lanes.move`
-            fastest = max(fastest, (1.0 + 0.25 * half**4) * (ahead * ahead + left * left))
-    return fastest
+    chosen, others = choices[r, first + used - 1], 0
+    for k in range(used):
+        others += 1 if choices[r, first + k] != chosen else 0
+    mixed = used if others > 0 else 0
+    for j in range(len(ASKED)):
+        row = asked[r, chosen, j]
+        for k in range(width):
+            bodies[r, ASKED[j] + k] = row
+        for k in range(mixed):
+            bodies[r, ASKED[j] + k] = asked[r, choices[r, first + k], j]
+    way = asked[r, chosen, len(ASKED)]
+    for k in range(mixed):
+        way = max(way, asked[r, choices[r, first + k], len(ASKED)])
+    return way
 
 
 @njit(cache=True)

@@ -113,7 +113,7 @@ def touch(
     dt: float,
     lanes: int,
 ) -> int:
-    """Write the contact rows of a robot that is located; return in how many lanes it may touch the box."""
+    """Write the contact rows of a robot that is located; return in how many lanes it may touch."""
     c00, c01, c02 = compliance[n, 0, 0], compliance[n, 0, 1], compliance[n, 0, 2]
     c10, c11, c12 = compliance[n, 1, 0], compliance[n, 1, 1], compliance[n, 1, 2]
     c20, c21, c22 = compliance[n, 2, 0], compliance[n, 2, 1], compliance[n, 2, 2]

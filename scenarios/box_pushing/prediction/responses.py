@@ -98,9 +98,9 @@ def _worths(choices: IntArray, contacts: Contacts, outlook: Outlook, wanted: Wan
 
 @njit(cache=True)
 def _holds(plan: _Plan, robot: int) -> bool:
-    """Return whether no other robot's wheel command is another than when it was last valued."""
+    """Return whether it was valued, and no other robot's wheel command is another since then."""
     around = plan.around[robot]
-    same = True
+    same = around[robot] >= 0
     for i in range(len(around)):
         same = same and (i == robot or around[i] == plan.commands[i])
     return same
