@@ -238,7 +238,7 @@ class BestResponse(Aggregation):
         distinct = np.count_nonzero(np.broadcast_to(alike, (len(self._bodies), len(each))) == each)
         self.count(first.agent, len(starts) + int(distinct) + len(each) * len(self._bodies))
         worth = partial(self.predicted_worth, first)
-        pooled = self._pooled(first)
+        pooled = self.learned(first).pooled
         return respond(Search(pooled, starts, worth, self._order, exploring, first.rng))
 
     def _plan(self, deliberation: Deliberation) -> IntArray:

@@ -9,6 +9,7 @@ share. So the mean of many agents costs little more than the value of a few.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -168,6 +169,39 @@ def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
     return [np.array(sorted((i, *below[i]))) for i in every]
 
 
+class Learned:
+    """What some agents have learned when they decide; each of its parts is worked out once.
+
+    Parameters
+    ----------
+    weights
+        The consequent weights ``(n_rules,)`` of every agent, in agent order.
+    agents
+        ``(k,)`` the agents that it is about, in agent order.
+    body_of
+        ``(n,)`` the body of every agent.
+    """
+
+    def __init__(self, weights: Sequence[FloatArray], agents: IntArray, body_of: IntArray) -> None:
+        self.weights = weights
+        self.agents = agents
+        self._body_of = body_of
+
+    @cached_property
+    def is_nothing(self) -> bool:
+        """Whether all their weights are zero."""
+        each = (self.weights[i] for i in self.agents.tolist())
+        return not any(own[:64].any() or own.any() for own in each)
+
+    @cached_property
+    def pooled(self) -> Pooled:
+        """Their weights, summed where they see the same."""
+        theta = np.array([self.weights[i] for i in self.agents], dtype=float)
+        bodies, firsts = np.unique(self._body_of[self.agents], return_index=True)
+        summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
+        return Pooled((theta, *summed), self.agents, bodies, np.append(firsts, len(self.agents)))
+
+
 class Aggregation(Evaluator):
     """What evaluators share: the decision rule, and the aggregation over teammates.
 
@@ -197,9 +231,8 @@ class Aggregation(Evaluator):
         self.concerned = concerned(self.hierarchy, problem.value_of)
         """Per agent ``(k,)`` the agents whose values decide."""
         self._body_of = np.array([g for g, group in enumerate(problem.groups) for _ in group])
-        self._last: tuple[Sequence[FloatArray], IntArray, Pooled] | None = None
+        self._learned: Learned | None = None
         self._have_learned: set[int] = set()
-        self._unlearned: tuple[Sequence[FloatArray], IntArray] | None = None
 
     @staticmethod
     def require(key: str, value: str, allowed: str, why: str) -> None:
@@ -228,16 +261,18 @@ class Aggregation(Evaluator):
         agent = deliberation.agent
         if self.problem.rule != "value" or agent in self._have_learned:
             return False
-        weights = deliberation.weights
-        concerned = self.concerned[agent]
-        last = self._unlearned
-        if last is not None and last[0] is weights and last[1] is concerned:
-            return True  # asked once for agents of one decision, who may be many
-        if not any(weights[i][:64].any() or weights[i].any() for i in concerned.tolist()):
-            self._unlearned = weights, concerned
+        if self.learned(deliberation).is_nothing:
             return True
         self._have_learned.add(agent)
         return False
+
+    def learned(self, deliberation: Deliberation) -> Learned:
+        """Return what those concerned have learned: one and the same for agents of one decision."""
+        weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
+        last = self._learned
+        if last is None or last.weights is not weights or last.agents is not concerned:
+            last = self._learned = Learned(weights, concerned, self._body_of)
+        return last
 
     def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
         """Return what joint actions ``(m, n)`` are worth to the deciding agent, ``(m,)``."""
@@ -251,25 +286,11 @@ class Aggregation(Evaluator):
 
         def values() -> FloatArray:
             if len(concerned) > 1:
-                return self.mean(self._pooled(deliberation), prediction, joint_actions)
+                return self.mean(self.learned(deliberation).pooled, prediction, joint_actions)
             states = prediction.states(deliberation.agent, joint_actions)
             return self.rules.values(deliberation.own_weights, states)
 
         return self.combine(lambda: rewards_of(prediction, joint_actions), values)
-
-    def _pooled(self, deliberation: Deliberation) -> Pooled:
-        """Return the pooled weights of those concerned, once for agents of one decision."""
-        weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
-        if self._last is None or self._last[0] is not weights or self._last[1] is not concerned:
-            self._last = weights, concerned, self.pooled(weights, concerned)
-        return self._last[2]
-
-    def pooled(self, weights: Sequence[FloatArray], agents: IntArray) -> Pooled:
-        """Return the weights of some agents in agent order; `weights` are those of all agents."""
-        theta = np.array([weights[i] for i in agents], dtype=float)
-        bodies, firsts = np.unique(self._body_of[agents], return_index=True)
-        summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
-        return Pooled((theta, *summed), agents, bodies, np.append(firsts, len(agents)))
 
     def mean(self, pooled: Pooled, prediction: Prediction, joint: IntArray) -> FloatArray:
         """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""

@@ -48,8 +48,15 @@ class BoxStateSpace:
 
         They have the bits of `sense`.
         """
-        done = None if self.columns is None else sensed(view, self.columns).swapaxes(0, 1)
-        return sense(self.functions, view, range(view.gaps.shape[1]), done).swapaxes(0, 1)
+        robots = range(view.gaps.shape[1])
+        if self.columns is None:
+            return self.sense(view, robots).swapaxes(0, 1)
+        shared = sensed(view, self.columns)
+        if not self.is_built_in:
+            users = [c for c, thing in enumerate(self.functions) if not thing.trusted]
+            of_users = sense([self.functions[c] for c in users], view, robots)
+            shared[:, :, users] = of_users.swapaxes(0, 1)
+        return shared
 
     @property
     def is_built_in(self) -> bool:

@@ -16,6 +16,7 @@ from nested_agents.core.evaluators.enumeration import (
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
     Deliberation,
+    Learned,
     Rule,
     ValueOf,
     concerned,
@@ -183,8 +184,8 @@ def test_pooled_means_are_means(order: int, membership: str) -> None:
     problem = DecisionProblem(rules, hierarchy, A, groups, "value", "best-response", 0.9)
     pooling = BestResponse(problem)
     expected = np.mean([rules.values(theta[i], states[i]) for i in agents], axis=0)
-    pooled, joint_actions = pooling.pooled(list(theta), agents), np.zeros((7, 6), dtype=int)
-    found = pooling.mean(pooled, Remembered(states), joint_actions)
+    pooled = Learned(list(theta), agents, np.repeat(range(3), 2)).pooled
+    found = pooling.mean(pooled, Remembered(states), np.zeros((7, 6), dtype=int))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 

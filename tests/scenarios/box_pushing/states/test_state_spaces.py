@@ -1,5 +1,6 @@
 """State variables worked out by hand, and their mirror images."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -284,8 +285,12 @@ def test_what_is_common_is_sensed_once() -> None:
         return StateVariable(Variable(name, "m", 0.0, 1.0), function, common)
 
     seen = view([[-0.2, 0, 0], [0.2, 0, 0]], [0, 0, 0], [0.06, 0.1])
-    sense([counted("same", True), counted("own", False)], seen, [0, 1])
+    functions = counted("same", True), counted("own", False)
+    sense(functions, seen, [0, 1])
     assert asked == [("same", 0), ("own", 0), ("own", 1)]
+    beside = replace(build_space("both", "gap", "side"), functions=functions)
+    np.testing.assert_array_equal(beside.observe(seen)[0], np.full((2, 2), seen.distance))
+    assert asked == 2 * [("same", 0), ("own", 0), ("own", 1)]
 
 
 def test_a_function_of_a_user_is_checked_whatever_its_name() -> None:
