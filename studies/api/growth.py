@@ -67,7 +67,7 @@ def scaling_law(
         Loaded results, whose sizes are a swept key of numbers.
     measure
         Of episodes, ``steps``, ``return`` or a number of whole trials, by name; by default the
-        first, which is success.
+        first, which is success, or the return where nothing is one.
     phase
         Of the episodes; by default ``evaluation``, or where there is none ``training``.
     size
@@ -85,7 +85,7 @@ def scaling_law(
     """
     expect("what load or run returned", StudyResults, study=study)
     results = study.results
-    name = results.measures[0].name if measure is None else measure
+    name = results.main.name if measure is None else measure
     law = laws_of_results.scaling_law(
         results, name, phase=phase, size=size, criterion=criterion, predict=predict
     )
