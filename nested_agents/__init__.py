@@ -49,6 +49,7 @@ _PLACES = {
     "Observation": ("core.interface.experience", "Observation"),
     "Partition": ("core.rules.kernels.fuzzy", "Partition"),
     "RuleBase": ("core.rules.rule_base", "RuleBase"),
+    "NO_SUCCESS": ("core.interface.measures", "NO_SUCCESS"),
     "SUCCESS": ("core.interface.measures", "SUCCESS"),
     "Prediction": ("core.interface.prediction", "Prediction"),
     "Peer": ("core.agents.peer", "Peer"),

@@ -20,7 +20,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..core.interface.measures import Measure
+from ..core.interface.measures import NO_SUCCESS, Measure
 from ..core.interface.scenario import Scenario, Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
 from ..core.interface.stacked import StackedWorlds
@@ -45,8 +45,9 @@ NEAR = 0.1
 COURSES = np.array([(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)])
 ACTIONS = ActionSet(("stay", "left", "right", "down", "up"), (1.0,) * 5, (0.0,) * 5, neutral=0)
 MEASURES = (
-    Measure("covered", "landmarks covered", source="covered", gathering="mean", better="higher"),
-    Measure("collisions", "collisions", source="collisions", gathering="sum", better="lower"),
+    NO_SUCCESS,
+    Measure("covered", "landmarks covered", "1", "covered", "mean", "higher", False, 0.0, 1.0),
+    Measure("collisions", "collisions", "1", "collisions", "sum", "lower", False, 0.0),
 )
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..core.interface.measures import SUCCESS, Measure
+from ..core.interface.measures import NO_SUCCESS, SUCCESS, Measure
 from ..core.interface.scenario import Scenario, Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
 from ..core.interface.worlds import Transitions, Worlds
@@ -60,7 +60,7 @@ class VmasSettings(ScenarioSettings):
 
     def warnings(self) -> tuple[str, ...]:
         """Return that nothing is a success, if it is so."""
-        nothing = "scenario.success_return: nothing is said to be a success, compare returns"
+        nothing = "scenario.success_return: nothing is said to be one, returns are compared"
         return () if self.success_return is not None else (nothing,)
 
 
@@ -79,10 +79,9 @@ class VmasTask(Scenario):
         do, or VMAS is not installed; one line.
     """
 
-    measures = (SUCCEEDED,)
-
     def __init__(self, settings: VmasSettings) -> None:
         self.settings = settings
+        self.measures = (SUCCEEDED if settings.success_return is not None else NO_SUCCESS,)
         self._single = VmasWorlds(settings, 1)
         self.agents = self._single.agents
         self.roles = ("agent",) * len(self.agents)

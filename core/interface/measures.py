@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 
@@ -52,6 +52,10 @@ class Measure:
 
 SUCCESS = Measure("success", "success", source="terminated", better="higher", is_rate=True)
 """Whether the episode ended with the task solved: success, unless a scenario says otherwise."""
+NO_SUCCESS = replace(SUCCESS, greatest=0.0)
+"""Success in a task in which nothing is one: teams are compared by their returns."""
+RETURN = Measure("return", "return", better="higher")
+"""The return of an episode, which every scenario has."""
 
 
 def measures_of(declared: Sequence[Measure]) -> tuple[Measure, ...]:
@@ -62,3 +66,13 @@ def measures_of(declared: Sequence[Measure]) -> tuple[Measure, ...]:
     """
     own = [m for m in declared if m.name == SUCCESS.name] or [SUCCESS]
     return (*own, *(m for m in declared if m.name != SUCCESS.name))
+
+
+def main_measure(measures: Sequence[Measure]) -> Measure:
+    """Return by which of its measures a task is judged: the first, or the return if that is never.
+
+    >>> main_measure([SUCCESS]).name, main_measure([NO_SUCCESS]).name
+    ('success', 'return')
+    """
+    first = next(iter(measures), RETURN)
+    return RETURN if first.is_rate and first.greatest == 0.0 else first

@@ -137,7 +137,8 @@ class Scenario(ABC):
     action_set: ActionSet
     """The actions of every agent."""
     measures: tuple[Measure, ...] = ()
-    """What is measured of an episode beside success, see `measures_of`."""
+    """What is measured of an episode beside success, see `measures_of`. By `NO_SUCCESS` nothing is
+    one, and returns are compared."""
     interactions: Sequence[tuple[int, int]] | None = None
     """Pairs of agents, by index, whose actions matter to each other: what a topology with ``shape =
     "scenario"`` joins."""

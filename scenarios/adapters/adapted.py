@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import NO_SUCCESS, SUCCESS, Measure
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import StateSpace
@@ -40,10 +40,8 @@ HELD = 0.7
 """Probability that a random action is held for a further step."""
 FRAMES = 20.0
 """Frames per second of an environment that says not how many it has."""
-MEASURES = (
-    Measure(SUCCESS.name, SUCCESS.title, source="succeeded", better="higher", is_rate=True),
-    Measure("total_reward", "total reward", "1", "env_reward", "sum", "higher"),
-)
+SUCCEEDED = Measure(SUCCESS.name, SUCCESS.title, source="succeeded", better="higher", is_rate=True)
+REWARD = Measure("total_reward", "total reward", "1", "env_reward", "sum", "higher")
 
 
 class AdaptedWorld(Scenario):
@@ -72,7 +70,6 @@ class AdaptedWorld(Scenario):
     True
     """
 
-    measures = MEASURES
     recorded = ("joint_action",)
     repeats = True
 
@@ -80,6 +77,7 @@ class AdaptedWorld(Scenario):
         self._make = maker_of(settings) if make is None else make
         self._actuators, self._perception = _survey_in_words(settings, self._make)
         self.settings = settings
+        self.measures = (SUCCEEDED if settings.success else NO_SUCCESS, REWARD)
         self._simulator = self._make(settings, None)
         self.agents = self._actuators.names
         self.roles = self._actuators.roles

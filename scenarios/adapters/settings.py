@@ -105,7 +105,7 @@ class AdaptedSettings(ScenarioSettings):
 
     def warnings(self) -> tuple[str, ...]:
         """Return that nothing is a success, if it is so."""
-        nothing = "scenario.success: nothing is said to be one, compare total_reward"
+        nothing = "scenario.success: nothing is said to be one, returns are compared"
         return () if self.success else (nothing,)
 
     def scenario_defaults(self, preset: str) -> Mapping[str, Any]:

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
+from numbers import Integral
 from typing import TYPE_CHECKING
 
-from ...core.plugins.words import expect
+from ...core.plugins.words import expect, expect_each
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import scaling_law as laws_of_results
 from .study import StudyResults
@@ -67,7 +68,7 @@ def scaling_law(
         Loaded results, whose sizes are a swept key of numbers.
     measure
         Of episodes, ``steps``, ``return`` or a number of whole trials, by name; by default the
-        first, which is success.
+        first, which is success, or the return where nothing is one.
     phase
         Of the episodes; by default ``evaluation``, or where there is none ``training``.
     size
@@ -84,8 +85,9 @@ def scaling_law(
         If there is no such measure, phase or size.
     """
     expect("what load or run returned", StudyResults, study=study)
+    expect_each("whole numbers", Integral, predict=predict)
     results = study.results
-    name = results.measures[0].name if measure is None else measure
+    name = results.main.name if measure is None else measure
     law = laws_of_results.scaling_law(
         results, name, phase=phase, size=size, criterion=criterion, predict=predict
     )

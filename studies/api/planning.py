@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.interface.measures import Measure, main_measure
 from ...core.numerics import FloatArray, IntArray, optimize, pd
 from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
@@ -105,10 +106,12 @@ class Plan:
     """Of all processes together [bytes], about."""
     comparisons: int
     """With the first condition."""
-    deviation: float
-    """Standard deviation of paired differences that is supposed."""
-    smallest: float
-    """The smallest difference of success rates that is of interest."""
+    measure: Measure
+    """By which conditions are compared: success, or the return where nothing is one."""
+    deviation: float | None
+    """Standard deviation of paired differences that is supposed; None: of returns nobody knows."""
+    smallest: float | None
+    """The smallest difference that is of interest; None: of returns nobody has named one."""
     warnings: tuple[str, ...] = ()
     """What looks wrong and is not refused, a line each."""
     costs: Mapping[str, ConditionCost] = field(default_factory=dict)
@@ -146,15 +149,24 @@ class Plan:
             yield from self._decisions()
         if self.comparisons:
             yield ""
-            yield from power_text(n_seeds, self.comparisons, self.deviation, self.smallest)
-            text = (
-                f"Differences of success rates, every condition with the first, p adjusted; "
-                f"differences of single seeds are taken to deviate by {self.deviation:g}."
-            )
-            yield from wrap(text, WIDTH)
+            yield from self._power(n_seeds)
         yield from self._exponents()
         for warning in self.warnings:
             yield from wrap(warning, WIDTH)
+
+    def _power(self, seeds: int) -> Iterator[str]:
+        """Yield which differences that many seeds can find, and of what they are."""
+        unit = "" if self.deviation else " standard deviations"
+        deviation = self.deviation or 1.0
+        yield from power_text(seeds, self.comparisons, deviation, self.smallest, unit=unit)
+        what = "success rates" if self.measure.is_rate else "returns, as nothing is a success"
+        supposed = (
+            f"differences of single seeds are taken to deviate by {deviation:g}"
+            if self.deviation
+            else "how much those of single seeds deviate is not known before (--deviation)"
+        )
+        text = f"Differences of {what}, every condition with the first, p adjusted; {supposed}."
+        yield from wrap(text, WIDTH)
 
     def _exponents(self) -> Iterator[str]:
         """Yield which exponents of growth can be told apart, if sizes are swept."""
@@ -191,8 +203,8 @@ def plan(
     spec: Spec | Mapping[str, object] | Place,
     *,
     jobs: int | None = None,
-    deviation: float = USUAL_DEVIATION,
-    smallest: float = SMALLEST,
+    deviation: float | None = None,
+    smallest: float | None = None,
     timed: bool = True,
 ) -> Plan:
     """Return what a study will take and what it can find; some seconds a condition are run.
@@ -204,9 +216,10 @@ def plan(
     jobs
         Trials at a time; by default one for every core.
     deviation
-        Standard deviation that is supposed of the differences of single seeds.
+        Standard deviation that is supposed of the differences of single seeds; by default .25 of
+        success rates, and unknown of returns.
     smallest
-        The smallest difference of success rates that is of interest.
+        The smallest difference that is of interest; by default .2 of success rates.
     timed
         Whether to try the conditions out.
 
@@ -216,12 +229,18 @@ def plan(
         If the study cannot be run, or a number is out of range.
     """
     spec = Spec.read(spec)
-    for name, value in (("deviation", deviation), ("smallest", smallest)):
-        if not 0.0 < value <= 1.0:
-            raise SpecError(f"--{name} {value:g}: must be above 0 and at most 1")
     if jobs is not None:
         check_jobs(jobs)
-    examine(spec)
+    measure = main_measure(examine(spec))
+    for name, value in (("deviation", deviation), ("smallest", smallest)):
+        if value is not None and not 0.0 < value <= (1.0 if measure.is_rate else np.inf):
+            most = " and at most 1" if measure.is_rate else ""
+            raise SpecError(f"--{name} {value:g}: must be above 0{most}")
+    if measure.is_rate:
+        deviation = deviation or USUAL_DEVIATION
+        smallest = smallest or SMALLEST
+    elif deviation is None and smallest is not None:
+        raise SpecError(f"--smallest {smallest:g}: of returns it needs --deviation, too")
     trials = trials_of(spec)
     processes = max(1, min(jobs or cores(), len(trials)))
     estimate = _estimate(spec, trials, processes) if timed else (None, None, None, {})
@@ -234,6 +253,7 @@ def plan(
         likely=likely,
         memory=memory,
         comparisons=len(spec.conditions()) - 1,
+        measure=measure,
         deviation=deviation,
         smallest=smallest,
         warnings=spec.warnings(),

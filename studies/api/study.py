@@ -24,7 +24,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.interface.measures import SUCCESS
+from ...core.interface.measures import RETURN, SUCCESS
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
 from ...core.plugins.words import closest
@@ -155,8 +155,8 @@ class StudyResults:
     @property
     def power(self) -> tuple[str, ...]:
         """What comparisons with the first condition can find, as `compare` says it."""
-        is_measured = SUCCESS.name in (measure.name for measure in self.results.measures)
-        return power_with_first(self.results) if is_measured and self.results.phases else ()
+        is_own = self.results.measures and self.results.main.name in (SUCCESS.name, RETURN.name)
+        return power_with_first(self.results) if is_own and self.results.phases else ()
 
     @cached_property
     def analysis(self) -> Any:
@@ -181,7 +181,7 @@ class StudyResults:
             None, or ``condition``: all conditions with the first.
         measure
             A measure of episodes, ``steps``, ``return`` or a number of whole trials, by name; by
-            default the first, which is success in studies.
+            default the first, success in studies, or the return where nothing is a success.
         phase
             Of the episodes; by default ``evaluation``.
         reference
@@ -193,7 +193,7 @@ class StudyResults:
             If there is no such key, measure, phase or reference.
         """
         key = None if by == "condition" else by
-        name = self.results.measures[0].name if measure is None else measure
+        name = self.results.main.name if measure is None else measure
         compared = contrasts(self.results, name, phase, key, reference)
         return Comparison(compared, self._of_controls)
 

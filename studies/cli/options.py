@@ -220,7 +220,7 @@ measure = click.option(
     "--measure",
     metavar="NAME",
     help="A measure of episodes, steps, return, or a number of whole trials, as messages; by "
-    "default the first, success, or the first score of a table.",
+    "default the first, success (return where nothing is one), or the first score of a table.",
 )
 """What is compared, or fitted."""
 

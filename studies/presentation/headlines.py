@@ -3,12 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-from ...core.interface.measures import SUCCESS
-from ..results.analysis import EVALUATED, Difference
+from ..results.analysis import Difference, estimate_of
 from ..results.contrasts import contrasts
 from ..results.notation import bracketed
 from ..results.results import Results
-from ..results.statistics import LEVEL, rate
+from ..results.statistics import LEVEL
 from ..spec.controls import LEARN_NOTHING, control_of, is_drawn
 from .progress import count
 
@@ -17,10 +16,11 @@ MOST = 3
 
 
 def headlines(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return sentences that say what the teams of a study have learned, by success in evaluation.
+    """Return sentences that say what the teams of a study have learned, in evaluation.
 
-    A team has learned if it is significantly better than the control that differs from it in
-    learning alone, p adjusted over all conditions. None of teams without such a control.
+    They are judged by `Results.main`. A team has learned if it is significantly better than the
+    control that differs from it in learning alone, p adjusted over all conditions. None of teams
+    without such a control.
 
     Parameters
     ----------
@@ -34,9 +34,10 @@ def headlines(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tu
     if not 1 <= len(teams) <= MOST:
         return ()
     sentences: list[str] = []
+    main = results.main.name
     for team in teams:
         control = control_of(team, there)
-        measured = [c for c in (team, control) if c and results.has(c, "evaluation", SUCCESS.name)]
+        measured = [c for c in (team, control) if c and results.has(c, "evaluation", main)]
         if len(measured) == 2:
             sentences.append(_sentence(results, team, measured[1], there))
     return tuple(sentences)
@@ -46,21 +47,22 @@ def _sentence(
     results: Results, team: str, control: str, settings: Mapping[str, Mapping[str, Any]]
 ) -> str:
     """Return what is said of a team that learns, and of its controls."""
-    compared = contrasts(results, phase="evaluation", reference=team)
+    compared = contrasts(results, results.main.name, "evaluation", reference=team)
     less = {d.condition: d for d in compared.differences}
     counted = count(len(results.seeds(team)), "seed")
     is_learned = control in less and _is_below(less[control])
     verdict = f"learned ({counted})" if is_learned else f"is not seen to learn with {counted}"
-    parts = [f"untrained ({control}) {_success(results, control)}"]
+    parts = [f"untrained ({control}) {_evaluated(results, control)}"]
     for other, own in settings.items():
         is_control = own["learner"]["kind"] in LEARN_NOTHING and other != control
         if is_control and other in less and not is_drawn(own):
-            parts.append(f"{other} {_success(results, other)}, {_beside(less[other], counted)}")
-    return f"{team} {verdict}: {EVALUATED} {_success(results, team)}; {'; '.join(parts)}."
+            parts.append(f"{other} {_evaluated(results, other)}, {_beside(less[other], counted)}")
+    title = f"evaluation {results.main.heading}"
+    return f"{team} {verdict}: {title} {_evaluated(results, team)}; {'; '.join(parts)}."
 
 
-def _success(results: Results, condition: str) -> str:
-    return bracketed(rate(results.success(condition, "evaluation")))
+def _evaluated(results: Results, condition: str) -> str:
+    return bracketed(estimate_of(results, condition, "evaluation", results.main))
 
 
 def _is_below(difference: Difference) -> bool:

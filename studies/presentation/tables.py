@@ -24,7 +24,7 @@ from rich.table import Table
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.printing import printable
-from ...core.plugins.words import near
+from ...core.plugins.words import expect_each, near
 from ..errors import SpecError
 from ..results.analysis import Summary
 from ..results.notation import bracketed
@@ -282,6 +282,7 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
     SpecError
         If there are no estimates of a title.
     """
+    expect_each("titles of columns", str, columns=columns)
     titles = tuple(dict.fromkeys(title for line in lines for title in line.estimates))
     without_units = {title.partition(" [")[0]: title for title in titles}
     columns = [

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.interface.measures import SUCCESS
+from ...core.interface.measures import Measure
 from ...core.numerics import pd
 from ..errors import WIDTH
 from .notation import bracketed, signed, wrapped
@@ -39,19 +39,29 @@ class Summary(NamedTuple):
 
 
 def evaluated(results: Results, condition: str) -> dict[str, Estimate]:
-    """Return the success of a condition's trained teams by title, in its own scenario and others.
+    """Return how a condition's trained teams do by title, in its own scenario and others.
 
-    Those of `[evaluations]` are called ``success, NAME``.
+    By `Results.main`. Those of `[evaluations]` are called ``success, NAME``.
     """
-    if not results.has(condition, "evaluation", SUCCESS.name):
+    main = results.main
+    if not results.has(condition, "evaluation", main.name):
         return {}
     others = results.other_evaluations(condition).items()
-    phases = {EVALUATED: "evaluation", **{f"success, {name}": phase for name, phase in others}}
-    return {title: rate(results.success(condition, phase)) for title, phase in phases.items()}
+    phases = {
+        f"evaluation {main.heading}": "evaluation",
+        **{f"{main.heading}, {name}": phase for name, phase in others},
+    }
+    return {t: estimate_of(results, condition, phase, main) for t, phase in phases.items()}
 
 
-PHASES = {"training success": "training", EVALUATED: "evaluation"}
-"""Measures that conditions are compared by: success rates in these phases."""
+def estimate_of(
+    results: Results, condition: str, phase: str, measure: Measure, part: slice = slice(None)
+) -> Estimate:
+    """Return the mean of a measure of episodes, or of a part, with its interval over seeds."""
+    values = results.values(condition, measure.name, phase)[:, part]
+    if measure.is_rate:
+        return rate(values)
+    return bootstrap(values.mean(axis=1), bounds=measure.bounds)
 
 
 @dataclass(frozen=True)
@@ -203,11 +213,11 @@ def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> 
 
 
 def phases_of(results: Results) -> dict[str, str]:
-    """Return those of `PHASES` that all trained conditions have."""
+    """Return training and evaluation, if all trained conditions have them, by what is compared."""
     conditions = results.of_phase("training")
     return {
-        title: phase
-        for title, phase in PHASES.items()
+        f"{phase} {results.main.heading}": phase
+        for phase in ("training", "evaluation")
         if all(results.has(condition, phase) for condition in conditions)
     }
 
@@ -298,15 +308,16 @@ def _seems_contradicted(difference: Difference) -> bool:
 
 
 def judged(
-    groups: Mapping[str, Iterable[Pair]], less: str, measure: str = ""
+    groups: Mapping[str, Iterable[Pair]], less: str, measure: str = "", *, of_rates: bool = True
 ) -> tuple[dict[str, tuple[Difference, ...]], list[str]]:
     """Return the `differences` of groups, and their `verdicts`.
 
     `less` is what the reference is, `measure` what is compared, unless the groups say so.
     """
-    compared = differences(groups)
+    compared = differences(groups, of_rates=of_rates)
     heads = {group: ": ".join(filter(None, (group, measure))) for group in groups}
-    return compared, verdicts({f"{heads[g]}, less that of {less}": compared[g] for g in groups})
+    by_head = {f"{heads[g]}, less that of {less}": compared[g] for g in groups}
+    return compared, verdicts(by_head, of_rates=of_rates)
 
 
 def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:

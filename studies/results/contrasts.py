@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import RETURN, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
@@ -14,16 +14,17 @@ from .analysis import (
     Difference,
     Summary,
     differences,
+    estimate_of,
     identity_lines,
     select_shared,
     verdicts,
 )
 from .power import power_lines
 from .results import SECONDS, Results, describe_number
-from .statistics import Array, Estimate, bootstrap, rate
+from .statistics import Array, Estimate, bootstrap
 
 STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
-EPISODES = (STEPS, Measure("return", "return", "1", better="higher"))
+EPISODES = (STEPS, RETURN)
 """What is known of every episode besides the measures of its scenario."""
 
 
@@ -150,11 +151,11 @@ def contrasts(
 
 
 def power_with_first(results: Results) -> tuple[str, ...]:
-    """Return what comparisons of success with the first condition can find, line by line.
+    """Return what comparisons with the first condition by `Results.main` can find, in lines.
 
     As `contrasts` of the same say it, whose tests take seconds where seeds are thousands.
     """
-    measure, values, phase = values_of(results, SUCCESS.name, _usual_phase(results))
+    measure, values, phase = values_of(results, results.main.name, _usual_phase(results))
     base, *others = (values[c] for c in results.columns if c in values)
     pairs = [select_shared([own, base]) for own in others]
     samples = [own - reference for own, reference in pairs if len(own) >= 2]
@@ -172,8 +173,8 @@ def _estimate(
     results: Results, measure: Measure, phase: str, condition: str, means: BySeed
 ) -> Estimate:
     """Return the mean over seeds of a measure, or of a number of trials, with its interval."""
-    if phase and measure.is_rate:
-        return rate(results.values(condition, measure.name, phase))
+    if phase:
+        return estimate_of(results, condition, phase, measure)
     return bootstrap(means.to_numpy().astype(float), bounds=measure.bounds)
 
 

@@ -89,25 +89,22 @@ def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: 
     there = (vt @ slope)[:rank] / s[:rank]
     places = np.append(x, at) - x[0]
     walk = _integrated_wiener(places)
-    lines = []
-    for sigma in SIGMAS:
-        variance = sigma**2
-        inverse = np.linalg.inv(variance * walk[:-1, :-1] + (noise + EXACT) * np.eye(len(x)))
-        information = terms.T @ inverse @ terms
-        own = np.linalg.solve(information, terms.T @ inverse @ left)
-        rest = left - terms @ own
-        carried = inverse @ (variance * walk[:-1, -1])
-        unseen = there - terms.T @ carried
-        fit = -np.linalg.slogdet(inverse)[1] + np.linalg.slogdet(information)[1]
-        lines.append(
-            (
-                -0.5 * (fit + rest @ inverse @ rest),
-                there @ own + carried @ rest,
-                variance * (walk[-1, -1] - walk[:-1, -1] @ carried)
-                + unseen @ np.linalg.solve(information, unseen),
-            )
-        )
-    likelihoods, shifts, variances = np.array(lines).T
+    scales = SIGMAS**2
+    # Below, the first axis is that of SIGMAS.
+    inverse = np.linalg.inv(
+        scales[:, None, None] * walk[:-1, :-1] + (noise + EXACT) * np.eye(len(x))
+    )
+    information = terms.T @ inverse @ terms
+    own = np.linalg.solve(information, (terms.T @ (inverse @ left)[..., None]))[..., 0]
+    rest = left - own @ terms.T
+    carried = scales[:, None] * (inverse @ walk[:-1, -1])
+    unseen = there - carried @ terms
+    fit = np.linalg.slogdet(information)[1] - np.linalg.slogdet(inverse)[1]
+    misfit = np.einsum("si,sij,sj->s", rest, inverse, rest)
+    spread = np.linalg.solve(information, unseen[..., None])[..., 0]
+    likelihoods = -0.5 * (fit + misfit)
+    shifts = own @ there + (carried * rest).sum(axis=1)
+    variances = scales * (walk[-1, -1] - carried @ walk[:-1, -1]) + (unseen * spread).sum(axis=1)
     weights = PRIOR * np.exp(likelihoods - likelihoods.max())
     extra = np.maximum(variances - variances[0], 0.0)
     return Drift(weights / weights.sum(), shifts, extra)

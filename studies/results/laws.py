@@ -53,6 +53,8 @@ class Curve(NamedTuple):
     n_parameters: int
     of: Callable[[Array, Array], Array]
     """Its values for parameters ``(k,)`` at ``x`` ``(m,)``."""
+    slopes: Callable[[Array, Array], Array]
+    """Its derivatives by the parameters ``(m, k)`` there."""
     begins: Callable[[Array, Array], list[Array]]
     """Where a fit to values ``(m,)`` at ``x`` may begin."""
     exponents: Callable[[Array], dict[str, float]]
@@ -61,6 +63,10 @@ class Curve(NamedTuple):
 
 def _line(p: Array, x: Array) -> Array:
     return p[0] + p[1] * x
+
+
+def _line_slopes(p: Array, x: Array) -> Array:
+    return np.stack([np.ones_like(x), x], axis=1)
 
 
 def _line_begins(x: Array, y: Array) -> list[Array]:
@@ -72,8 +78,18 @@ def _quadratic(p: Array, x: Array) -> Array:
     return p[0] + x + np.log(np.exp(x) + np.exp(p[1]) - LEAST)
 
 
+def _quadratic_slopes(p: Array, x: Array) -> Array:
+    own = np.exp(p[1])
+    return np.stack([np.ones_like(x), own / (np.exp(x) + own - LEAST)], axis=1)
+
+
 def _with_floor(p: Array, x: Array) -> Array:
     return np.logaddexp(p[2], p[0] + p[1] * x)
+
+
+def _floor_slopes(p: Array, x: Array) -> Array:
+    share = special.expit(p[0] + p[1] * x - p[2])
+    return np.stack([share, share * x, 1.0 - share], axis=1)
 
 
 def _floor_begins(x: Array, y: Array) -> list[Array]:
@@ -86,6 +102,11 @@ def _broken(p: Array, x: Array) -> Array:
     return p[0] + p[1] * x + p[2] * np.maximum(0.0, x - p[3])
 
 
+def _broken_slopes(p: Array, x: Array) -> Array:
+    beyond = np.maximum(0.0, x - p[3])
+    return np.stack([np.ones_like(x), x, beyond, -p[2] * (x > p[3])], axis=1)
+
+
 def _broken_begins(x: Array, y: Array) -> list[Array]:
     begins = []
     for k in x[1:-1]:
@@ -94,12 +115,15 @@ def _broken_begins(x: Array, y: Array) -> list[Array]:
     return begins
 
 
-POWER = Curve("power law", 2, _line, _line_begins, lambda p: {"exponent": float(p[1])})
+POWER = Curve(
+    "power law", 2, _line, _line_slopes, _line_begins, lambda p: {"exponent": float(p[1])}
+)
 LOGISTIC = POWER._replace(name="logistic in log n")
 QUADRATIC = Curve(
     "linear to quadratic",
     2,
     _quadratic,
+    _quadratic_slopes,
     lambda x, y: [np.array([float((y - 2.0 * x).mean()), start]) for start in (0.0, 3.0)],
     lambda p: {"c of n (n + c)": float(np.exp(p[1]) - LEAST)},
 )
@@ -107,6 +131,7 @@ FLOOR = Curve(
     "power law with a floor",
     3,
     _with_floor,
+    _floor_slopes,
     _floor_begins,
     lambda p: {"exponent": float(p[1]), "floor": float(np.exp(p[2]))},
 )
@@ -114,6 +139,7 @@ BREAK = Curve(
     "break point",
     4,
     _broken,
+    _broken_slopes,
     _broken_begins,
     lambda p: {
         "exponent below": float(p[1]),
@@ -131,9 +157,15 @@ class Scale(NamedTuple):
     back: Callable[[Array], Array]
     """Returns values of fitted ones."""
 
+    def interval(self, known: Mixture, level: float = 0.9) -> Estimate:
+        """Return the median of a distribution of fitted values, and an interval around it."""
+        shares = (0.5, 0.5 - level / 2.0, 0.5 + level / 2.0)
+        return Estimate(*(np.asarray(self.back(np.asarray(known.quantile(p)))) for p in shares))
+
 
 LOG = Scale((POWER, QUADRATIC, FLOOR, BREAK), np.exp)
 LOGIT = Scale((LOGISTIC, BREAK), special.expit)
+DIFFERENCE = Scale((LOGISTIC, BREAK), np.array)
 
 
 class Sample(NamedTuple):
@@ -181,12 +213,12 @@ def apart(own: Sample, base: Sample) -> Sample:
     """Return by how much values lie above those of the same seeds at the same sizes, on the scale.
 
     What lets both grow alike is not in it, so that its law is left by less than theirs. Its values
-    are no logits, but may be negative, and have the same laws.
+    may be negative, and have the laws of logits.
     """
     both, first, second = np.intersect1d(own.sizes, base.sizes, return_indices=True)
     values = own.values[:, first] - base.values[:, second]
     censored = own.censored[:, first] | base.censored[:, second]
-    return Sample(both, values, censored, LOGIT)
+    return Sample(both, values, censored, DIFFERENCE)
 
 
 class Law(NamedTuple):
@@ -232,10 +264,7 @@ class Law(NamedTuple):
 
         Of numbers it is the geometric mean.
         """
-        known = self.distribution(size, seeds)
-        back = self.sample.scale.back
-        shares = (0.5, 0.5 - level / 2.0, 0.5 + level / 2.0)
-        return Estimate(*(np.asarray(back(np.asarray(known.quantile(p)))) for p in shares))
+        return self.sample.scale.interval(self.distribution(size, seeds), level)
 
     def distribution(self, size: float, seeds: int | None = None) -> Mixture:
         """Return the distribution of a prediction, on the scale."""
@@ -256,15 +285,10 @@ class Law(NamedTuple):
     def _drift(self, x: Array) -> Drift:
         """Return how far the law may be left at ``x`` ``(1,)``."""
         fitted = np.log(self.sample.sizes)
-        slopes = self._slopes(np.append(fitted, x))
+        slopes = self.curve.slopes(self.parameters, np.append(fitted, x))
         return drift(
             fitted, float(x[0]), self.left, slopes[:-1], slopes[-1], self.scatter / self.seeds
         )
-
-    def _slopes(self, x: Array) -> Array:
-        """Return the derivatives ``(m, k)`` of the law at ``x`` by its parameters."""
-        slopes = optimize.approx_fprime(self.parameters, lambda p: self.curve.of(p, x))
-        return np.atleast_2d(slopes)
 
     def curve_at(self, sizes: Array) -> Array:
         """Return the law's values ``(k,)`` at sizes."""
@@ -320,7 +344,14 @@ def _fitted(
     if not censored.any():
         if curve.of is _line:
             return _line_begins(x, means)[0]
-        fits = [optimize.least_squares(lambda p: curve.of(p, x) - means, own) for own in begins]
+
+        def off(p: Array) -> Array:
+            return curve.of(p, x) - means
+
+        def slopes(p: Array) -> Array:
+            return curve.slopes(p, x)
+
+        fits = [optimize.least_squares(off, own, slopes) for own in begins]
         return np.asarray(min(fits, key=lambda one: one.cost).x)
 
     def lack(p: Array) -> float:
@@ -381,9 +412,9 @@ def _held_out(curve: Curve, sample: Sample) -> list[tuple[float, tuple[float, fl
         law = fit(curve, sample.first(k), FEW_RESAMPLES)
         size = float(sample.sizes[k])
         mean = float(sample.values[:, k].mean())
-        density = law.distribution(size).log_density(mean)
+        known = law.distribution(size)
         measured = float(sample.scale.back(np.asarray(mean)))
-        checks.append((density, (size, measured, law.predict(size))))
+        checks.append((known.log_density(mean), (size, measured, sample.scale.interval(known))))
     return checks
 
 

@@ -244,6 +244,7 @@ def power_text(
     deviation: float | None,
     smallest: float | None,
     measure: str = "",
+    unit: str = "",
 ) -> list[str]:
     r"""Return lines on what paired seeds can tell, given the deviation of their differences.
 
@@ -257,6 +258,8 @@ def power_text(
         The smallest difference that is of interest; None: none is named.
     measure
         By what conditions are compared.
+    unit
+        Of differences, to be read after a number.
 
     Examples
     --------
@@ -284,8 +287,8 @@ def power_text(
         text += "would find cannot be determined."
     else:
         least = two_figures(detectable(deviation, seeds, comparisons))
-        text = f"with {counted}{among}, a difference of {least} is found with probability "
-        text += f"{two_figures(WANTED)}{within}."
+        text = f"with {counted}{among}, a difference of {least}{unit} is found with "
+        text += f"probability {two_figures(WANTED)}{within}."
         text += f" For a difference of {goal} it takes about {enough} seeds." if enough else ""
     return wrapped(f"Power: {text}")
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import RETURN, SUCCESS, Measure, main_measure
 from ...core.numerics import pd
 from ..spec.tables import SpecTable, flat, label
 from ..store.database import EVALUATION
@@ -121,6 +121,13 @@ class Results:
             for phase in self.phases
             if phase.startswith(EVALUATION) and self.has(condition, phase)
         }
+
+    @cached_property
+    def main(self) -> Measure:
+        """The measure by which conditions are judged: the first, or returns if nothing is one."""
+        main = main_measure(self.measures)
+        is_left_out = main == RETURN and self.episodes[RETURN.name].isna().all()
+        return self.measures[0] if is_left_out and self.measures else main
 
     @cached_property
     def identical(self) -> tuple[tuple[str, ...], ...]:

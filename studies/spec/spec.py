@@ -42,7 +42,7 @@ from ..store.database import DATABASE, SPEC_FILE
 from ..store.durable import read_text
 from .conditions import Condition, Curriculum, Length, Name, Override
 from .controls import LEARN_NOTHING, planning_remark
-from .layers import below, expand, grid, section, tuning_keys
+from .layers import SWEEP, below, expand, grid, section, tuning_keys
 from .presets import PRESETS
 from .studies import STUDIES
 from .tables import SpecTable, TomlTable, assignment, overlay
@@ -271,7 +271,7 @@ class Spec(Settings):
         try:
             spec = cls.model_validate(tuples(table), strict=True)
         except ValidationError as error:
-            raise SpecError(explain(error, cls, table, below(table))) from None
+            raise SpecError(explain(error, cls, table, below(table), SWEEP)) from None
         own = [override.sweep for override in spec.overrides] or [{}]
         points = sum(math.prod(map(len, {**swept, **spec.sweep}.values())) for swept in own)
         if points * len(spec.seeds) > MOST_TRIALS:

@@ -9,9 +9,9 @@ conditions and both measures.
 
 from collections.abc import Sequence
 
-from ...results.analysis import Analysis, Figures, Pair, Summary, judged, phases_of
+from ...results.analysis import Analysis, Figures, Pair, Summary, estimate_of, judged, phases_of
 from ...results.results import Results
-from ...results.statistics import exactly, rate
+from ...results.statistics import exactly
 from ..study import measure as measure
 
 PUBLISHED = ("success",)
@@ -27,17 +27,18 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
     """Return the analysis with conditions under these names, as many as have been trained."""
     conditions = dict(zip(names, results.of_phase("training"), strict=True))
     phases = phases_of(results)
+    main = results.main
     pairs: dict[str, list[Pair]] = {}
     for title, phase in phases.items() if len(conditions) > 1 else ():
-        means = {name: results.means(condition, phase) for name, condition in conditions.items()}
+        means = {name: results.means(c, phase, main.name) for name, c in conditions.items()}
         pairs[title] = [(name, title, own, means[names[0]]) for name, own in means.items()][1:]
-    compared, notes = judged(pairs, "".join(names[:1]))
+    compared, notes = judged(pairs, "".join(names[:1]), of_rates=main.is_rate)
     by_place = {(d.condition, d.measure): d.estimate for ds in compared.values() for d in ds}
     table = []
     for name, condition in conditions.items():
         estimates = {}
         for title, phase in phases.items():
-            estimates[title] = rate(results.success(condition, phase))
+            estimates[title] = estimate_of(results, condition, phase, main)
             estimates[f"{title}, difference"] = by_place.get((name, title), exactly(0.0))
         table.append(Summary(name, len(results.seeds(condition)), estimates))
     return Analysis(tuple(table), tuple(notes), differences=compared)

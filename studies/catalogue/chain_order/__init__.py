@@ -87,7 +87,7 @@ def order_tests(results: Results) -> tuple[OrderTest, ...]:
     conditions = results.of_phase("training")
     tests = []
     for title, phase in phases_of(results).items() if len(conditions) > 1 else ():
-        means = [results.means(condition, phase) for condition in conditions]
+        means = [results.means(condition, phase, results.main.name) for condition in conditions]
         values = np.stack(select_shared(means), axis=1)
         if len(values) >= 2:
             test = friedman(values)

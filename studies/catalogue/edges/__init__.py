@@ -85,9 +85,9 @@ def draw(analysis: Analysis) -> Figures:
     """
     from ...presentation.figures import draw_forest
 
-    names = {case.hierarchy for case in analysis.cases}
+    names = {case.hierarchy for case in analysis.cases if EVALUATED in case.values}
     figures = _draw_parted(analysis) if {*sum(PARTED, ())} <= names else {}
-    unit = f"success less that {TRAINED}"
+    unit = f"difference from {TRAINED}" if not names else f"success less that {TRAINED}"
     return figures | draw_forest("differences", analysis.differences, unit)
 
 

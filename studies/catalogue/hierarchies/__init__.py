@@ -1,11 +1,11 @@
 """The hierarchies study: which hierarchy it takes, at which size, at what cost.
 
 Conditions are topologies, crossed with whose value decides and with the number of robots; all meet
-the same worlds, seed by seed. One measure was fixed beforehand: evaluation success. For each number
-of robots and each choice of whose value decides, every hierarchy is compared with the chain (with
-the first hierarchy if there is no chain) by permutation of signs; p is adjusted by Holm's method
-over all of these comparisons. Few seeds cannot give a small p whatever the outcome: how many it
-takes is printed.
+the same worlds, seed by seed. One measure was fixed beforehand: evaluation success, or the return
+in tasks in which nothing is one. For each number of robots and each choice of whose value decides,
+every hierarchy is compared with the chain (with the first hierarchy if there is no chain) by
+permutation of signs; p is adjusted by Holm's method over all of these comparisons. Few seeds cannot
+give a small p whatever the outcome: how many it takes is printed.
 
 A trial is measured as one of the scaling study, messages included: one for every edge of the
 hierarchy's transitive closure. Decisions to the goal are those of successful episodes alone: a
@@ -19,9 +19,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import SpecError
-from ...results.analysis import EVALUATED, NOTHING, Analysis, Figures, Pair, Summary, judged
+from ...results.analysis import (
+    EVALUATED,
+    NOTHING,
+    Analysis,
+    Figures,
+    Pair,
+    Summary,
+    estimate_of,
+    judged,
+)
 from ...results.results import Results, Sizes
-from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exactly, rate
+from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exactly
 from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ..scaling import NUMBERS, measure
@@ -87,13 +96,15 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
         return Analysis(())
     hierarchies = [case.hierarchy for case in cases]
     reference = reference if reference in hierarchies else hierarchies[0]
-    success = [results.means(case.condition, case.phase) for case in cases]
-    bases = {c.setting: s for c, s in zip(cases, success, strict=True) if c.hierarchy == reference}
+    main = results.main
+    title = f"evaluation {main.heading}"
+    means = [results.means(case.condition, case.phase, main.name) for case in cases]
+    bases = {c.setting: m for c, m in zip(cases, means, strict=True) if c.hierarchy == reference}
     pairs: dict[str, list[Pair]] = {setting: [] for setting in bases}
-    for case, own in zip(cases, success, strict=True):
+    for case, own in zip(cases, means, strict=True):
         if case.setting in bases and case.hierarchy != reference:
-            pairs[case.setting].append((case.hierarchy, EVALUATED, own, bases[case.setting]))
-    judgement, lines = judged(pairs, reference, EVALUATED)
+            pairs[case.setting].append((case.hierarchy, title, own, bases[case.setting]))
+    judgement, lines = judged(pairs, reference, title, of_rates=main.is_rate)
     compared = {setting: own for setting, own in judgement.items() if own}
     notes = ["Rows: what else is swept, hierarchy."] * any(case.value_of for case in cases)
     return Analysis(tuple(table), (*notes, MESSAGES, "", *(lines or [NOTHING])), cases, compared)
@@ -102,9 +113,10 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
 def estimates(
     results: Results, condition: str, phase: str, deciding: Array, messages: Array
 ) -> dict[str, Estimate]:
-    """Return success, decisions to the goal, time of a decision [s] and messages, by title."""
+    """Return by title `Results.main`, decisions to the goal, time of a decision [s], messages."""
     success = results.success(condition, phase)
-    values = {EVALUATED: rate(success)}
+    main = results.main
+    values = {f"evaluation {main.heading}": estimate_of(results, condition, phase, main)}
     decisions = to_the_goal(success, results.values(condition, "steps", phase))
     if len(decisions):
         values["decisions to goal"] = bootstrap(decisions, bounds=NOT_NEGATIVE)
@@ -129,11 +141,12 @@ def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
     """Draw success and messages of a decision of one size, a row for every hierarchy."""
     from ...presentation import figures
 
+    main = next(iter(cases[0].values))
     rows = distinct(case.hierarchy for case in cases)
     whose = distinct(case.value_of for case in cases)
     offsets = figures.beside(len(whose))
     figure, panels = figures.panels(1, 2, (7.2, 1.3 + 0.36 * len(rows)), sharey=True)
-    for axes, title in zip(panels[0], (EVALUATED, "messages"), strict=True):
+    for axes, title in zip(panels[0], (main, "messages"), strict=True):
         for case in cases:
             i = whose.index(case.value_of)
             row = rows.index(case.hierarchy) + offsets[i]
@@ -143,7 +156,8 @@ def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
             )
         axes.set_xlabel(title)
         axes.grid(axis="x", alpha=0.25)
-    figures.as_rates(panels[0, 0], "x")
+    if main == EVALUATED:
+        figures.as_rates(panels[0, 0], "x")
     figures.name_rows(panels[0, 0], rows)
     if len(whose) > 1:
         names = [f"value of: {value_of}" for value_of in whose]
@@ -164,6 +178,7 @@ def draw(analysis: Analysis) -> Figures:
     cases = analysis.cases
     if len({case.robots for case in cases}) == 1:
         return {"hierarchies": _draw_dots(cases)}
+    main = next(iter(cases[0].values))
     hierarchies = distinct(case.hierarchy for case in cases)
     whose = distinct(case.value_of for case in cases)
     size = (max(5.6, 0.6 + 2.8 * len(whose)), 5.2)
@@ -171,7 +186,7 @@ def draw(analysis: Analysis) -> Figures:
     for column, value_of in zip(panels.T, whose, strict=True):
         for index, hierarchy in enumerate(hierarchies):
             own = [c for c in cases if (c.hierarchy, c.value_of) == (hierarchy, value_of)]
-            for axes, title in zip(column, (EVALUATED, DECIDING), strict=True):
+            for axes, title in zip(column, (main, DECIDING), strict=True):
                 robots = [case.robots for case in own]
                 values = [case.values[title] for case in own]
                 if own:
@@ -180,9 +195,10 @@ def draw(analysis: Analysis) -> Figures:
         column[1].set_xlabel(cases[0].sizes.word)
     for axes in panels.flat:
         figures.scale_axis(axes, sorted({case.robots for case in cases}))
-    figures.as_rates(panels[0, 0])
+    if main == EVALUATED:
+        figures.as_rates(panels[0, 0])
     figures.log_axis(panels[1, 0])
-    for axes, title in zip(panels[:, 0], (EVALUATED, "deciding [ms]"), strict=True):
+    for axes, title in zip(panels[:, 0], (main, "deciding [ms]"), strict=True):
         axes.set_ylabel(title)
     figures.name_lines(figure, hierarchies, "means over seeds, bars: 95 % intervals")
     return {"hierarchies": figure}

@@ -65,8 +65,11 @@ def effects(
 ) -> dict[str, tuple[Effect, Effect]]:
     """Return by hierarchy its effects on success and on decisions, over all settings.
 
-    Hierarchies of which fewer than two seeds are shared with the reference are left out.
+    Hierarchies of which fewer than two seeds are shared with the reference are left out; all, if
+    nothing is a success.
     """
+    if not results.main.is_rate:
+        return {}
     bases = {case.setting: case for case in cases if case.hierarchy == reference}
     compared: dict[str, list[HierarchyCase]] = {}
     for case in cases:

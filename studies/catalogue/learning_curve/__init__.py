@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 from ....core.interface.measures import SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
 from ...results.contrasts import EPISODES, STEPS
 from ...results.results import Array, Results
-from ...results.statistics import Estimate, bootstrap, rate, rates
+from ...results.statistics import Estimate, bootstrap, rates
 from ..study import measure as measure
 
 if TYPE_CHECKING:
@@ -44,18 +44,19 @@ Metric = tuple[str, Measure, str]
 """Heading of a column of the table, which measurement it is, and of which of `BLOCKS`."""
 
 
-def metrics_of(measures: Sequence[Measure], episodes: int) -> tuple[Metric, ...]:
+def metrics_of(measures: Sequence[Measure], main: Measure, episodes: int) -> tuple[Metric, ...]:
     """Return the columns of the table, given what is measured of an episode, and their number.
 
-    Success as it begins, as it ends and when evaluated; how the evaluation fares by other rates
-    and how many steps it takes; and every other measure at the end of training. Where training is
-    no longer than a block, its begin is its end.
+    The main measure as it begins, as it ends and when evaluated; how the evaluation fares by other
+    rates and how many steps it takes; and every other measure at the end of training. Where
+    training is no longer than a block, its begin is its end.
     """
+    title = main.heading
     others = [m for m in measures if m.name != SUCCESS.name]
     return (
-        *[(f"success first {BLOCK}", SUCCESS, "first")] * (episodes > BLOCK),
-        (f"success last {BLOCK}", SUCCESS, "last"),
-        (EVALUATED, SUCCESS, "evaluation"),
+        *[(f"{title} first {BLOCK}", main, "first")] * (episodes > BLOCK),
+        (f"{title} last {BLOCK}", main, "last"),
+        (f"evaluation {title}", main, "evaluation"),
         *((f"{m.title}, evaluation", m, "evaluation") for m in others if m.is_rate),
         ("evaluation steps", STEPS, "evaluation"),
         *((m.heading, m, "last") for m in others if not m.is_rate),
@@ -79,23 +80,22 @@ def analyse(results: Results) -> Analysis:
         return _of_evaluations(results)
     table = []
     measures = results.measures or EPISODES[1:]  # foreign ones may have the return alone
+    main = results.main
     for condition in conditions:
         estimates: dict[str, Estimate] = {}
         episodes = results.values(condition, measures[0].name).shape[1]
-        for title, m, block in metrics_of(measures, episodes):
+        for title, m, block in metrics_of(measures, main, episodes):
             phase = "evaluation" if block == "evaluation" else "training"
             if results.has(condition, phase, m.name):  # published results keep a part
-                values = results.values(condition, m.name, phase)[:, BLOCKS[block]]
-                means = values.mean(axis=1)
-                estimates[title] = rate(values) if m.is_rate else bootstrap(means, bounds=m.bounds)
-            if title == EVALUATED:
+                estimates[title] = estimate_of(results, condition, phase, m, BLOCKS[block])
+            if title == f"evaluation {main.heading}":
                 estimates |= evaluated(results, condition)
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
     _leave_out_same(table)
     followed = []
-    for m in measures:
+    for m in dict.fromkeys((main, *measures)):
         own = [c for c in conditions if results.has(c, "training", m.name)]
-        if own and (m.name == SUCCESS.name or not m.is_rate):
+        if own and (m == main or not m.is_rate):
             followed.append((m, {c: results.values(c, m.name) for c in own}))
     return Analysis(tuple(table), cases=followed)
 
@@ -118,9 +118,7 @@ def _of_evaluations(results: Results) -> Analysis:
     for condition in results.of_phase("evaluation"):
         estimates = {}
         for m in results.measures:
-            values = results.values(condition, m.name, "evaluation")
-            means = values.mean(axis=1)
-            estimates[m.heading] = rate(values) if m.is_rate else bootstrap(means, bounds=m.bounds)
+            estimates[m.heading] = estimate_of(results, condition, "evaluation", m)
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
     return Analysis(tuple(table))
 

@@ -11,9 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, judged
+from ...results.analysis import (
+    EVALUATED,
+    Analysis,
+    Figures,
+    Summary,
+    estimate_of,
+    evaluated,
+    judged,
+)
 from ...results.results import Results
-from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stack_estimates
+from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, stack_estimates
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
@@ -61,8 +69,8 @@ class LearningCourse(NamedTuple):
     """Its label."""
     decisions: Array
     """``(k,)`` decisions experienced until each evaluation, means over seeds."""
-    success: Estimate
-    """The evaluations' success rates ``(k,)``."""
+    values: Estimate
+    """What the evaluations come to, by `Results.main` ``(k,)``."""
 
 
 def evaluated_after(results: Results, condition: str) -> dict[int, str]:
@@ -78,6 +86,8 @@ def evaluated_after(results: Results, condition: str) -> dict[int, str]:
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("evaluation")
+    main = results.main
+    title = f"evaluation {main.heading}"
     table = []
     courses = []
     for condition in conditions:
@@ -85,33 +95,33 @@ def analyse(results: Results) -> Analysis:
         numbers = results.numbers(condition)
         episodes = steps.shape[1]
         stopped = evaluated_after(results, condition)
-        success = {n: rate(results.success(condition, phase)) for n, phase in stopped.items()}
-        estimates = {f"success, {count}": estimate for count, estimate in success.items()}
+        values = {n: estimate_of(results, condition, phase, main) for n, phase in stopped.items()}
+        estimates = {f"{main.heading}, {count}": estimate for count, estimate in values.items()}
         estimates |= evaluated(results, condition)
         estimates["decisions"] = bootstrap(steps.sum(axis=1), bounds=NOT_NEGATIVE)
         if f"{CPU}{episodes}" in numbers:
             estimates["CPU [s]"] = bootstrap(numbers[f"{CPU}{episodes}"], bounds=NOT_NEGATIVE)
         table.append(Summary(condition, len(steps), estimates))
-        success[episodes] = estimates[EVALUATED]
-        decisions = [steps[:, :count].sum(axis=1).mean() for count in success]
+        values[episodes] = estimates[title]
+        decisions = [steps[:, :count].sum(axis=1).mean() for count in values]
         courses.append(
             LearningCourse(
                 condition,
                 np.array(decisions),
-                stack_estimates([*success.values()]),
+                stack_estimates([*values.values()]),
             )
         )
     if not courses:
         return Analysis(())
-    means = [results.means(condition, "evaluation") for condition in conditions]
-    pairs = [(c, EVALUATED, own, means[0]) for c, own in zip(conditions, means, strict=True)]
-    compared, lines = judged({EVALUATED: pairs[1:]}, conditions[0])
-    notes = ("success, N: when evaluated after N episodes of training.", *lines)
+    means = [results.means(condition, "evaluation", main.name) for condition in conditions]
+    pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
+    compared, lines = judged({title: pairs[1:]}, conditions[0], of_rates=main.is_rate)
+    notes = (f"{main.heading}, N: when evaluated after N episodes of training.", *lines)
     return Analysis(tuple(table), notes, courses, compared)
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: evaluation success against experience, a panel for each condition.
+    """Return the figure: evaluations against experience, a panel for each condition.
 
     The condition's line has a colour, and a band for its 95 % intervals; those of the others are
     grey.
@@ -121,20 +131,22 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures as f  # matplotlib takes its time
 
     courses = analysis.cases
+    (title,) = analysis.differences
     figure, panels = f.grid(len(courses), 4, (2.3, 1.5), (0.2, 0.6), sharex=True, sharey=True)
     for axes, own in zip(panels.flat, courses, strict=False):
         for other in courses:
-            axes.plot(other.decisions, other.success.value, color="#c9ccd2", lw=0.8)
-        f.draw_curve(axes, own.decisions, own.success, 0, alpha=0.15, marker="o", markersize=3.5)
+            axes.plot(other.decisions, other.values.value, color="#c9ccd2", lw=0.8)
+        f.draw_curve(axes, own.decisions, own.values, 0, alpha=0.15, marker="o", markersize=3.5)
         axes.set_title(own.condition, loc="left", fontsize=8)
         f.log_axis(axes, "x")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-        f.as_rates(axes)
+        if title == EVALUATED:
+            f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
     for axes in panels.flat[len(courses) - panels.shape[1] : len(courses)]:
         axes.tick_params(labelbottom=True)
     figure.supxlabel("decisions of training", fontsize=9)
-    figure.supylabel(EVALUATED, fontsize=9)
+    figure.supylabel(title, fontsize=9)
     return {"peers": figure}
 
 

@@ -18,10 +18,18 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.numerics import FloatArray, pd
-from ...results.analysis import EVALUATED, Analysis, Figures, Summary, evaluated, select_shared
+from ...results.analysis import (
+    EVALUATED,
+    Analysis,
+    Figures,
+    Summary,
+    estimate_of,
+    evaluated,
+    select_shared,
+)
 from ...results.notation import bracketed, two_decimals
 from ...results.results import Results, Sizes
-from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly
 from ...spec.tables import label_but
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
@@ -34,14 +42,14 @@ PUBLISHED = ("success",)
 TIMES = {"deciding": "decision [ms]", "learning": "learning [ms]"}
 """Times whose growth with the number of agents is estimated, by what they are of."""
 PANELS = (
-    (EVALUATED, EVALUATED, "linear"),
     ("decision [ms]", "deciding, per step [ms]", "log"),
     ("learning [ms]", "learning, per step [ms]", "log"),
     ("team [MB]", "arrays of the team [MB]", "log"),
     ("process [MB]", "process, peak [MB]", "linear"),
     ("messages", "messages passed down, per step", "symlog"),
 )
-"""What the figure shows, its titles, and the scale of the axis; agents may pass no messages."""
+"""What the figure shows beside evaluation, its titles, and the scale of the axis; agents may pass
+no messages."""
 MEMORY = Path("/proc/self/status")
 CLEAR = Path("/proc/self/clear_refs")
 
@@ -146,7 +154,9 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
     }
     if "process_bytes" in numbers:
         costs["process [MB]"] = 1e-6 * numbers["process_bytes"]
-    values = {"success last 5": rate(results.success(condition)[:, -5:])}
+    main = results.main
+    last = estimate_of(results, condition, "training", main, slice(-5, None))
+    values = {f"{main.heading} last 5": last}
     values |= evaluated(results, condition)
     if "all_touching" in numbers:
         values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
@@ -192,7 +202,9 @@ def draw(analysis: Analysis) -> Figures:
     points = analysis.cases
     evaluators = distinct(p.evaluator for p in points)
     figure, panels = figures.panels(2, 3, (8.4, 5.2), sharex=True)
-    for axes, (name, title, scale) in zip(panels.flat, PANELS, strict=True):
+    main = next((t for t in points[0].values if t.startswith("evaluation ")), EVALUATED)
+    first = (main, main, "linear")
+    for axes, (name, title, scale) in zip(panels.flat, (first, *PANELS), strict=True):
         for index, evaluator in enumerate(evaluators):
             own = [p for p in points if p.evaluator == evaluator and name in p.values]
             if own:
@@ -205,8 +217,10 @@ def draw(analysis: Analysis) -> Figures:
         else:
             axes.set_yscale(scale, **({"linthresh": 1.0} if scale == "symlog" else {}))
             axes.yaxis.set_major_formatter("{x:,.10g}")
-            axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
-    figures.as_rates(panels[0, 0])
+            if axes.get_ylim()[1] > 0.0:
+                axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
+    if main == EVALUATED:
+        figures.as_rates(panels[0, 0])
     for period in {p.period for p in points if p.period is not None}:
         panels[0, 1].axhline(1e3 * period, color="#888888", linewidth=0.8, ls=":")
     for axes in panels.flat:

@@ -156,16 +156,26 @@ class Supposed(TypedDict):
     """What a plan supposes."""
 
     jobs: int | None
-    deviation: float
-    smallest: float
+    deviation: float | None
+    smallest: float | None
     timed: bool
 
 
 @click.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.jobs
-@options.number("--deviation", "SD", 0.25, "Supposed standard deviation of differences of seeds.")
-@options.number("--smallest", "D", 0.2, "The smallest difference of success rates of interest.")
+@click.option(
+    "--deviation",
+    type=float,
+    metavar="SD",
+    help="Supposed standard deviation of differences of seeds; by default 0.25 of success rates.",
+)
+@click.option(
+    "--smallest",
+    type=float,
+    metavar="D",
+    help="The smallest difference of interest; by default 0.2 of success rates.",
+)
 @click.option("--timed/--no-timed", default=True, help="Try episodes of every condition.")
 @options.trust
 @options.changes

@@ -124,6 +124,6 @@ def test_there_is_a_panel_for_every_number(further, tmp_path):
 
 
 def test_success_alone_makes_a_table():
-    assert [title for title, *_ in metrics_of((SUCCESS,), 20)] == [
+    assert [title for title, *_ in metrics_of((SUCCESS,), SUCCESS, 20)] == [
         "success first 5", "success last 5", "evaluation success", "evaluation steps",
     ]  # fmt: skip

@@ -49,7 +49,7 @@ def test_success_against_experience(tmp_path: Path) -> None:
     analysis = analyse(made_up().frames())
     ours, _ = analysis.cases
     assert ours.decisions.tolist() == [100, 500, 1000]
-    assert ours.success.value.tolist() == [0, 1, 1]
+    assert ours.values.value.tolist() == [0, 1, 1]
     assert list(analysis.table[0].estimates) == [
         "success, 2", "success, 10", "evaluation success", "decisions", "CPU [s]"
     ]  # fmt: skip

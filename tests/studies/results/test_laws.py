@@ -77,6 +77,14 @@ def test_intervals_cover_laws_whose_exponent_wanders() -> None:
     assert 0.86 <= inside / times <= 0.94, inside / times
 
 
+@pytest.mark.parametrize("curve", [*laws.LOG.curves, laws.LOGISTIC], ids=lambda curve: curve.name)
+def test_slopes_are_derivatives(curve) -> None:
+    x, p = np.log(SIZES), np.array([0.4, 0.7, -0.3, 2.0])[: curve.n_parameters]
+    steps = 1e-6 * np.eye(len(p))
+    each = [(curve.of(p + step, x) - curve.of(p - step, x)) / 2e-6 for step in steps]
+    np.testing.assert_allclose(curve.slopes(p, x), np.transpose(each), rtol=0, atol=1e-8)
+
+
 def test_a_break_is_met_by_a_fit() -> None:
     def broken(n):
         return np.where(n < 8.0, n**0.2, 8.0**0.2 * (n / 8.0) ** 1.5)
