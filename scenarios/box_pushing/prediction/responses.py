@@ -107,15 +107,8 @@ def _holds(plan: _Plan, robot: int) -> bool:
 
 
 @njit(cache=True)
-def _value(
-    robots: IntArray,
-    value: float,
-    plan: _Plan,
-    contacts: Contacts,
-    outlook: Outlook,
-    wanted: Wanted,
-) -> None:
-    """Value the actions of some robots around a plan that is worth `value`."""
+def _varied(robots: IntArray, plan: _Plan, outlook: Outlook) -> IntArray:
+    """Return the wheel commands ``(M, m)`` in which one of some robots departs from a plan."""
     n_actions = outlook.which.shape[1]
     who, commands = np.empty((2, len(robots) * n_actions), np.int64)
     m = 0
@@ -128,13 +121,18 @@ def _value(
     for i in range(len(choices)):
         for c in range(m):
             choices[i, c] = commands[c] if who[c] == i else plan.commands[i]
-    worths: FloatArray = np.empty(0)
-    if m > 0:
-        worths = _worths(choices, contacts, outlook, wanted)
+    return choices
+
+
+@njit(cache=True)
+def _value(
+    robots: IntArray, value: float, worths: FloatArray, plan: _Plan, outlook: Outlook
+) -> None:
+    """Value the actions of robots, by what their departures from a plan of a value are worth."""
     m = 0
     for r in robots:
         plan.around[r] = plan.commands
-        for a in range(n_actions):
+        for a in range(outlook.which.shape[1]):
             first = outlook.alike[r, a]
             if outlook.which[r, a] == plan.commands[r]:
                 plan.worths[r, a] = value
@@ -241,7 +239,10 @@ def respond(
             if not _holds(plan, r):
                 depth = min(2 * depth, MOST_AHEAD) if k == reach else 1
                 reach = min(k + depth, n)
-                _value(order[k:reach], value, plan, contacts, outlook, wanted)
+                ahead = order[k:reach]
+                # A kernel more between this and `_worths` would take three seconds to compile.
+                worths = _worths(_varied(ahead, plan, outlook), contacts, outlook, wanted)
+                _value(ahead, value, worths, plan, outlook)
             if decides:
                 own = joint[r * wheels : (r + 1) * wheels]
                 best = _decide(r, plan.worths[r], own, n_actions, exploring, rng)
