@@ -409,7 +409,8 @@ class Spec(Settings):
         tuned = tuning_keys([*(f"learner.{key}" for key in self.learner), *self.sweep])
         tuned = [key for key in tuned if key != "learner.kind"]
         if tuned and controls:
-            yield f"{', '.join(tuned)}: left out for {labels}, which learn nothing"
+            learn = "learns" if len(controls) == 1 else "learn"
+            yield f"{', '.join(tuned)}: left out for {labels}, which {learn} nothing"
         for control in controls:
             if control.same:
                 others = join_names(map(repr, control.same), MOST_KEYS)
