@@ -171,7 +171,9 @@ def rules_table(
             lines.append((rule, *consequents))
         lines.append(("", *[""] * len(parts)))
     names, *columns = zip(*lines, strict=True)
-    heads = pd.MultiIndex.from_tuples([name.rpartition(".")[::2] for name in agents])
+    heads: pd.Index = pd.Index(agents)
+    if any("." in name for name in agents):
+        heads = pd.MultiIndex.from_tuples([name.rpartition(".")[::2] for name in agents])
     frame = pd.DataFrame(list(zip(*columns, strict=True)), index=names, columns=heads)
     return frame.to_string(line_width=WIDTH, sparsify=False).replace("  \\\n", "\n")
 
