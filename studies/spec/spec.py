@@ -342,7 +342,9 @@ class Spec(Settings):
         try:
             text = read_text(path)
         except OSError as error:
-            raise SpecError(f"{path}: {error.strerror or error}") from None
+            own = path / SPEC_FILE
+            hint = f"; the spec of this study is {own}" if own.is_file() else ""
+            raise SpecError(f"{path}: {error.strerror or error}{hint}") from None
         except UnicodeDecodeError:
             raise SpecError(f"{path}: is not UTF-8 text") from None
         is_copy = path.name == SPEC_FILE and (path.parent / DATABASE).exists()

@@ -302,3 +302,21 @@ def test_names_stay_with_their_shares():
     lines = explain_text._wrapped(sentence).splitlines()
     assert len(lines) > 1
     assert all(line.startswith("variable_") and line.endswith("%,") for line in lines)
+
+
+@pytest.mark.parametrize("condition", ["fitted-q", "random"])
+def test_a_team_of_a_budget_of_decisions_is_trained_again(condition, tmp_path, capsys) -> None:
+    table = {"study": "experience", "seeds": 1, "decisions": 40, "steps": 5, "evaluation": 1}
+    table |= {"scenario": {"kind": "spread"}}
+    own = {"learner": {"kind": "fitted-q"}} if condition == "fitted-q" else {"preset": "random"}
+    kept = na.run(table | {"overrides": [{"name": condition, **own}]}, tmp_path, jobs=1)
+    assert f"{condition}, seed 0: the team after 40 decisions" in str(kept.explain())
+
+
+def test_networks_are_not_explained(tmp_path, capsys) -> None:
+    table = {"study": "experience", "seeds": 1, "decisions": 40, "steps": 5, "evaluation": 1}
+    learner = {"kind": "ippo", "worlds": 2, "rollout": 10, "batch_size": 20}
+    na.run(table | {"scenario": {"kind": "spread"}, "learner": learner}, tmp_path, jobs=1)
+    assert main(["explain", str(tmp_path)]) == 2
+    needed = "learner.kind = 'ippo': explain needs agents with rule bases"
+    assert needed in capsys.readouterr().err
