@@ -171,14 +171,15 @@ def atlas(
         print_text("", "What faults cost")
         print_lines([*map(str, costs), *thresholds(costs)])
     if figures is not None:
-        from ..studies.presentation.figures import write
+        from ..studies.presentation.figures import apply_style, write
         from .atlas_figures import FIGURES
 
         before = frame["source"] == ALREADY  # a task of both has two sets of seeds
         frame["task"] = frame["task"].mask(before, frame["task"] + ", published")
         figures.mkdir(parents=True, exist_ok=True)
         for name, draw in FIGURES.items():
-            write(draw(frame), figures / f"{name}.png")
+            with apply_style():
+                write(draw(frame), figures / f"{name}.png")
     return 0
 
 

@@ -100,3 +100,59 @@ def test_a_wrong_argument_is_one_line(
 def test_the_argument_its_value_and_what_is_allowed_are_named() -> None:
     with pytest.raises(ValueError, match=r"^agents = 6, allowed: the names of agents$"):
         na.build_hierarchy("tree:2", **{"agents": 6})
+
+
+SEQUENCES: dict[tuple[str, str], tuple[object, ...]] = {
+    ("bootstrap", "bounds"): (0.0,),
+    ("build_hierarchy", "agents"): ("a",),
+    ("build_hierarchy", "interactions"): ((0, 1),),
+    ("check_scenario", "seeds"): (0,),
+    ("check_scenario", "episodes"): (0,),
+    ("compare_table", "condition"): ("condition",),
+    ("compare_table", "score"): ("score",),
+    ("cost_table", "topologies"): ("chain",),
+    ("cost_table", "agents"): (2,),
+    ("run", "track"): (),
+    ("Hierarchy", "agents"): ("a",),
+    ("Hierarchy", "edges"): (("a", "b"),),
+    ("Hierarchy", "neighbours"): (("a", "b"),),
+    ("state_variable", "centres"): (0.0,),
+    ("state_variable", "labels"): ("near",),
+}
+"""What sequences may begin with, by function and argument."""
+JOINED = {"settings": {"kind": "coordination-graph", "shape": "scenario"}, "agents": ["a", "b"]}
+
+
+@pytest.mark.parametrize("wrong", [None, [], object()])
+@pytest.mark.parametrize(("name", "argument"), SEQUENCES)
+def test_a_wrong_element_is_named_with_its_index(name, argument, wrong, monkeypatch) -> None:
+    monkeypatch.chdir(Path(__file__).parent)
+    first = SEQUENCES[name, argument]
+    given = VALID[name] | (JOINED if argument == "interactions" else {})
+    given |= {argument: [*first, wrong]}
+
+    def call() -> None:
+        made = getattr(na, name)(**given)
+        made(lambda view, body: 0.0)  # a state variable is made by what this returns
+
+    with pytest.raises(ValueError, match=rf"{argument}\[{len(first)}\] = .*(allowed|must be)") as e:
+        call()
+    assert "\n" not in str(e.value)
+
+
+def test_pairs_are_of_two_and_of_indices_that_there_are() -> None:
+    with pytest.raises(ValueError, match=r"^edges\[0\] = \['a'\], allowed: pairs of names$"):
+        na.Hierarchy(("a", "b"), [("a",)])
+    with pytest.raises(ValueError, match=r"interactions\[1\] = \(0, 2\): must be pairs of agent"):
+        na.build_hierarchy(**JOINED, interactions=[(0, 1), (0, 2)])
+
+
+def test_elements_given_to_loaded_studies_are_named(tmp_path: Path) -> None:
+    kept = na.run(SPEC, tmp_path, jobs=1)
+    for call in (
+        lambda: kept.table([3]),
+        lambda: na.load(tmp_path, columns=[3]),
+        lambda: na.scaling_law(kept, predict=["x"]),
+    ):
+        with pytest.raises(ValueError, match=r"(columns|predict)\[0\] = (3|'x'), allowed: "):
+            call()

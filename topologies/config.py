@@ -24,7 +24,7 @@ from ..core.numerics import nx
 from ..core.plugins import sources
 from ..core.plugins.registry import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
-from ..core.plugins.words import closest, expect
+from ..core.plugins.words import closest, expect, expect_each
 from .builders import Bodies, Names, check_names, from_networkx, quote
 from .files import read_file
 from .strings import ARGUMENTS, Keys
@@ -210,6 +210,7 @@ def build(
         settings = parse(settings)
     expect("the names of agents", Sequence, agents=agents)
     expect("sequences of indices", Sequence | None, bodies=bodies, interactions=interactions)
+    expect_each("the names of agents", str, agents=agents)
     title = settings.title
     named: Bodies = [(a,) for a in agents]
     try:
@@ -218,7 +219,7 @@ def build(
         if bodies is not None:
             named = _named(agents, bodies)
         if interactions is not None and dict(settings).get("shape") == "scenario":
-            pairs = tuple((agents[a], agents[b]) for a, b in interactions)
+            pairs = _pairs(agents, interactions)
             settings = settings.model_copy(update={"edges": pairs})
         if settings.kind in TOPOLOGIES.built_in:
             graph = settings.build(agents, named)
@@ -304,6 +305,20 @@ def _named(agents: Names, bodies: Sequence[Sequence[int]]) -> Bodies:
         raise ValueError(f"bodies = {quote(bodies)}: must be {allowed}") from None
     check_names([name for body in named for name in body], agents, "bodies")
     return named
+
+
+def _pairs(agents: Names, interactions: Sequence[Sequence[int]]) -> tuple[tuple[str, str], ...]:
+    """Return pairs of names for pairs of indices; refuse what is none."""
+    indices = range(len(agents))
+    named = []
+    for k, pair in enumerate(interactions):
+        try:
+            first, second = (agents[indices.index(i)] for i in pair)
+        except (TypeError, ValueError):
+            allowed = f"pairs of agent indices, 0 to {len(agents) - 1}"
+            raise ValueError(f"interactions[{k}] = {quote(pair)}: must be {allowed}") from None
+        named.append((first, second))
+    return tuple(named)
 
 
 def _arguments(kind: str, text: str) -> Keys:

@@ -30,7 +30,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator
 
 from ..numerics import nx
-from ..plugins.words import expect
+from ..plugins.words import expect, expect_each, expect_pairs
 from .picture import svg
 
 ARROW, LINE = "{} -> {}", "{} - {}"
@@ -100,13 +100,18 @@ class Hierarchy:
     ) -> None:
         expect("the names of agents", Collection, agents=agents)
         expect("pairs of names", Iterable, edges=edges, neighbours=neighbours, bodies=bodies)
-        agents, edges = tuple(agents), [(str(a), str(b)) for a, b in edges]
+        expect_each("the names of agents", str, agents=agents)
+        pairs = tuple(edges)
+        beside_each_other = tuple(neighbours)
+        expect_pairs("pairs of names", edges=pairs, neighbours=beside_each_other)
+        agents = tuple(agents)
+        edges = [(str(a), str(b)) for a, b in pairs]
         if not agents:
             raise ValueError("hierarchy: no agents")
         for name in agents:
             if agents.count(name) > 1:
                 raise ValueError(f"hierarchy: agent {name!r} is named more than once")
-        sides = [(str(a), str(b)) for a, b in neighbours]
+        sides = [(str(a), str(b)) for a, b in beside_each_other]
         if sides and considers not in ("descendants", "children"):
             raise ValueError(
                 f"hierarchy: considers = {considers!r}: neighbours consider each other; without "

@@ -16,11 +16,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
+from numbers import Real
 from typing import Literal
 
 import numpy as np
 
 from ..numerics import FloatArray, IntArray
+from ..plugins.words import expect_each
 
 FARTHEST = 1000.0
 """Ranges of a variable beyond which its value cannot be meant."""
@@ -61,6 +63,8 @@ class Variable:
             raise ValueError(
                 f"variable {self.name!r}: range [{self.low}, {self.high}] must be finite, low first"
             )
+        expect_each("numbers", Real, centres=self.centres)
+        expect_each("words", str, labels=self.labels)
         ordered = all(a < b for a, b in zip(self.centres, self.centres[1:], strict=False))
         inside = all(self.low <= c <= self.high for c in self.centres)
         if not (ordered and inside):

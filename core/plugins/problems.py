@@ -127,6 +127,7 @@ def explain(
     model: type[BaseModel],
     table: Table,
     outer: tuple[type[BaseModel], Table] | None = None,
+    swept_in: str = "",
 ) -> str:
     """Return one line on the first thing that pydantic found wrong with a table.
 
@@ -140,6 +141,8 @@ def explain(
         As the user gave it.
     outer
         Model and table of all that a misplaced key may belong to; none: `model` and `table`.
+    swept_in
+        The table where values to compare stand; empty: there is none.
     """
     problems = problems_of(error, table)
     # Where a name or a table may stand and a table does, what is wrong is in the table.
@@ -155,14 +158,14 @@ def explain(
         return f"{problem.path if is_there else dotted((*problem.keys, name))}: missing"
     if kind_of_problem == "plugged_kind":
         kind = entry(problem.details["input"], "kind")
-        hint = several((*problem.keys, "kind"), kind, "")
+        hint = several((*problem.keys, "kind"), kind, "", swept_in)
         return f"{_on_kind(problem)}{problem.details['msg']}{hint}"
     if kind_of_problem.startswith("union_tag"):
         return _on_unknown_kind(problem, model, table)
     # The members of a union complain one by one about the same place: say what any would take.
     same = [p for p in problems if p.keys == problem.keys]
     text = ", or ".join(dict.fromkeys(rule(p.details["msg"]) for p in same))
-    return _on_value(problem, text, model, table)
+    return _on_value(problem, text, model, table, swept_in)
 
 
 def _on_unknown_key(
@@ -197,7 +200,9 @@ def _on_unknown_kind(problem: Complaint, model: type[BaseModel], table: Table) -
     return f"{_on_kind(problem)}{hint}{_pointer(problem.keys, kind, model, table)}"
 
 
-def _on_value(problem: Complaint, text: str, model: type[BaseModel], table: Table) -> str:
+def _on_value(
+    problem: Complaint, text: str, model: type[BaseModel], table: Table, swept_in: str
+) -> str:
     if not problem.keys:
         return text
     value = problem.details["input"]
@@ -206,20 +211,22 @@ def _on_value(problem: Complaint, text: str, model: type[BaseModel], table: Tabl
     hint = ""
     if owner is not None and is_other_type:
         hint = mistaken(problem.keys[-1], owner.model_fields, problem.details["type"])
-    hint = hint or _pointer(problem.keys, value, model, table) or several(problem.keys, value, text)
+    hint = hint or _pointer(problem.keys, value, model, table)
+    hint = hint or several(problem.keys, value, text, swept_in)
     return f"{problem.path} = {show(value)}: {text}{hint}"
 
 
-def several(keys: Keys, value: object, text: str) -> str:
+def several(keys: Keys, value: object, text: str, swept_in: str) -> str:
     """Return where the values of a key of a section stand if a list was given for one value.
 
     Examples
     --------
-    >>> several(("scenario", "robots"), [2, 4], "must be a whole number")
+    >>> several(("scenario", "robots"), [2, 4], "must be a whole number", "sweep")
     '; values to compare stand in sweep'
     """
     is_one = isinstance(value, list | tuple) and len(keys) > 1 and isinstance(keys[-1], str)
-    return "; values to compare stand in sweep" * (is_one and "list" not in text)
+    is_meant = swept_in and is_one and "list" not in text
+    return f"; values to compare stand in {swept_in}" if is_meant else ""
 
 
 def _pointer(keys: Keys, value: object, model: type[BaseModel], table: Table) -> str:

@@ -73,3 +73,42 @@ def expect(allowed: str, kind: type | UnionType, /, **arguments: object) -> None
     for name, value in arguments.items():
         if not isinstance(value, kind):
             raise ValueError(f"{name} = {show(value)}, allowed: {allowed}")
+
+
+def expect_each(
+    allowed: str, kind: type | UnionType, /, **sequences: Iterable[object] | None
+) -> None:
+    """Refuse elements of sequences given to a public function that are of no allowed type.
+
+    Parameters
+    ----------
+    allowed
+        What is allowed, in words.
+    kind
+        The types of it.
+    **sequences
+        By name; None has no elements.
+
+    Raises
+    ------
+    ValueError
+        If one is of another type; it names the argument, the index, its value, what is allowed.
+
+    Examples
+    --------
+    >>> expect_each("the names of agents", str, agents=["a", 6])
+    Traceback (most recent call last):
+    ValueError: agents[1] = 6, allowed: the names of agents
+    """
+    for name, values in sequences.items():
+        for index, value in enumerate(() if values is None else values):
+            expect(allowed, kind, **{f"{name}[{index}]": value})
+
+
+def expect_pairs(allowed: str, /, **sequences: Iterable[object]) -> None:
+    """Refuse elements of sequences that are no pairs, as `expect_each` does."""
+    expect_each(allowed, list | tuple, **sequences)
+    for name, pairs in sequences.items():
+        for index, pair in enumerate(pairs):
+            if isinstance(pair, list | tuple) and len(pair) != 2:
+                raise ValueError(f"{name}[{index}] = {show(pair)}, allowed: {allowed}")

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.plugins.words import expect, show
+from ...core.plugins.words import expect, expect_each, show
 from .frames import Examination
 from .promises import (
     check_form,
@@ -134,6 +134,7 @@ def check_scenario(
         raise ValueError(f"factory = {show(factory)}, allowed: what makes a scenario")
     expect("whole numbers", Integral, steps=steps)
     expect("lists of whole numbers", Sequence, seeds=seeds, episodes=episodes)
+    expect_each("whole numbers", Integral, seeds=seeds, episodes=episodes)
     if steps < LEAST_STEPS:
         raise ValueError(f"steps = {steps}: must be at least {LEAST_STEPS}")
     for name, numbers, least in (("seeds", seeds, 2), ("episodes", episodes, 1)):

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
+from numbers import Integral
 from typing import TYPE_CHECKING
 
-from ...core.plugins.words import expect
+from ...core.plugins.words import expect, expect_each
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import scaling_law as laws_of_results
 from .study import StudyResults
@@ -84,6 +85,7 @@ def scaling_law(
         If there is no such measure, phase or size.
     """
     expect("what load or run returned", StudyResults, study=study)
+    expect_each("whole numbers", Integral, predict=predict)
     results = study.results
     name = results.main.name if measure is None else measure
     law = laws_of_results.scaling_law(

@@ -10,7 +10,7 @@ from typing import Literal
 
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
-from ...core.plugins.words import expect
+from ...core.plugins.words import expect, expect_each
 from ..errors import SpecError
 from ..results import foreign, published
 from ..results.parts import join_parts
@@ -50,6 +50,7 @@ def load(
         raise SpecError("load: needs a directory at least")
     for place in places:
         expect("paths of studies or files", str | PathLike, places=place)
+    expect_each("pairs of a role and a column, ROLE=COLUMN", str, columns=columns)
     paths = [Path(place) for place in places]
     _check_distinct(paths)
     is_table = [path.suffix in foreign.SUFFIXES for path in paths]
@@ -109,6 +110,7 @@ def compare_table(
     -0.23
     """
     expect("a table of pandas or the path of a file", pd.DataFrame | str | PathLike, table=table)
+    expect_each("names of columns", str, condition=condition, score=score)
     frame = table if isinstance(table, pd.DataFrame) else foreign.read_table(Path(table))
     names = foreign.ScoreColumns(_several(condition), _several(score), seed, item)
     return _of_table(foreign.results_of(frame, names, better)).compare(by, reference=reference)

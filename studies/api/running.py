@@ -15,7 +15,7 @@ from pathlib import Path
 from ...core.functions.recorded import AnswersError, RecordedAnswers
 from ...core.interface.measures import Measure
 from ...core.plugins.sources import ANSWERS, Answers, Checkpoints, is_reference
-from ...core.plugins.words import expect
+from ...core.plugins.words import expect, expect_each
 from ..catalogue.study import load_study, measure_by_name
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
@@ -232,6 +232,7 @@ def run(
     out = Path(out)
     spec = Spec.read(spec, study=out)
     listener = observer or (Terminal() if progress else Observer())
+    expect_each("names of trackers", str, track=track)
     if track:
         from .tracking import Tracking
 

@@ -11,13 +11,14 @@ from dataclasses import asdict, astuple, dataclass
 from fractions import Fraction
 from html import escape
 from itertools import product
+from numbers import Integral
 from textwrap import wrap
 from typing import Literal
 
 from ...core.agents.cost import Problem, is_chain
 from ...core.evaluators.enumeration import AutoSettings
 from ...core.numerics import pd
-from ...core.plugins.words import expect
+from ...core.plugins.words import expect, expect_each
 from ...topologies.view import align, format_count
 from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex
@@ -280,6 +281,9 @@ def cost_table(
     """
     expect("names of topologies", Sequence | None, topologies=topologies)
     expect("numbers of agents", Iterable, agents=agents)
+    numbers = list(agents)
+    expect_each("names of topologies", str, topologies=topologies)
+    expect_each("numbers of agents", Integral, agents=numbers)
     expect("a Problem", Problem, problem=problem)
     if not 1 <= repeats <= MOST_REPEATS:
         raise ValueError(f"repeats = {repeats}, allowed: 1 to {MOST_REPEATS}")
@@ -289,7 +293,7 @@ def cost_table(
     named = [m.groups() if m else (t, t) for m, t in zip(matches, topologies, strict=True)]
     labels = [label for label, _ in named]
     rows = []
-    for (label, text), n in product(named, agents):
+    for (label, text), n in product(named, numbers):
         if labels.count(label) > 1:
             raise ValueError(f"topology = {label!r} more than once; name each: LABEL={text}")
         below = () if text in {SINGLE_AGENT, *WAYS} else agents_below(text, n)

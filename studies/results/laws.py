@@ -165,6 +165,7 @@ class Scale(NamedTuple):
 
 LOG = Scale((POWER, QUADRATIC, FLOOR, BREAK), np.exp)
 LOGIT = Scale((LOGISTIC, BREAK), special.expit)
+DIFFERENCE = Scale((LOGISTIC, BREAK), np.array)
 
 
 class Sample(NamedTuple):
@@ -212,12 +213,12 @@ def apart(own: Sample, base: Sample) -> Sample:
     """Return by how much values lie above those of the same seeds at the same sizes, on the scale.
 
     What lets both grow alike is not in it, so that its law is left by less than theirs. Its values
-    are no logits, but may be negative, and have the same laws.
+    may be negative, and have the laws of logits.
     """
     both, first, second = np.intersect1d(own.sizes, base.sizes, return_indices=True)
     values = own.values[:, first] - base.values[:, second]
     censored = own.censored[:, first] | base.censored[:, second]
-    return Sample(both, values, censored, LOGIT)
+    return Sample(both, values, censored, DIFFERENCE)
 
 
 class Law(NamedTuple):

@@ -289,7 +289,8 @@ def power_text(
         least = two_figures(detectable(deviation, seeds, comparisons))
         text = f"with {counted}{among}, a difference of {least}{unit} is found with "
         text += f"probability {two_figures(WANTED)}{within}."
-        text += f" For a difference of {goal} it takes about {enough} seeds." if enough else ""
+        if enough and goal != least:
+            text += f" For a difference of {goal} it takes about {enough} seeds."
     return wrapped(f"Power: {text}")
 
 

@@ -13,13 +13,14 @@ paired one flips the signs of the differences of n seeds, so its p is a multiple
 import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.numerics import special, stats
-from ...core.plugins.words import show
+from ...core.plugins.words import expect_each, show
 
 Array = NDArray[np.float64]
 
@@ -98,6 +99,7 @@ def bootstrap(
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '2.50 [0.45, 4.55]'
     """
+    expect_each("numbers", Real, bounds=bounds)
     array = _numbers(values, "values")
     if array.ndim not in (1, 2) or len(array) == 0:
         raise ValueError(

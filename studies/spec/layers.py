@@ -37,6 +37,8 @@ from .presets import PRESETS
 from .tables import SpecTable, TomlTable, flat, label, nested, overlay, scalar, without
 
 SECTIONS = ("scenario", "topology", "learner")
+SWEEP = "sweep"
+"""The table of values to compare."""
 
 Layer = SpecTable
 """A table, or a point of a sweep, that is laid over what is below it."""
@@ -280,7 +282,7 @@ def _settle(given: Layers, own: Layers, where: str) -> Resolved:
             settings = ConditionSettings.model_validate(tuples(table), strict=True)
         except ValidationError as error:
             refused_keys = [_key(problem.keys) for problem in problems_of(error, table)]
-            line = explain(error, ConditionSettings, table) + where
+            line = explain(error, ConditionSettings, table, swept_in=SWEEP) + where
         else:
             refused_keys = [*_refused(settings.learner)]
             line = ""
@@ -396,7 +398,7 @@ def _validated(table: TomlTable, where: str) -> ConditionSettings:
     try:
         return ConditionSettings.model_validate(tuples(table), strict=True)
     except ValidationError as error:
-        raise SpecError(explain(error, ConditionSettings, table) + where) from None
+        raise SpecError(explain(error, ConditionSettings, table, swept_in=SWEEP) + where) from None
 
 
 def section(name: str, value: object) -> TomlTable:
@@ -412,7 +414,7 @@ def section(name: str, value: object) -> TomlTable:
     is_topology = name.rpartition(".")[2] == "topology"
     if not is_topology or not isinstance(value, str):
         allowed = "must be a name or a table" if is_topology else "must be a table"
-        hint = several((name, "kind"), value, allowed) * is_topology
+        hint = several((name, "kind"), value, allowed, SWEEP) * is_topology
         raise SpecError(f"{name} = {show(value)}: {allowed}{hint}")
     with refused(name.removesuffix("topology")):
         return parse(value).model_dump()

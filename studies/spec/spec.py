@@ -42,7 +42,7 @@ from ..store.database import DATABASE, SPEC_FILE
 from ..store.durable import read_text
 from .conditions import Condition, Curriculum, Length, Name, Override
 from .controls import LEARN_NOTHING, planning_remark
-from .layers import below, expand, grid, section, tuning_keys
+from .layers import SWEEP, below, expand, grid, section, tuning_keys
 from .presets import PRESETS
 from .studies import STUDIES
 from .tables import SpecTable, TomlTable, assignment, overlay
@@ -271,7 +271,7 @@ class Spec(Settings):
         try:
             spec = cls.model_validate(tuples(table), strict=True)
         except ValidationError as error:
-            raise SpecError(explain(error, cls, table, below(table))) from None
+            raise SpecError(explain(error, cls, table, below(table), SWEEP)) from None
         own = [override.sweep for override in spec.overrides] or [{}]
         points = sum(math.prod(map(len, {**swept, **spec.sweep}.values())) for swept in own)
         if points * len(spec.seeds) > MOST_TRIALS:
@@ -342,7 +342,9 @@ class Spec(Settings):
         try:
             text = read_text(path)
         except OSError as error:
-            raise SpecError(f"{path}: {error.strerror or error}") from None
+            own = path / SPEC_FILE
+            hint = f"; the spec of this study is {own}" if own.is_file() else ""
+            raise SpecError(f"{path}: {error.strerror or error}{hint}") from None
         except UnicodeDecodeError:
             raise SpecError(f"{path}: is not UTF-8 text") from None
         is_copy = path.name == SPEC_FILE and (path.parent / DATABASE).exists()
@@ -409,7 +411,8 @@ class Spec(Settings):
         tuned = tuning_keys([*(f"learner.{key}" for key in self.learner), *self.sweep])
         tuned = [key for key in tuned if key != "learner.kind"]
         if tuned and controls:
-            yield f"{', '.join(tuned)}: left out for {labels}, which learn nothing"
+            learn = "learns" if len(controls) == 1 else "learn"
+            yield f"{', '.join(tuned)}: left out for {labels}, which {learn} nothing"
         for control in controls:
             if control.same:
                 others = join_names(map(repr, control.same), MOST_KEYS)

@@ -272,7 +272,8 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         """
         choices, view = self._view_again(joint_actions)
         space = self.premises.space
-        speeds = speeds_of(choices, self.wheel_commands.speeds)
+        by_robot = np.ascontiguousarray(choices.T)
+        speeds = speeds_of(by_robot, self.wheel_commands.speeds)
         poses: FloatArray = np.zeros((0, 3))
         if space.own_needs_pose:
             of_robots = view.robots.transpose(1, 0, 2)

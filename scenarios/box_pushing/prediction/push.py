@@ -25,14 +25,27 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics import BoolArray, FloatArray, IntArray, njit
-from ..world.geometry import LANES, nearest_points, surface
+from ..world.geometry import LANES, SIDE, SQUARE
 from ..world.robots import resistance
 from ..world.settings import RobotSettings
 from . import push_lanes as lanes
-from .push_lanes import BODY_SIZE, BOX_SIZE, MARGIN
+from .push_lanes import BODY_SIZE, BOX_SIZE, FIXED, MARGIN
 
 SUBSTEPS = 4
 SWEEPS = 4
+VECTOR = 8
+"""Lanes are used by so many at a time."""
+ASKED = (
+    lanes.AHEAD,
+    lanes.LEFT,
+    lanes.TURN,
+    lanes.WANT_N,
+    lanes.WANT_T,
+    lanes.FORCE_N,
+    lanes.FORCE_T,
+    lanes.ACTIVE,
+)
+"""The rows of a robot that hang on what it is asked for; there are no forces at first."""
 ROUNDED = 1e-9
 """What rounding may make of a gap, or a way [m]."""
 
@@ -56,6 +69,56 @@ class PushModel(NamedTuple):
     """rho [m]."""
     contact_friction: float
     """Coefficient of friction between robot and box."""
+
+
+class Contacts(NamedTuple):
+    """How robots stand and may touch the box at first, which is the same in all combinations."""
+
+    rows: FloatArray
+    """``(M, FIXED)`` one number for each of the first rows of `push_lanes`."""
+    gaps: FloatArray
+    """``(M,)`` [m]."""
+    asked: FloatArray
+    """``(M, K, 9)`` the rows `ASKED` under every twist, and the greatest way in a substep [m]."""
+
+
+@njit(cache=True)
+def contacts_of(
+    robots: FloatArray, box: FloatArray, twists: FloatArray, seconds: float, model: PushModel
+) -> Contacts:
+    """Return the contacts of robots ``(M, 3)``, each asked for twists ``(M, K, 3)``."""
+    n, count = twists.shape[:2]
+    rows, gaps, asked = np.empty((n, FIXED)), np.empty(n), np.empty((n, count, len(ASKED) + 1))
+    bodies, shared = np.zeros((n, BODY_SIZE)), np.zeros((1, BOX_SIZE))
+    box_rows, nearest, dt = shared[0], shared[0, lanes.NEAREST :], seconds / SUBSTEPS
+    radii, compliance, rounding = model.radii, model.compliance, model.rounding
+    for first in range(0, count, LANES):
+        used = min(LANES, count - first)
+        width = (used + VECTOR - 1) // VECTOR * VECTOR
+        for j in range(3):
+            for k in range(width):
+                shared[0, j * LANES + k] = box[j]
+        lanes.head(shared, 0, width)
+        for r in range(n):
+            for j in range(3):
+                for k in range(width):
+                    bodies[r, j * LANES + k] = robots[r, j]
+                for k in range(used):
+                    bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, first + k, j]
+            lanes.head(bodies, r, width)
+            lanes.locate(bodies, r, box_rows, nearest, model.edges, width)
+            lanes.touch(bodies, r, box_rows, radii[r], rounding, compliance, dt, width)
+            for k in range(used):
+                for j in range(len(ASKED)):
+                    asked[r, first + k, j] = bodies[r, ASKED[j] + k]
+                ahead, left, turn = twists[r, first + k]
+                half = 0.5 * dt * turn  # makes chords longer, see `lanes.move`
+                square = (1.0 + 0.25 * half**4) * (ahead * ahead + left * left)
+                asked[r, first + k, len(ASKED)] = dt * np.sqrt(square)
+            for j in range(FIXED):
+                rows[r, j] = bodies[r, j * LANES]
+            gaps[r] = np.sqrt(nearest[SQUARE]) * nearest[SIDE] - rounding - radii[r]
+    return Contacts(rows, gaps, asked)
 
 
 def push(
@@ -89,7 +152,8 @@ def push(
         Robot poses ``(m, M, 3)``, box poses ``(m, 3)`` and gaps ``(m, M)`` [m]; in memory the
         combinations stand next to each other.
     """
-    after, boxes, gaps = pushed(robots, box, twists, choices, seconds, model)
+    by_robot = np.ascontiguousarray(choices.T)
+    after, boxes, gaps = pushed(robots, box, twists, by_robot, seconds, model)
     return after.transpose(2, 0, 1), boxes.T, gaps.T
 
 
@@ -104,64 +168,89 @@ def pushed(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return what `push` does with the combinations last: ``(M, 3, m)``, ``(3, m)``, ``(M, m)``.
 
-    Transposing within a kernel would take as long to compile as half of the arithmetic.
+    So are the choices, ``(M, m)``. Transposing within a kernel would take as long to compile as
+    half of the arithmetic.
     """
-    m, n = choices.shape
+    contacts = contacts_of(robots, box, twists, seconds, model)
+    return pushed_on(contacts, box, choices, seconds, model)
+
+
+@njit(cache=True)
+def pushed_on(
+    contacts: Contacts, box: FloatArray, choices: IntArray, seconds: float, model: PushModel
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what `pushed` does, by the contacts of the robots."""
+    n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     dt = seconds / SUBSTEPS
-    gaps, way, spare = np.empty(n), np.empty(n), np.empty(n)
-    cos, sin = np.cos(box[2]), np.sin(box[2])
-    for r in range(n):
-        dx, dy = robots[r, 0] - box[0], robots[r, 1] - box[1]
-        apart = surface(model.edges, model.rounding, cos * dx + sin * dy, cos * dy - sin * dx)[0]
-        gaps[r] = apart - model.radii[r]
-    bodies, shared = np.zeros((n, BODY_SIZE)), np.zeros(BOX_SIZE)
-    near = np.zeros(n, np.bool_)
+    bodies, shared = np.empty((n, BODY_SIZE)), np.zeros((1, BOX_SIZE))
+    way, spare, near = np.empty(n), np.empty(n), np.empty(n, np.bool_)
+    nearest = shared[0, lanes.NEAREST :]
     for first in range(0, m, LANES):
         used = min(LANES, m - first)
         # Whole vectors are faster than their ends: lanes beyond repeat the last one.
-        width = (used + 7) // 8 * 8
+        width = (used + VECTOR - 1) // VECTOR * VECTOR
         for j in range(3):
             for k in range(width):
-                shared[j * LANES + k] = box[j]
-        # How far robots may move in a substep, and what is left of their gaps until they may touch.
+                shared[0, j * LANES + k] = box[j]
         for r in range(n):
-            fastest, last = 0.0, -1
-            for k in range(width):
-                choice = choices[first + min(k, used - 1), r]
-                for j in range(3):
-                    bodies[r, j * LANES + k] = robots[r, j]
-                    bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, choice, j]
-                if choice != last:
-                    last, ahead, left = choice, twists[r, choice, 0], twists[r, choice, 1]
-                    half = 0.5 * dt * twists[r, choice, 2]  # makes chords longer, see `lanes.move`
-                    fastest = max(fastest, (1.0 + 0.25 * half**4) * (ahead * ahead + left * left))
-            way[r] = dt * np.sqrt(fastest)
-            spare[r] = gaps[r] - 2.0 * way[r] - MARGIN - ROUNDED
+            way[r] = _begin(bodies, r, contacts, choices, first, used, width)
+            spare[r] = contacts.gaps[r] - 2.0 * way[r] - MARGIN - ROUNDED
         moved = 0.0
         for substep in range(SUBSTEPS):
             moved = _substep(bodies, shared, near, substep, way, spare, moved, dt, model, width)
-        lanes.head(shared, width)
+        lanes.head(shared, 0, width)
         for r in range(n):
-            lanes.move(bodies[r], model.radii[r], model.compliance[r], dt, width)
-            lanes.localise(bodies[r], shared, width)
-            nearest_points(model.edges, shared[lanes.NEAREST :], width)
+            lanes.move(bodies, r, model.radii[r], model.compliance, dt, width)
+            lanes.locate(bodies, r, shared[0], nearest, model.edges, width)
             for k in range(used):
-                gap = np.sqrt(shared[lanes.SQUARE + k]) * shared[lanes.SIDE + k]
+                gap = np.sqrt(nearest[SQUARE + k]) * nearest[SIDE + k]
                 out_gaps[r, first + k] = gap - model.rounding - model.radii[r]
             for j in range(3):
                 for k in range(used):
                     out_robots[r, j, first + k] = bodies[r, j * LANES + k]
         for j in range(3):
             for k in range(used):  # slices that are assigned take seconds to compile
-                out_box[j, first + k] = shared[j * LANES + k]
+                out_box[j, first + k] = shared[0, j * LANES + k]
     return out_robots, out_box, out_gaps
+
+
+@njit(cache=True)
+def _begin(
+    bodies: FloatArray,
+    r: int,
+    contacts: Contacts,
+    choices: IntArray,
+    first: int,
+    used: int,
+    width: int,
+) -> float:
+    """Let a robot stand as it does at first; return how far at most it moves in a substep."""
+    rows, asked = contacts.rows, contacts.asked
+    for j in range(FIXED):
+        row = rows[r, j]
+        for k in range(width):
+            bodies[r, j * LANES + k] = row
+    chosen, others = choices[r, first + used - 1], 0
+    for k in range(used):
+        others += 1 if choices[r, first + k] != chosen else 0
+    mixed = used if others > 0 else 0
+    for j in range(len(ASKED)):
+        row = asked[r, chosen, j]
+        for k in range(width):
+            bodies[r, ASKED[j] + k] = row
+        for k in range(mixed):
+            bodies[r, ASKED[j] + k] = asked[r, choices[r, first + k], j]
+    way = asked[r, chosen, len(ASKED)]
+    for k in range(mixed):
+        way = max(way, asked[r, choices[r, first + k], len(ASKED)])
+    return way
 
 
 @njit(cache=True)
 def _substep(
     bodies: FloatArray,
-    box: FloatArray,
+    shared: FloatArray,
     near: BoolArray,
     substep: int,
     way: FloatArray,
@@ -176,27 +265,24 @@ def _substep(
     The robots are moved when they are next looked at, which saves to go through them once more.
     Taken and returned is by how much the surface of the box may have `moved` in all.
     """
-    rho2 = model.friction_radius**2
-    lanes.head(box, width)
+    rho2, box, nearest = model.friction_radius**2, shared[0], shared[0, lanes.NEAREST :]
+    radii, compliance, rounding = model.radii, model.compliance, model.rounding
+    lanes.head(shared, 0, width)
     lanes.rest(box, rho2, model.friction_force, width)
     touching = False
     for r in range(len(bodies)):
-        body, radius, compliance = bodies[r], model.radii[r], model.compliance[r]
         if substep > 0:
-            lanes.move(body, radius, compliance, dt, width)
-        lanes.head(body, width)
-        lanes.release(body, width)
-        near[r] = False
-        if spare[r] <= substep * way[r] + moved:
-            lanes.localise(body, box, width)
-            nearest_points(model.edges, box[lanes.NEAREST :], width)
-            near[r] = lanes.touch(body, box, radius, model.rounding, compliance, dt, width) > 0
-            touching = touching or near[r]
+            lanes.move(bodies, r, radii[r], compliance, dt, width)
+            lanes.head(bodies, r, width)
+        near[r] = spare[r] <= substep * way[r] + moved
+        if near[r] and substep > 0:
+            lanes.locate(bodies, r, box, nearest, model.edges, width)
+            count = lanes.touch(bodies, r, box, radii[r], rounding, compliance, dt, width)
+            near[r] = count > 0
+        touching = touching or near[r]
     if touching:
         for _ in range(SWEEPS):
-            for r in range(len(bodies)):
-                if near[r]:
-                    lanes.answer(bodies[r], box, model.contact_friction, width)
+            lanes.answer(bodies, near, box, model.contact_friction, width)
             lanes.drag(box, rho2, model.friction_force, width)
     return moved + lanes.carry(box, model.reach, dt, width)
 
@@ -285,7 +371,7 @@ def outcomes(
     """
     n = len(robots)
     moved = np.empty((len(constants), n + 1, 3))
-    requested, choices = np.expand_dims(twists, 1), np.zeros((1, n), np.int64)
+    requested, choices = np.expand_dims(twists, 1), np.zeros((n, 1), np.int64)
     for p in range(len(constants)):
         model = believing(belief, constants[p])
         after, boxes, _ = pushed(robots, box, requested, choices, seconds, model)

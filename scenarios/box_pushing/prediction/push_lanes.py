@@ -3,15 +3,16 @@
 Every quantity of a joint action is one row of a scratch array, the joint actions of a chunk stand
 next to each other in it, and every loop runs over them without a branch: so that the compiler can
 use the vector instructions of the processor. Rows of `body` belong to one robot, rows of `box` to
-the box and to what is passed between functions. All scratch is flat, as a loop over a row at a
-constant offset is what compilers see through. The readable definition, some thousand times slower,
-is the oracle of the tests, `tests/scenarios/box_pushing/push_oracle.py`.
+the box and to what is passed between functions. A loop over a row at a constant offset is what
+compilers see through. Functions are told which robot, n, is meant: to hand over the rows of one
+robot takes as long as the arithmetic of eight joint actions. The readable definition, some thousand
+times slower, is the oracle of the tests, `tests/scenarios/box_pushing/push_oracle.py`.
 """
 
 import numpy as np
 
-from ....core.numerics import FloatArray, njit
-from ..world.geometry import LANES, NEAREST_SIZE
+from ....core.numerics import BoolArray, FloatArray, njit
+from ..world.geometry import LANES, NEAREST_SIZE, nearest_points
 
 CREEP = 0.002
 """Speed of the box [m/s] below which ground friction is taken as viscous."""
@@ -33,6 +34,8 @@ MARGIN = 0.01
     ACTIVE,  # 1 if the robot may touch the box within the substep, else 0
 ) = range(0, 20 * LANES, LANES)  # fmt: skip
 BODY_SIZE = ACTIVE + LANES
+FIXED = YIELD_TT // LANES + 1
+"""How many of the first rows are the same whatever a robot is asked for, but for that itself."""
 
 # Those of the box: pose and heading as for a robot, velocity, how readily it moves, the wrench of
 # all contacts on it.
@@ -51,14 +54,14 @@ _EXACT = {"contract", "nsz"}
 
 
 @njit(cache=True, fastmath=_EXACT)
-def head(rows: FloatArray, lanes: int) -> None:
-    """Write cosine and sine of the heading: to the last bit but one, for any sane angle.
+def head(bodies: FloatArray, n: int, lanes: int) -> None:
+    """Write cosine and sine of a heading: to the last bit but one, for any sane angle.
 
     The angle is reduced to an eighth of a turn on either side of a quarter, in two steps for
     accuracy, and the polynomials there are those of Sun's fdlibm.
     """
     for k in range(lanes):
-        x = rows[PSI + k]
+        x = bodies[n, PSI + k]
         quarters = np.floor(x * 0.6366197723675814 + 0.5)
         r = x - quarters * 1.57079632673412561417 - quarters * 6.07710050650619224932e-11
         z = r * r
@@ -79,23 +82,30 @@ def head(rows: FloatArray, lanes: int) -> None:
         quarter = quarters - 4.0 * np.floor(0.25 * quarters)
         odd = quarter == 1.0 or quarter == 3.0
         sine, cosine = c if odd else s, s if odd else c
-        rows[SIN + k] = -sine if quarter >= 2.0 else sine
-        rows[COS + k] = -cosine if quarter == 1.0 or quarter == 2.0 else cosine
+        bodies[n, SIN + k] = -sine if quarter >= 2.0 else sine
+        bodies[n, COS + k] = -cosine if quarter == 1.0 or quarter == 2.0 else cosine
 
 
 @njit(cache=True, fastmath=_EXACT)
-def localise(body: FloatArray, box: FloatArray, lanes: int) -> None:
-    """Write where the robot is in the frame of the box."""
+def locate(
+    bodies: FloatArray, n: int, box: FloatArray, rows: FloatArray, edges: FloatArray, lanes: int
+) -> None:
+    """Write where a robot is in the frame of the box, and the point of the box next to it.
+
+    `rows` are those of `nearest_points`.
+    """
     for k in range(lanes):
-        dx, dy = body[X + k] - box[X + k], body[Y + k] - box[Y + k]
+        dx, dy = bodies[n, X + k] - box[X + k], bodies[n, Y + k] - box[Y + k]
         cos, sin = box[COS + k], box[SIN + k]
         box[LOCAL_X + k] = cos * dx + sin * dy
         box[LOCAL_Y + k] = cos * dy - sin * dx
+    nearest_points(edges, rows, lanes)
 
 
 @njit(cache=True, fastmath=_EXACT)
 def touch(
-    body: FloatArray,
+    bodies: FloatArray,
+    n: int,
     box: FloatArray,
     radius: float,
     rounding: float,
@@ -103,16 +113,16 @@ def touch(
     dt: float,
     lanes: int,
 ) -> int:
-    """Write the contact rows of a robot; return in how many lanes it may touch the box."""
-    c00, c01, c02 = compliance[0, 0], compliance[0, 1], compliance[0, 2]
-    c10, c11, c12 = compliance[1, 0], compliance[1, 1], compliance[1, 2]
-    c20, c21, c22 = compliance[2, 0], compliance[2, 1], compliance[2, 2]
+    """Write the contact rows of a robot that is located; return in how many lanes it may touch."""
+    c00, c01, c02 = compliance[n, 0, 0], compliance[n, 0, 1], compliance[n, 0, 2]
+    c10, c11, c12 = compliance[n, 1, 0], compliance[n, 1, 1], compliance[n, 1, 2]
+    c20, c21, c22 = compliance[n, 2, 0], compliance[n, 2, 1], compliance[n, 2, 2]
     touching = 0
     for k in range(lanes):
         ahead, left, turn = (
-            body[AHEAD + k],
-            body[LEFT + k],
-            body[TURN + k],
+            bodies[n, AHEAD + k],
+            bodies[n, LEFT + k],
+            bodies[n, TURN + k],
         )
         qx, qy, side = box[NEAR_X + k], box[NEAR_Y + k], box[SIDE + k]
         off = np.sqrt(box[SQUARE + k])
@@ -129,22 +139,22 @@ def touch(
         cos, sin = box[COS + k], box[SIN + k]
         ix, iy = sin * my - cos * mx, -sin * mx - cos * my
         wx, wy = cos * px - sin * py, sin * px + cos * py
-        ch, sh = body[COS + k], body[SIN + k]
+        ch, sh = bodies[n, COS + k], bodies[n, SIN + k]
         n0, n1 = ch * ix + sh * iy, ch * iy - sh * ix
         t0, t1 = -n1, n0
-        body[ACTIVE + k] = 1.0 if touches else 0.0
-        body[NX + k], body[NY + k] = ix, iy
-        body[LEVER_N + k] = wx * iy - wy * ix
-        body[LEVER_T + k] = wx * ix + wy * iy
+        bodies[n, ACTIVE + k] = 1.0 if touches else 0.0
+        bodies[n, NX + k], bodies[n, NY + k] = ix, iy
+        bodies[n, LEVER_N + k] = wx * iy - wy * ix
+        bodies[n, LEVER_T + k] = wx * ix + wy * iy
         # Compliance times t, with the radius as its arm.
         yt0 = c00 * t0 + c01 * t1 + c02 * radius
         yt1 = c10 * t0 + c11 * t1 + c12 * radius
         yt2 = c20 * t0 + c21 * t1 + c22 * radius
-        body[YIELD_NN + k] = n0 * (c00 * n0 + c01 * n1) + n1 * (c10 * n0 + c11 * n1)
-        body[YIELD_NT + k] = n0 * yt0 + n1 * yt1
-        body[YIELD_TT + k] = t0 * yt0 + t1 * yt1 + radius * yt2
-        body[WANT_N + k] = n0 * ahead + n1 * left - gap / dt
-        body[WANT_T + k] = t0 * ahead + t1 * left + radius * turn
+        bodies[n, YIELD_NN + k] = n0 * (c00 * n0 + c01 * n1) + n1 * (c10 * n0 + c11 * n1)
+        bodies[n, YIELD_NT + k] = n0 * yt0 + n1 * yt1
+        bodies[n, YIELD_TT + k] = t0 * yt0 + t1 * yt1 + radius * yt2
+        bodies[n, WANT_N + k] = n0 * ahead + n1 * left - gap / dt
+        bodies[n, WANT_T + k] = t0 * ahead + t1 * left + radius * turn
     return touching
 
 
@@ -159,49 +169,45 @@ def rest(box: FloatArray, rho2: float, force: float, lanes: int) -> None:
 
 
 @njit(cache=True, fastmath=_EXACT)
-def release(body: FloatArray, lanes: int) -> None:
-    """Take the contact force off a robot."""
-    for k in range(lanes):
-        body[FORCE_N + k] = body[FORCE_T + k] = 0.0
-
-
-@njit(cache=True, fastmath=_EXACT)
-def answer(body: FloatArray, box: FloatArray, friction: float, lanes: int) -> None:
-    """Let one robot find its contact force, the others' given."""
-    for k in range(lanes):
-        ix, iy = body[NX + k], body[NY + k]
-        pn, pt = body[LEVER_N + k], body[LEVER_T + k]
-        before_n, before_t = body[FORCE_N + k], body[FORCE_T + k]
-        mobility = box[MOBILITY + k]
-        # The wrench on the box of all others.
-        fx = box[FORCE_X + k] - (before_n * ix - before_t * iy)
-        fy = box[FORCE_Y + k] - (before_n * iy + before_t * ix)
-        torque = box[TORQUE + k] - (before_n * pn + before_t * pt)
-        # What is left to give by this robot once the others' forces have acted.
-        lever = box[SPIN + k]
-        want_n = body[WANT_N + k] - mobility * (fx * ix + fy * iy) - lever * torque * pn
-        want_t = body[WANT_T + k] - mobility * (fy * ix - fx * iy) - lever * torque * pt
-        nn = body[YIELD_NN + k] + mobility + lever * pn * pn
-        nt = body[YIELD_NT + k] + lever * pn * pt
-        tt = body[YIELD_TT + k] + mobility + lever * pt * pt
-        # The force at which both bodies move alike there: a contact that sticks.
-        det = nn * tt - nt * nt
-        scale = 1.0 / det if det > 1e-12 * nn * tt else 0.0
-        force_n = (tt * want_n - nt * want_t) * scale
-        force_t = (nn * want_t - nt * want_n) * scale
-        # It slips: the tangential force is the friction cone's, against the slip.
-        ratio = friction if force_t > 0.0 else -friction
-        slips = abs(force_t) > friction * force_n
-        slipping = want_n / (nn + ratio * nt)
-        force_n = slipping if slips else force_n
-        force_t = ratio * slipping if slips else force_t
-        pushes = (force_n > 0.0) & (body[ACTIVE + k] > 0.0)
-        force_n = force_n if pushes else 0.0
-        force_t = force_t if pushes else 0.0
-        body[FORCE_N + k], body[FORCE_T + k] = force_n, force_t
-        box[FORCE_X + k] = fx + (force_n * ix - force_t * iy)
-        box[FORCE_Y + k] = fy + (force_n * iy + force_t * ix)
-        box[TORQUE + k] = torque + (force_n * pn + force_t * pt)
+def answer(
+    bodies: FloatArray, near: BoolArray, box: FloatArray, friction: float, lanes: int
+) -> None:
+    """Let each robot near the box find its contact force in turn, the others' given."""
+    for n in range(len(bodies)):
+        for k in range(lanes if near[n] else 0):
+            ix, iy = bodies[n, NX + k], bodies[n, NY + k]
+            pn, pt = bodies[n, LEVER_N + k], bodies[n, LEVER_T + k]
+            before_n, before_t = bodies[n, FORCE_N + k], bodies[n, FORCE_T + k]
+            mobility = box[MOBILITY + k]
+            # The wrench on the box of all others.
+            fx = box[FORCE_X + k] - (before_n * ix - before_t * iy)
+            fy = box[FORCE_Y + k] - (before_n * iy + before_t * ix)
+            torque = box[TORQUE + k] - (before_n * pn + before_t * pt)
+            # What is left to give by this robot once the others' forces have acted.
+            lever = box[SPIN + k]
+            want_n = bodies[n, WANT_N + k] - mobility * (fx * ix + fy * iy) - lever * torque * pn
+            want_t = bodies[n, WANT_T + k] - mobility * (fy * ix - fx * iy) - lever * torque * pt
+            nn = bodies[n, YIELD_NN + k] + mobility + lever * pn * pn
+            nt = bodies[n, YIELD_NT + k] + lever * pn * pt
+            tt = bodies[n, YIELD_TT + k] + mobility + lever * pt * pt
+            # The force at which both bodies move alike there: a contact that sticks.
+            det = nn * tt - nt * nt
+            scale = 1.0 / det if det > 1e-12 * nn * tt else 0.0
+            force_n = (tt * want_n - nt * want_t) * scale
+            force_t = (nn * want_t - nt * want_n) * scale
+            # It slips: the tangential force is the friction cone's, against the slip.
+            ratio = friction if force_t > 0.0 else -friction
+            slips = abs(force_t) > friction * force_n
+            slipping = want_n / (nn + ratio * nt)
+            force_n = slipping if slips else force_n
+            force_t = ratio * slipping if slips else force_t
+            pushes = (force_n > 0.0) & (bodies[n, ACTIVE + k] > 0.0)
+            force_n = force_n if pushes else 0.0
+            force_t = force_t if pushes else 0.0
+            bodies[n, FORCE_N + k], bodies[n, FORCE_T + k] = force_n, force_t
+            box[FORCE_X + k] = fx + (force_n * ix - force_t * iy)
+            box[FORCE_Y + k] = fy + (force_n * iy + force_t * ix)
+            box[TORQUE + k] = torque + (force_n * pn + force_t * pt)
 
 
 @njit(cache=True, fastmath=_EXACT)
@@ -218,17 +224,19 @@ def drag(box: FloatArray, rho2: float, force: float, lanes: int) -> None:
 
 
 @njit(cache=True, fastmath=_EXACT)
-def move(body: FloatArray, radius: float, compliance: FloatArray, dt: float, lanes: int) -> None:
-    """Move a robot for one substep under its twist and its contact force."""
-    c00, c01, c02 = compliance[0, 0], compliance[0, 1], compliance[0, 2]
-    c10, c11, c12 = compliance[1, 0], compliance[1, 1], compliance[1, 2]
-    c20, c21, c22 = compliance[2, 0], compliance[2, 1], compliance[2, 2]
+def move(
+    bodies: FloatArray, n: int, radius: float, compliance: FloatArray, dt: float, lanes: int
+) -> None:
+    """Move a robot for one substep under its twist and its contact force, which then ends."""
+    c00, c01, c02 = compliance[n, 0, 0], compliance[n, 0, 1], compliance[n, 0, 2]
+    c10, c11, c12 = compliance[n, 1, 0], compliance[n, 1, 1], compliance[n, 1, 2]
+    c20, c21, c22 = compliance[n, 2, 0], compliance[n, 2, 1], compliance[n, 2, 2]
     for k in range(lanes):
-        cos, sin = body[COS + k], body[SIN + k]
-        ahead, left = body[AHEAD + k], body[LEFT + k]
-        turn = body[TURN + k]
-        force_n, force_t = body[FORCE_N + k], body[FORCE_T + k]
-        ix, iy = body[NX + k], body[NY + k]
+        cos, sin = bodies[n, COS + k], bodies[n, SIN + k]
+        ahead, left = bodies[n, AHEAD + k], bodies[n, LEFT + k]
+        turn = bodies[n, TURN + k]
+        force_n, force_t = bodies[n, FORCE_N + k], bodies[n, FORCE_T + k]
+        ix, iy = bodies[n, NX + k], bodies[n, NY + k]
         fx, fy = force_t * iy - force_n * ix, -force_n * iy - force_t * ix
         lx, ly = cos * fx + sin * fy, cos * fy - sin * fx
         torque = -radius * force_t
@@ -239,9 +247,10 @@ def move(body: FloatArray, radius: float, compliance: FloatArray, dt: float, lan
         half = 0.5 * turn * dt
         c = cos - half * sin - 0.5 * half * half * cos
         s = sin + half * cos - 0.5 * half * half * sin
-        body[X + k] += (c * ahead - s * left) * dt
-        body[Y + k] += (s * ahead + c * left) * dt
-        body[PSI + k] += turn * dt
+        bodies[n, X + k] += (c * ahead - s * left) * dt
+        bodies[n, Y + k] += (s * ahead + c * left) * dt
+        bodies[n, PSI + k] += turn * dt
+        bodies[n, FORCE_N + k] = bodies[n, FORCE_T + k] = 0.0
 
 
 @njit(cache=True, fastmath=_EXACT)

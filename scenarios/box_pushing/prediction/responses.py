@@ -20,7 +20,7 @@ from ....core.numerics import FloatArray, IntArray, njit
 from ....core.rules.kernels.compact_states import total_compact
 from ....core.rules.kernels.fuzzy import Packed
 from ..states.relational_lanes import Wanted, relational
-from .push import PushModel, pushed
+from .push import Contacts, PushModel, contacts_of, pushed_on
 from .wheel_commands import choices_of, speeds_of
 
 
@@ -73,11 +73,9 @@ class _Plan(NamedTuple):
 
 
 @njit(cache=True)
-def _worths(choices: IntArray, outlook: Outlook, wanted: Wanted) -> FloatArray:
-    """Return what wheel commands ``(m, M)`` are worth to the mean agent ``(m,)``."""
-    robots, box, gaps = pushed(
-        outlook.robots, outlook.box, outlook.twists, choices, outlook.seconds, outlook.model
-    )
+def _worths(choices: IntArray, contacts: Contacts, outlook: Outlook, wanted: Wanted) -> FloatArray:
+    """Return what wheel commands ``(M, m)`` are worth to the mean agent ``(m,)``."""
+    robots, box, gaps = pushed_on(contacts, outlook.box, choices, outlook.seconds, outlook.model)
     shared = relational(
         robots,
         box,
@@ -100,29 +98,39 @@ def _worths(choices: IntArray, outlook: Outlook, wanted: Wanted) -> FloatArray:
 
 @njit(cache=True)
 def _holds(plan: _Plan, robot: int) -> bool:
-    """Return whether no other robot's wheel command is another than when it was last valued."""
+    """Return whether it was valued, and no other robot's wheel command is another since then."""
     around = plan.around[robot]
-    same = True
+    same = around[robot] >= 0
     for i in range(len(around)):
         same = same and (i == robot or around[i] == plan.commands[i])
     return same
 
 
 @njit(cache=True)
-def _value(robots: IntArray, value: float, plan: _Plan, outlook: Outlook, wanted: Wanted) -> None:
+def _value(
+    robots: IntArray,
+    value: float,
+    plan: _Plan,
+    contacts: Contacts,
+    outlook: Outlook,
+    wanted: Wanted,
+) -> None:
     """Value the actions of some robots around a plan that is worth `value`."""
     n_actions = outlook.which.shape[1]
-    rows = np.empty((len(robots) * n_actions, len(plan.commands)), np.int64)
+    who, commands = np.empty((2, len(robots) * n_actions), np.int64)
     m = 0
     for r in robots:
         for a in range(n_actions):
             if outlook.alike[r, a] == a and outlook.which[r, a] != plan.commands[r]:
-                rows[m] = plan.commands
-                rows[m, r] = outlook.which[r, a]
+                who[m], commands[m] = r, outlook.which[r, a]
                 m += 1
+    choices = np.empty((len(plan.commands), m), np.int64)
+    for i in range(len(choices)):
+        for c in range(m):
+            choices[i, c] = commands[c] if who[c] == i else plan.commands[i]
     worths: FloatArray = np.empty(0)
     if m > 0:
-        worths = _worths(rows[:m], outlook, wanted)
+        worths = _worths(choices, contacts, outlook, wanted)
     m = 0
     for r in robots:
         plan.around[r] = plan.commands
@@ -212,7 +220,13 @@ def respond(
     n, n_indices = outlook.which.shape
     wheels = starts.shape[1] // n
     choices = choices_of(starts, outlook.which, n_actions)
-    worths = _worths(choices, outlook, wanted)
+    robots, twists, model = outlook.robots, outlook.twists, outlook.model
+    contacts = contacts_of(robots, outlook.box, twists, outlook.seconds, model)
+    by_robot = np.empty(choices.shape[::-1], np.int64)
+    for i in range(n):
+        for c in range(len(choices)):
+            by_robot[i, c] = choices[c, i]
+    worths = _worths(by_robot, contacts, outlook, wanted)
     best = draw(worths, rng)
     joint = starts[best].copy()
     plan = _Plan(choices[best], np.empty((n, n_indices)), np.full((n, n), -1))
@@ -227,7 +241,7 @@ def respond(
             if not _holds(plan, r):
                 depth = min(2 * depth, MOST_AHEAD) if k == reach else 1
                 reach = min(k + depth, n)
-                _value(order[k:reach], value, plan, outlook, wanted)
+                _value(order[k:reach], value, plan, contacts, outlook, wanted)
             if decides:
                 own = joint[r * wheels : (r + 1) * wheels]
                 best = _decide(r, plan.worths[r], own, n_actions, exploring, rng)

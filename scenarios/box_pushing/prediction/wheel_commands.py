@@ -173,13 +173,12 @@ def twist_table(commands: WheelCommands) -> tuple[IntArray, IntArray]:
 
 @njit(cache=True)
 def speeds_of(choices: IntArray, speeds: FloatArray) -> FloatArray:
-    """Return the wheel speeds ``(n, m)`` of all agents under wheel commands ``(m, M)`` [m/s]."""
-    m, n = choices.shape
+    """Return the wheel speeds ``(n, m)`` of all agents under wheel commands ``(M, m)`` [m/s]."""
+    n, m = choices.shape
     wheels = speeds.shape[2]
     wheel_speeds = np.empty((n * wheels, m))
     for r in range(n):
-        for c in range(m):
-            choice = choices[c, r]
-            for j in range(wheels):
-                wheel_speeds[r * wheels + j, c] = speeds[r, choice, j]
+        for j in range(wheels):
+            for c in range(m):
+                wheel_speeds[r * wheels + j, c] = speeds[r, choices[r, c], j]
     return wheel_speeds

@@ -112,13 +112,30 @@ def test_the_lanes_compute_what_is_written(name: str, rigid: bool) -> None:
                 np.testing.assert_allclose(a[c], b, rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("name", ["square", "pentagon", "L"])
+def test_a_joint_action_has_the_same_bits_alone_and_among_others(name: str) -> None:
+    rng = np.random.default_rng(0)
+    outline = BOXES[name].outline
+    believed = model(3)._replace(edges=outline.edges, reach=outline.radius)
+    robots = rng.uniform(-1.2, 1.2, (3, 3)) * [outline.radius, outline.radius, np.pi]
+    box = np.array([0.01, 0.02, 0.3])
+    twists = rng.uniform(-0.1, 0.13, (3, 40, 3)) * [1, 0.2, 9]
+    choices = rng.integers(40, size=(70, 3))
+    choices[32:64, 0] = 5  # all of a block the same
+    among = push(robots, box, twists, choices, 0.512, believed)
+    for c in (0, 31, 32, 40, 69):
+        alone = push(robots, box, twists, choices[c : c + 1], 0.512, believed)
+        for a, b in zip(alone, among, strict=True):
+            np.testing.assert_array_equal(a[0], b[c])
+
+
 @given(st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=LANES))
 def test_headings_are_exact_to_the_last_bit_but_one(angles: list[float]) -> None:
-    rows = np.zeros(BOX_SIZE)
-    rows[PSI : PSI + len(angles)] = angles
-    head(rows, len(angles))
+    rows = np.zeros((2, BOX_SIZE))
+    rows[1, PSI : PSI + len(angles)] = angles
+    head(rows, 1, len(angles))
     for row, function in ((COS, np.cos), (SIN, np.sin)):
-        found = rows[row : row + len(angles)]
+        found = rows[1, row : row + len(angles)]
         np.testing.assert_allclose(found, function(angles), rtol=0, atol=3e-16)
 
 
