@@ -21,6 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..studies.cli.display import print_text, print_wrapped
+from ..studies.results.analysis import format_p
 from ..studies.results.notation import bracketed, two_decimals, two_figures
 from ..studies.results.results import NOTHING, Results
 from ..studies.results.statistics import LEVEL
@@ -191,7 +192,7 @@ class Finding:
             estimate = bracketed(self.measured.estimate, self.claim.criterion.notation)
             text = f"{estimate}, {self.measured.seeds} seeds"
         if self.measured.p is not None:
-            text += f", p = {self.measured.p:.2g}"
+            text += f", p {format_p(self.measured.p)}"
         return text + (f", {self.measured.note}" if self.measured.note else "")
 
 

@@ -74,6 +74,9 @@ TASKS = {
     "arm": PublishedCourse("an arm of four", (1000, 10_000, 30_000, 100_000, 400_000), 25, 0.05),
     "arm-16": PublishedCourse("an arm of sixteen", (1000, 3000, 10_000, 30_000, 100_000), 10),
     "box": PublishedCourse("a box, two robots", (1000, 3000, 10_000, 30_000, 100_000), 10),
+    "box-again": PublishedCourse(
+        "a box, two robots, other seeds", (1000, 3000, 10_000, 30_000, 100_000), 10
+    ),
     "four-robots": PublishedCourse("a box, four robots", (1000, 3000, 10_000, 30_000, 100_000), 5),
 }
 """By the name of their rows."""

@@ -46,7 +46,7 @@ COURSES = np.array([(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)
 ACTIONS = ActionSet(("stay", "left", "right", "down", "up"), (1.0,) * 5, (0.0,) * 5, neutral=0)
 MEASURES = (
     NO_SUCCESS,
-    Measure("covered", "landmarks covered", "1", "covered", "mean", "higher", False, 0.0, 1.0),
+    Measure("covered", "landmarks covered", "1", "covered", "mean", "higher", False, 0.0),
     Measure("collisions", "collisions", "1", "collisions", "sum", "lower", False, 0.0),
 )
 

@@ -1,9 +1,25 @@
 """What Python text means and imports, the same under every version of Python that reads it."""
 
 import ast
+import gc
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Look for no garbage meanwhile: that takes longer than to read a file, which leaves none."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+@uncollected()
 def tree_text(text: str, name: str) -> str:
     """Return the syntax tree of Python text as Python 3.11 writes it, whichever version runs.
 

@@ -27,7 +27,7 @@ from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
 from ..results.laws import FEWEST
-from ..results.power import SMALLEST, USUAL_DEVIATION, exponent_text, power_text
+from ..results.power import SMALLEST, USUAL_DEVIATION, exponent_text, planned_text
 from ..results.scaling_law import size_key
 from ..spec.controls import LEARN_NOTHING
 from ..spec.outline import StudyOutline
@@ -149,24 +149,12 @@ class Plan:
             yield from self._decisions()
         if self.comparisons:
             yield ""
-            yield from self._power(n_seeds)
+            supposed = self.deviation, self.smallest
+            is_rate = self.measure.is_rate
+            yield from planned_text(n_seeds, self.comparisons, *supposed, of_rates=is_rate)
         yield from self._exponents()
         for warning in self.warnings:
             yield from wrap(warning, WIDTH)
-
-    def _power(self, seeds: int) -> Iterator[str]:
-        """Yield which differences that many seeds can find, and of what they are."""
-        unit = "" if self.deviation else " standard deviations"
-        deviation = self.deviation or 1.0
-        yield from power_text(seeds, self.comparisons, deviation, self.smallest, unit=unit)
-        what = "success rates" if self.measure.is_rate else "returns, as nothing is a success"
-        supposed = (
-            f"differences of single seeds are taken to deviate by {deviation:g}"
-            if self.deviation
-            else "how much those of single seeds deviate is not known before (--deviation)"
-        )
-        text = f"Differences of {what}, every condition with the first, p adjusted; {supposed}."
-        yield from wrap(text, WIDTH)
 
     def _exponents(self) -> Iterator[str]:
         """Yield which exponents of growth can be told apart, if sizes are swept."""

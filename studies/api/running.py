@@ -108,7 +108,7 @@ def run_study(
         if retry_failed:
             store.forget_failed()
         if checkpoint:
-            kept = _checkpoints(directory, checkpoint, observer)
+            kept = _checkpoints(store, checkpoint, observer)
             spec.sources.checkpoints = stack.enter_context(kept)
         left = pending(store, trials)
         # A user's study is made again in every worker, which knows its file.
@@ -136,14 +136,14 @@ def run_study(
 
 
 @contextmanager
-def _checkpoints(directory: Path, seconds: float, observer: Observer) -> Iterator[Checkpoints]:
+def _checkpoints(store: Store, seconds: float, observer: Observer) -> Iterator[Checkpoints]:
     """Make a folder for checkpoints of trials, and remove it in the end if none is left."""
-    folder = directory.resolve() / CHECKPOINTS
+    folder = store.directory.resolve() / CHECKPOINTS
     with suppress(OSError):  # trials go on without
         folder.mkdir(exist_ok=True)
         for remark in sweep(folder):
             observer.note(remark)
-    code = json.dumps([fingerprint(present()), versions()])
+    code = json.dumps([fingerprint(present(store.code())), versions()])
     try:
         yield Checkpoints(folder, seconds, code)
     finally:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
@@ -154,3 +154,20 @@ class Status:
         return self.text
 
     __str__ = __repr__
+
+
+def failures(failed: Iterable[tuple[str, int, str]]) -> Iterator[str]:
+    r"""Yield which trials failed and why, those with equal tracebacks together.
+
+    >>> print(*failures([("a", 0, "E\n"), ("a", 3, "E\n"), ("b", 1, "F")]), sep="\n")
+    a, seeds 0, 3 failed:
+    E
+    b, seed 1 failed:
+    F
+    """
+    by_error: dict[str, dict[str, list[str]]] = {}
+    for condition, seed, error in failed:
+        by_error.setdefault(error.rstrip(), {}).setdefault(condition, []).append(str(seed))
+    for error, seeds in by_error.items():
+        which = (f"{c}, seed{'s' * (len(own) > 1)} {', '.join(own)}" for c, own in seeds.items())
+        yield f"{'; '.join(which)} failed:\n{error}"

@@ -101,14 +101,17 @@ class Tuning:
         name, success = self.configurations.loc[0, ["name", "success"]]
         lines = [f"Best of {len(self.configurations)} configurations: {name}"]
         lines += [f"  {key} = {show(value)}" for key, value in self.changes.items()]
-        if success == 0.0:
+        main = self.study.results.main
+        if not main.is_rate:
+            lines.append("Nothing is a success: they are ranked by evaluation return.")
+        elif success == 0.0:
             lines.append("None of them reaches the goal in evaluation: they are ranked by return.")
         if self.control.startswith(AS):
             lines.append("Untrained weights plan by the reward under its rule of decision: judge")
             lines.append(f"learning by the difference to {self.control!r}.")
         return [
             *lines,
-            "Its success on these seeds is flattered, as it was chosen by it.",
+            f"Its {main.title} on these seeds is flattered, as it was chosen by it.",
             "The spec's own seeds tell how good it is.",
         ]
 

@@ -171,7 +171,9 @@ def rules_table(
             lines.append((rule, *consequents))
         lines.append(("", *[""] * len(parts)))
     names, *columns = zip(*lines, strict=True)
-    heads = pd.MultiIndex.from_tuples([name.rpartition(".")[::2] for name in agents])
+    heads: pd.Index = pd.Index(agents)
+    if any("." in name for name in agents):
+        heads = pd.MultiIndex.from_tuples([name.rpartition(".")[::2] for name in agents])
     frame = pd.DataFrame(list(zip(*columns, strict=True)), index=names, columns=heads)
     return frame.to_string(line_width=WIDTH, sparsify=False).replace("  \\\n", "\n")
 
@@ -299,6 +301,9 @@ def _load_team(store: Store, trial: Trial) -> tuple[Session, BodyEffects | None]
     arrays = store.recording(trial.identity, TEAM) if trial.keep_teams else None
     with refused(f"{store.directory}: "):  # a file that settings name may not be what it was
         session = Session(trial)
+        if not all(isinstance(part, FuzzyAgents) for part in session.team.parts):
+            kind = trial.settings.learner.kind
+            raise ValueError(f"learner.kind = {kind!r}: explain needs agents with rule bases")
         model = session.team.only(FuzzyAgents).foresight.self_model
     bodies = BodyEffects({}, ())
     if model:
@@ -315,8 +320,10 @@ def _load_team(store: Store, trial: Trial) -> tuple[Session, BodyEffects | None]
 def _train(store: Store, session: Session, bodies: BodyEffects) -> None:
     trial = session.trial
     model = session.team.only(FuzzyAgents).foresight.self_model
+    if trial.decisions is not None:
+        session.train_until(trial.decisions)
     episodes = track(
-        range(trial.episodes),
+        range(trial.episodes if trial.decisions is None else 0),
         escape(printable(f"training {trial.condition}, seed {trial.seed} again")),
         console=Console(stderr=True),
         transient=True,

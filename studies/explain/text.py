@@ -1,5 +1,6 @@
 """The explanation of a trained team: text of 80 columns, and figures."""
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from textwrap import fill
@@ -14,7 +15,7 @@ from ...core.numerics import pd
 from ..errors import WIDTH
 from ..presentation import figures
 from ..presentation.figures import add_legend, look, marker
-from .team import BodyEffects, Explanation, exponent, mean_shares, percent, rules_table
+from .team import BodyEffects, Explanation, Parts, exponent, mean_shares, percent, rules_table
 
 TEMPLATE = Path(__file__).with_name("text.txt.jinja")
 MOST_AGENTS = 8
@@ -29,12 +30,13 @@ def text(explained: Explanation, agents: int | None = None) -> str:
     explained
         The explanation.
     agents
-        How many agents' rules to write; none: all.
+        How many agents' rules to write; none: all. Those that have the same are written once.
     """
     parts = explained.parts
     variables = explained.variables
     bodies = explained.bodies
-    names = explained.agents[:agents]
+    alike = share_rules(explained.agents, parts)
+    first = [explained.agents.index(names[0]) for names in alike][:agents]
     shares = [f"{variables[j].name} {percent(share)}" for j, share in mean_shares(parts).items()]
     environment = jinja2.Environment(trim_blocks=True, undefined=jinja2.StrictUndefined)
     environment.filters["wrapped"] = _wrapped
@@ -46,8 +48,14 @@ def text(explained: Explanation, agents: int | None = None) -> str:
         is_additive=max(map(len, explained.rules.terms)) == 1,
         rest=percent(float(np.mean([p.rest for p in parts]))),
         power=exponent(parts),
-        rules=rules_table(explained.rules, variables, names, parts[: len(names)]),
-        more=len(explained.agents) - len(names),
+        rules=rules_table(
+            explained.rules,
+            variables,
+            [explained.agents[i] for i in first],
+            [parts[i] for i in first],
+        ),
+        alike=[" = ".join(names) for names in alike[:agents] if len(names) > 1],
+        more=len(alike) - len(first),
         verdicts=list(verdicts(bodies, explained.actuators)) if bodies else (),
         effects=effects_table(bodies, explained.actuators) if bodies else "",
         errors="" if explained.errors is None else explained.errors.to_string(float_format="%.3g"),
@@ -56,9 +64,18 @@ def text(explained: Explanation, agents: int | None = None) -> str:
     return "\n".join(line.rstrip() for line in rendered.splitlines()).rstrip() + "\n"
 
 
+def share_rules(agents: Sequence[str], parts: Sequence[Parts]) -> list[list[str]]:
+    """Return the agents in groups whose functions are the same, as where they share weights."""
+    groups: dict[bytes, list[str]] = {}
+    for name, part in zip(agents, parts, strict=True):
+        groups.setdefault(np.concatenate(part.singles).tobytes(), []).append(name)
+    return list(groups.values())
+
+
 def _wrapped(sentence: str) -> str:
-    # A number stays with its percent sign.
-    sentence = " ".join(sentence.split()).replace(" %", "\u00a0%")
+    # A number stays with its percent sign, and with the name before it.
+    sentence = " ".join(sentence.split())
+    sentence = re.sub(r"\b(\w{1,40}) (?=<?\d+ %)", "\\1\u00a0", sentence).replace(" %", "\u00a0%")
     return fill(sentence, 79).replace("\u00a0", " ") + "\n"
 
 

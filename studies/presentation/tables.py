@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import RETURN, SUCCESS, Measure, main_measure
 from ...core.numerics import pd
 from ...core.plugins.printing import printable
 from ...core.plugins.words import expect_each, near
@@ -65,13 +65,16 @@ def write_rows(
 def _table(frame: pd.DataFrame, measures: dict[str, Measure]) -> Table:
     """Return the rows of one condition; no word and no number is broken if there is any room.
 
-    What equals success in every row, such as that the box stopped at the goal, is left out.
+    What equals success in every row, such as that the box stopped at the goal, is left out; so is
+    success where nothing is one.
     """
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="")
     shown = [name for name in frame.columns if name in FORMATS or name in measures]
     if SUCCESS.name in shown:
         same = {n for n in shown if n in measures and frame[n].equals(frame[SUCCESS.name])}
         shown = [name for name in shown if name == SUCCESS.name or name not in same]
+        if main_measure([measures.get(SUCCESS.name, SUCCESS)]) == RETURN:
+            shown.remove(SUCCESS.name)
     cells = [_cells(frame[[name]], measures.get(name)) for name in shown]
     for name, texts in zip(shown, cells, strict=True):
         heading = printable(measures[name].heading if name in measures else name)

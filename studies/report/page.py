@@ -64,7 +64,9 @@ def page(directory: Path) -> str:
         figures |= growth_figures(results)
     notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
-        notes = contrasts(results).notes  # what `compare` says of it, this included
+        notes = contrasts(
+            results, results.main.name
+        ).notes  # what `compare` says of it, this included
     there = {label: own for label, own in settings.items() if label in results.conditions}
     table = tabulate(analysis.table)
     rate = rate_of(table)
@@ -165,8 +167,12 @@ def _template(name: str) -> jinja2.Template:
 
 
 def rate_of(table: SummaryTable) -> str:
-    """Return the heading of the success that a summary tells, in evaluation if it is there."""
-    rates = [t for t in table.titles if "success" in t and "difference" not in t]
+    """Return the heading of the success that a summary tells, in evaluation if it is there.
+
+    Where nothing is one, that of the return.
+    """
+    titles = [title for title in table.titles if "difference" not in title]
+    rates = [t for t in titles if "success" in t] or [t for t in titles if "return" in t]
     return next((title for title in rates if "evaluation" in title), rates[0] if rates else "")
 
 

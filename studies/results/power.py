@@ -11,12 +11,14 @@ from collections.abc import Sequence
 from functools import cache
 from itertools import combinations
 from numbers import Integral, Real
+from textwrap import wrap
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.numerics import quadrature, special
 from ...core.plugins.words import expect
+from ..errors import WIDTH
 from .notation import two_figures, wrapped
 from .statistics import EXACT, LEVEL, Array
 
@@ -289,8 +291,34 @@ def power_text(
         least = two_figures(detectable(deviation, seeds, comparisons))
         text = f"with {counted}{among}, a difference of {least}{unit} is found with "
         text += f"probability {two_figures(WANTED)}{within}."
-        text += f" For a difference of {goal} it takes about {enough} seeds." if enough else ""
+        if enough and goal != least:
+            text += f" For a difference of {goal} it takes about {enough} seeds."
     return wrapped(f"Power: {text}")
+
+
+def planned_text(
+    seeds: int,
+    comparisons: int,
+    deviation: float | None,
+    smallest: float | None,
+    *,
+    of_rates: bool,
+) -> list[str]:
+    """Return lines on what paired seeds can tell before any have run, and of what it is.
+
+    Parameters are those of `power_text`; a deviation that is not known is the unit. `of_rates`:
+    whether success rates are compared, or returns.
+    """
+    unit = "" if deviation else " standard deviations"
+    what = "success rates" if of_rates else "returns, as nothing is a success"
+    supposed = (
+        f"differences of single seeds are taken to deviate by {deviation:g}"
+        if deviation
+        else "how much those of single seeds deviate is not known before (--deviation)"
+    )
+    text = f"Differences of {what}, every condition with the first, p adjusted; {supposed}."
+    known = power_text(seeds, comparisons, deviation or 1.0, smallest, unit=unit)
+    return [*known, *wrap(text, WIDTH)]
 
 
 def exponent_text(

@@ -34,11 +34,9 @@ from ..errors import SpecError, refused
 from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings
 from .controls import LEARN_NOTHING
 from .presets import PRESETS
-from .tables import SpecTable, TomlTable, flat, label, nested, overlay, scalar, without
+from .tables import SWEEP, SpecTable, TomlTable, flat, label, nested, overlay, scalar, without
 
 SECTIONS = ("scenario", "topology", "learner")
-SWEEP = "sweep"
-"""The table of values to compare."""
 
 Layer = SpecTable
 """A table, or a point of a sweep, that is laid over what is below it."""

@@ -39,13 +39,12 @@ from ...topologies import TOPOLOGIES
 from ...topologies.builders import join_names
 from ..errors import SpecError, refused
 from ..store.database import DATABASE, SPEC_FILE
-from ..store.durable import read_text
 from .conditions import Condition, Curriculum, Length, Name, Override
 from .controls import LEARN_NOTHING, planning_remark
-from .layers import SWEEP, below, expand, grid, section, tuning_keys
+from .layers import below, expand, grid, section, tuning_keys
 from .presets import PRESETS
 from .studies import STUDIES
-from .tables import SpecTable, TomlTable, assignment, overlay
+from .tables import SWEEP, SpecTable, TomlTable, assignment, overlay, spec_text
 
 REGISTRIES: dict[str, Registry] = {
     "study": STUDIES,
@@ -339,12 +338,7 @@ class Spec(Settings):
             If the file cannot be read, is no TOML, or anything in it is wrong.
         """
         path = Path(path)
-        try:
-            text = read_text(path)
-        except OSError as error:
-            raise SpecError(f"{path}: {error.strerror or error}") from None
-        except UnicodeDecodeError:
-            raise SpecError(f"{path}: is not UTF-8 text") from None
+        text = spec_text(path)
         is_copy = path.name == SPEC_FILE and (path.parent / DATABASE).exists()
         brought_by = str(path.parent) if is_copy else None
         sources = Sources(path.parent, study=study, brought_by=brought_by)
@@ -409,7 +403,8 @@ class Spec(Settings):
         tuned = tuning_keys([*(f"learner.{key}" for key in self.learner), *self.sweep])
         tuned = [key for key in tuned if key != "learner.kind"]
         if tuned and controls:
-            yield f"{', '.join(tuned)}: left out for {labels}, which learn nothing"
+            learn = "learns" if len(controls) == 1 else "learn"
+            yield f"{', '.join(tuned)}: left out for {labels}, which {learn} nothing"
         for control in controls:
             if control.same:
                 others = join_names(map(repr, control.same), MOST_KEYS)

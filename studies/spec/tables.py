@@ -11,6 +11,7 @@ import hashlib
 import tomllib
 import typing
 from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import tomli_w
@@ -18,6 +19,12 @@ from pydantic import BaseModel
 
 from ...core.plugins.models import Slot, field_of, kinds_at, model_at
 from ...core.plugins.words import show
+from ..errors import SpecError
+from ..store.database import SPEC_FILE
+from ..store.durable import read_text
+
+SWEEP = "sweep"
+"""The table of values to compare."""
 
 TomlTable = dict[str, Any]
 SpecTable = Mapping[str, Any]
@@ -261,3 +268,21 @@ def scalar(value: object) -> object:
     """Return a value as it stands in a column: a number or text as it is, else in TOML."""
     is_scalar = isinstance(value, int | float | str) and not isinstance(value, bool)
     return value if is_scalar else show(value, width=None)
+
+
+def spec_text(path: Path) -> str:
+    """Return the text of a spec.
+
+    Raises
+    ------
+    SpecError
+        If it cannot be read; of the directory of a study one line names the spec in it.
+    """
+    try:
+        return read_text(path)
+    except OSError as error:
+        own = path / SPEC_FILE
+        hint = f"; the spec of this study is {own}" if own.is_file() else ""
+        raise SpecError(f"{path}: {error.strerror or error}{hint}") from None
+    except UnicodeDecodeError:
+        raise SpecError(f"{path}: is not UTF-8 text") from None

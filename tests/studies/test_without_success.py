@@ -78,3 +78,17 @@ def test_success_that_a_spec_names_is_compared_as_before() -> None:
     assert named.measures[0].greatest is None
     assert named.measures[0].name == SUCCESS.name
     assert np.isinf(named.measures[0].bounds[1])
+
+
+def test_rows_reports_and_tuning_leave_success_out(tmp_path, capsys) -> None:
+    table = {**SPREAD, **BESIDE_RANDOM}
+    na.run(table, tmp_path / "kept", jobs=1)
+    assert main(["results", str(tmp_path / "kept")]) == 0
+    assert "success" not in capsys.readouterr().out
+    assert main(["report", str(tmp_path / "kept")]) == 0
+    page = (tmp_path / "kept" / "report.html").read_text(encoding="utf-8")
+    assert "Evaluation return: from " in page
+    alone = {**SPREAD, **FITTED, "tune": {"learner.ridge": [0.01, 1.0]}}
+    tuned = na.tune(alone, tmp_path / "tuned", trials=3, seeds=2, jobs=1)
+    assert "Nothing is a success: they are ranked by evaluation return." in tuned.lines
+    assert "Its return on these seeds is flattered, as it was chosen by it." in tuned.lines

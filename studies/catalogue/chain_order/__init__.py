@@ -34,9 +34,10 @@ def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("training")
     if any({"name", "topology"} <= results.columns.get(c, {}).keys() for c in conditions):
-        by_order = contrasts(results, by="topology")
+        by_order = contrasts(results, results.main.name, by="topology")
         groups = [group for group in by_order.groups if group.differences]
-        notes = (*map(equivalence, groups), *by_order.notes)
+        equal = map(equivalence, groups) if results.main.is_rate else ()  # `MARGIN` is of rates
+        notes = (*equal, *by_order.notes)
         return Analysis(by_order.table, notes, (), {g.setting: g.differences for g in groups})
     compared = ablation.compared_with_first(results, shorten_orders(conditions))
     tests = order_tests(results)

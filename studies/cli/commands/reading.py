@@ -10,7 +10,7 @@ from typing import Literal, TypedDict, Unpack
 import click
 
 from ....core.plugins.printing import printable
-from ...api.status import describe, progress
+from ...api.status import describe, failures, progress
 from ...errors import SpecError, refused
 from ...presentation.progress import say
 from ...spec.outline import StudyOutline, sources_of
@@ -46,8 +46,8 @@ def status(directory: Path, watch: bool) -> int:
     with Store.open(directory) as store:
         print_lines(describe(store, progress(store)))
         failed = store.failed()
-    for condition, seed, error in failed:
-        print_text(f"\n{condition}, seed {seed} failed:\n{error.rstrip()}")
+    for text in failures(failed):
+        print_text(f"\n{text}")
     if failed:
         print_text(f"\nto run them again: nested-agents retry {quote(str(directory))}")
     return 1 if failed else 0

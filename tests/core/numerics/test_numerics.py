@@ -104,16 +104,18 @@ def test_kernels_for_several_types_are_compiled_at_once(
     package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    code = "from package.caller import caller; print(caller({}))"
-    for _ in range(2):  # compiled, then taken from the cache
-        begun = [
-            subprocess.Popen(
-                [sys.executable, "-c", code.format(value)], cwd=package.parent,
-                stdout=subprocess.PIPE, text=True,
-            )
-            for value in ("3", "1.5", "2j", "True")
-        ]  # fmt: skip
-        assert [process.communicate()[0].strip() for process in begun] == ["6", "3.0", "4j", "2"]
+    values = {"3": "6", "1.5": "3.0", "2j": "4j", "True": "2"}
+
+    def asking(*values: str) -> subprocess.Popen[str]:
+        calls = "".join(f"print(caller({value}))\n" for value in values)
+        code = f"from package.caller import caller\n{calls}"
+        command = [sys.executable, "-c", code]
+        return subprocess.Popen(command, cwd=package.parent, stdout=subprocess.PIPE, text=True)
+
+    begun = [asking(value) for value in values]
+    assert [process.communicate()[0].strip() for process in begun] == [*values.values()]
+    from_cache = asking(*values).communicate()[0]
+    assert from_cache.split() == [*values.values()]
 
 
 def test_what_cannot_be_compiled_apart_is_compiled_all_the_same(

@@ -124,3 +124,18 @@ def test_a_study_of_another_version_is_refused(study, monkeypatch, capsys):
 )
 def test_the_time_left(means, left, running, processes, expected):
     assert _estimate(means, left, running, processes) == expected
+
+
+def test_equal_tracebacks_are_printed_once(study, capsys):
+    with made_up.opened(study) as store:
+        for trial in made_up.TRIALS[3:5]:
+            store.fail(trial, "Traceback\nRuntimeError: a wheel came off\n")
+    assert main(["status", str(study)]) == 1
+    out = capsys.readouterr().out
+    assert out.count("a wheel came off") == 1
+    assert "default, seed 2; frozen, seed 1 failed:\nTraceback\n" in out
+
+
+def test_the_spec_of_a_kept_study_is_named_where_its_directory_is_given(study, capsys):
+    assert main(["plan", str(study)]) == 2
+    assert f"{study}: Is a directory; the spec of this study is {study}" in capsys.readouterr().err

@@ -7,6 +7,7 @@ import made_up
 import numpy as np
 import pytest
 
+import nested_agents as na
 from nested_agents.core.interface.spaces import Variable
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
@@ -283,3 +284,39 @@ def test_many_agents_stand_in_blocks():
     table = rules_table(rules, VARIABLES, names, parts)
     assert max(len(line.rstrip()) for line in table.splitlines()) <= 80
     assert table.count("robot") == 12
+
+
+def test_agents_of_the_same_rules_have_one_column(tmp_path) -> None:
+    table = {"seeds": 1, "episodes": 3, "steps": 10, "scenario": {"kind": "spread"}}
+    texts = []
+    for weights in ("role", "own"):
+        learner = {"kind": "fitted-q", "weights": weights}
+        kept = na.run(table | {"learner": learner}, tmp_path / weights, jobs=1)
+        texts.append(" ".join(str(kept.explain()).split()))
+    assert "have one column, of the first: agent1 = agent2 = agent3." in texts[0]
+    assert "one column" not in texts[1]
+
+
+def test_names_stay_with_their_shares():
+    sentence = " ".join(f"variable_{k} {k + 10} %," for k in range(12))
+    lines = explain_text._wrapped(sentence).splitlines()
+    assert len(lines) > 1
+    assert all(line.startswith("variable_") and line.endswith("%,") for line in lines)
+
+
+@pytest.mark.parametrize("condition", ["fitted-q", "random"])
+def test_a_team_of_a_budget_of_decisions_is_trained_again(condition, tmp_path, capsys) -> None:
+    table = {"study": "experience", "seeds": 1, "decisions": 40, "steps": 5, "evaluation": 1}
+    table |= {"scenario": {"kind": "spread"}}
+    own = {"learner": {"kind": "fitted-q"}} if condition == "fitted-q" else {"preset": "random"}
+    kept = na.run(table | {"overrides": [{"name": condition, **own}]}, tmp_path, jobs=1)
+    assert f"{condition}, seed 0: the team after 40 decisions" in str(kept.explain())
+
+
+def test_networks_are_not_explained(tmp_path, capsys) -> None:
+    table = {"study": "experience", "seeds": 1, "decisions": 40, "steps": 5, "evaluation": 1}
+    learner = {"kind": "ippo", "worlds": 2, "rollout": 10, "batch_size": 20}
+    na.run(table | {"scenario": {"kind": "spread"}, "learner": learner}, tmp_path, jobs=1)
+    assert main(["explain", str(tmp_path)]) == 2
+    needed = "learner.kind = 'ippo': explain needs agents with rule bases"
+    assert needed in capsys.readouterr().err

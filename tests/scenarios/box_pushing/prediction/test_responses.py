@@ -59,7 +59,7 @@ def at_once_and_one_by_one(monkeypatch, settings, options, number=12):
         ({"robots": 3, "state_space": "crowd"}, {"order": SIX}),
         ({"robots": 3, "state_space": "relational"}, {"rules": PRODUCTS}),
         ({"robots": 1, "state_space": "pose"}, {}),
-        ({"robots": 5, "state_space": "wide", "box": "rectangle"}, {}),
+        ({"robots": 5, "state_space": "crowd", "box": "rectangle"}, {}),
         ({"robots": 24, "state_space": "crowd"}, {}),
         ({"robots": 70, "state_space": "crowd"}, {"weights": "own"}),
         ({"robots": 2, "robot": "four-wheel", "state_space": "crowd"}, {}),

@@ -17,7 +17,11 @@ VARIABLES = tuple(STATE_VARIABLES.built_in)
 @pytest.mark.parametrize("robots", [1, 2, 5])
 @pytest.mark.parametrize(
     "names",
-    [VARIABLES, ("cross_track_error",), ("bend", "gap"), ("face_bearing", "others_away")],
+    [  # each group of lanes is wanted and not, by variables of built-in spaces: those are compiled
+        VARIABLES,
+        ("cross_track_error", "bend"),
+        ("gap", "face_bearing", "others_away", "contact_push_bearing"),
+    ],
 )
 @pytest.mark.parametrize("box", ["square", "L", "circle"])
 def test_compiled_blocks_are_those_of_the_definition(
