@@ -16,8 +16,7 @@ import numpy as np
 
 from ..core.numerics import pd
 from ..studies.results import laws
-from ..studies.results.analysis import format_p
-from ..studies.results.notation import bracketed
+from ..studies.results.notation import format_estimate, format_p
 from ..studies.results.statistics import LEVEL, paired_tests, rate
 from .atlas import MEASURES, NO_FAULT, quality, sample_of
 from .atlas_predictions import largest_small
@@ -128,5 +127,5 @@ def shares_right(chosen: Sequence[HierarchyChoice]) -> list[str]:
     lines = [f"{head}: {counts}"]
     for name, outcomes in shares.items():
         share = rate(np.array(outcomes)[:, None])
-        lines.append(f"{name}: {sum(outcomes)} of {len(clear)}, {bracketed(share)}")
+        lines.append(f"{name}: {sum(outcomes)} of {len(clear)}, {format_estimate(share)}")
     return lines

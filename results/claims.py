@@ -21,8 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..studies.cli.display import print_text, print_wrapped
-from ..studies.results.analysis import format_p
-from ..studies.results.notation import bracketed, two_decimals, two_figures
+from ..studies.results.notation import format_estimate, format_number, format_p
 from ..studies.results.results import NOTHING, Results
 from ..studies.results.statistics import LEVEL
 from .measures import MEASURES, Measured
@@ -53,7 +52,6 @@ class Criterion:
         "A claim holds if the whole interval meets the criterion, does not if none of it does, "
         "and is not decided in between or by under 5 seeds."
     )
-    notation: ClassVar = staticmethod(two_decimals)
 
     def decide(self, measured: Measured) -> Verdict:
         """Compare the whole interval with the bounds, and p with .05."""
@@ -84,12 +82,11 @@ class Benefit:
         "if the whole interval lies within the margin, which its spec named before the runs, and "
         "is not decided otherwise."
     )
-    notation: ClassVar = staticmethod(two_figures)
 
     @property
     def text(self) -> str:
         """The criterion in words."""
-        return f"p < .05, or equal within {two_figures(self.margin)}"
+        return f"p < .05, or equal within {format_number(self.margin)}"
 
     def decide(self, measured: Measured) -> Verdict:
         """Compare p with .05, and the whole interval with the margin."""
@@ -187,10 +184,9 @@ class Finding:
         if self.measured is None:
             return "no results"
         value = float(self.measured.estimate.value)
-        text = f"{value:.2g}, computed"
+        text = f"{format_number(value)}, computed"
         if self.measured.seeds:
-            estimate = bracketed(self.measured.estimate, self.claim.criterion.notation)
-            text = f"{estimate}, {self.measured.seeds} seeds"
+            text = f"{format_estimate(self.measured.estimate)}, {self.measured.seeds} seeds"
         if self.measured.p is not None:
             text += f", p {format_p(self.measured.p)}"
         return text + (f", {self.measured.note}" if self.measured.note else "")

@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from ..studies.cli.display import print_text
 from ..studies.presentation import figures
 from ..studies.results import published
-from ..studies.results.analysis import Difference, differences, format_p
-from ..studies.results.notation import bracketed, two_figures
+from ..studies.results.analysis import Difference, differences
+from ..studies.results.notation import format_estimate, format_number, format_p
 from ..studies.results.results import Results
 from ..studies.results.statistics import Array, Estimate, bootstrap, rate
 from ..studies.store.database import EVALUATION
@@ -137,13 +137,15 @@ def lines(every: list[Disagreement]) -> list[str]:
     ]
     for own in every:
         for k, name in enumerate(own.errors):
-            told, silent = (bracketed(own.success[side][k]) for side in SIDES)
+            told, silent = (format_estimate(own.success[side][k]) for side in SIDES)
             d = own.compared[k]
-            difference = f"{bracketed(d.estimate)}, p {format_p(d.p)}"
+            difference = f"{format_estimate(d.estimate)}, p {format_p(d.p)}"
             right = " and ".join(f"{own.agreement[side][k]:.2f}"[1:] for side in SIDES)
-            spent = " and ".join(two_figures(float(own.decisions[side][k].value)) for side in SIDES)
+            spent = " and ".join(
+                format_number(float(own.decisions[side][k].value)) for side in SIDES
+            )
             longer = Estimate(*map(np.exp, own.longer[k].estimate))
-            times = f"{bracketed(longer)}, p {format_p(own.longer[k].p)}"
+            times = f"{format_estimate(longer)}, p {format_p(own.longer[k].p)}"
             shown = name.removeprefix(SHOWN)
             table.append(
                 f"| {own.robots} | {shown} | {told} | {silent} | {difference} | {right} | {spent} "

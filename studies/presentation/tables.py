@@ -27,7 +27,7 @@ from ...core.plugins.printing import printable
 from ...core.plugins.words import expect_each, near
 from ..errors import SpecError
 from ..results.analysis import Summary
-from ..results.notation import bracketed
+from ..results.notation import format_estimate
 from ..results.statistics import FEW, Estimate, exactly, stack_estimates
 from .legend import meanings
 from .progress import count
@@ -335,7 +335,7 @@ class Cell(NamedTuple):
     @classmethod
     def of(cls, estimate: Estimate) -> Cell:
         """Return the cell of an estimate."""
-        value, _, interval = bracketed(estimate).partition(" ")
+        value, _, interval = format_estimate(estimate).partition(" ")
         return cls(value, interval)
 
     def text(self, space: str = " ") -> str:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ...core.interface.measures import Measure
 from ...core.numerics import pd
 from ..errors import WIDTH
-from .notation import bracketed, signed, wrapped
+from .notation import format_estimate, format_p, wrapped
 from .power import power_lines
 from .results import Results
 from .statistics import LEVEL, Array, Estimate, bootstrap, exactly, paired_tests, rate
@@ -87,13 +87,8 @@ class Difference:
     def shown(self) -> str:
         """Value, interval, p as it is and adjusted, as text."""
         raw = format_p(self.raw)
-        shown = f"{bracketed(self.estimate, signed)}, p {format_p(self.p)}"
+        shown = f"{format_estimate(self.estimate, signed=True)}, p {format_p(self.p)}"
         return f"{shown} ({raw.removeprefix('= ')} unadjusted)"
-
-
-def format_p(p: float) -> str:
-    """Return how p is shown, its sign before it."""
-    return "< .001" if p < 0.001 else f"= {p:.2g}"
 
 
 BySeed: TypeAlias = "pd.Series | pd.DataFrame"

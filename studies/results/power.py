@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ...core.numerics import quadrature, special
 from ...core.plugins.words import expect
 from ..errors import WIDTH
-from .notation import two_figures, wrapped
+from .notation import format_number, wrapped
 from .statistics import EXACT, LEVEL, Array
 
 WANTED = 0.8
@@ -276,7 +276,7 @@ def power_text(
     among = f" and {comparisons} comparisons" if comparisons > 1 else ""
     needed = seeds_needed(comparisons)
     enough = seeds_for(smallest, deviation, comparisons) if smallest and deviation else None
-    goal = two_figures(smallest or 0.0)
+    goal = format_number(smallest or 0.0)
     within = f" in {measure}" if measure else ""
     if seeds < needed:
         text = (
@@ -288,9 +288,9 @@ def power_text(
         text = f"{counted}{among} that deviate by nothing{within}: how small a difference they "
         text += "would find cannot be determined."
     else:
-        least = two_figures(detectable(deviation, seeds, comparisons))
+        least = format_number(detectable(deviation, seeds, comparisons))
         text = f"with {counted}{among}, a difference of {least}{unit} is found with "
-        text += f"probability {two_figures(WANTED)}{within}."
+        text += f"probability {format_number(WANTED)}{within}."
         if enough and goal != least:
             text += f" For a difference of {goal} it takes about {enough} seeds."
     return wrapped(f"Power: {text}")
@@ -350,7 +350,7 @@ def exponent_text(
       significantly different with probability .80. A difference of .20 takes about
       23 seeds, or sizes to 32.
     """
-    goal = two_figures(APART)
+    goal = format_number(APART)
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
     enough = seeds_for(APART, deviation / _reach(sizes), comparisons)
     larger = list(sizes)
@@ -363,9 +363,9 @@ def exponent_text(
         text = f"{counted} are too few for a significant difference, "
         text += f"at least {seeds_needed(comparisons)} are needed. {takes}."
     else:
-        least = two_figures(detectable(deviation / _reach(sizes), seeds, comparisons))
+        least = format_number(detectable(deviation / _reach(sizes), seeds, comparisons))
         text = f"with {counted} of sizes {sizes[0]:g} to {sizes[-1]:g}, those that differ by "
-        text += f"{least} are significantly different with probability {two_figures(WANTED)}."
+        text += f"{least} are significantly different with probability {format_number(WANTED)}."
         if len(larger) > len(sizes) and takes:
             up_to = f", or sizes to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
             text += f" {takes}{up_to}."

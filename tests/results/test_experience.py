@@ -13,7 +13,7 @@ from nested_agents.results import ROWS, experience
 from nested_agents.results.claims import Benefit
 from nested_agents.results.measures import Measured
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.results.notation import bracketed
+from nested_agents.studies.results.notation import format_estimate
 from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.spec.spec import Spec
 
@@ -45,7 +45,7 @@ def test_differences_on_the_way_are_those_of_the_rows(name, decisions, text) -> 
     rows = experience.read(name)
     wide = rows.pivot(index=["decisions", "seed"], columns="condition", values="success")
     ahead = wide[CHAIN] - wide["hierarchy-ppo, no edges"]
-    assert bracketed(na.bootstrap(ahead.loc[decisions].to_numpy())) == text
+    assert format_estimate(na.bootstrap(ahead.loc[decisions].to_numpy())) == text
     assert text in PEERS
 
 

@@ -10,7 +10,7 @@ from published_tables import print_table
 import nested_agents as na
 from nested_agents.results import ROWS
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.results.notation import bracketed, two_figures
+from nested_agents.studies.results.notation import format_estimate, format_number
 from nested_agents.studies.results.statistics import bootstrap
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -76,8 +76,8 @@ def test_decisions_to_a_success_rate() -> None:
     page = " ".join(PAGE.read_text(encoding="utf-8").split())
     for counted in (to_first, to_last):
         slopes = np.polyfit(np.log(SIZES), np.log(counted), 1)[0]
-        assert f"n^{bracketed(bootstrap(slopes))}" in page
-    means = [f"{float(two_figures(float(d.mean()))):,.0f}" for d in to_first]
+        assert f"n^{format_estimate(bootstrap(slopes))}" in page
+    means = [f"{float(format_number(float(d.mean()))):,.0f}" for d in to_first]
     assert f"16 robots: {', '.join(means[:-1])} and {means[-1]} in the mean over 20 seeds" in page
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...results.analysis import Analysis, Figures, phases_of, select_shared
 from ...results.contrasts import Group, contrasts
-from ...results.notation import two_figures
+from ...results.notation import format_number
 from ...results.results import Results
 from ...results.statistics import LEVEL, Friedman, friedman, holm
 from .. import ablation
@@ -54,7 +54,7 @@ def equivalence(group: Group) -> str:
     else:
         verdict = "equal" if max(-low, high) <= MARGIN else "not decided"
     orders = len(group.differences) + 1
-    ends = f"[{two_figures(low)}, {two_figures(high)}]"
+    ends = f"[{format_number(low)}, {format_number(high)}]"
     return f"{group.setting}, {orders} orders, within {MARGIN:g}: {verdict} {ends}"
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ...results.analysis import EVALUATED, Analysis, Figures
-from ...results.notation import two_figures
+from ...results.notation import format_number
 from ...results.results import Results, Sizes
 from ...spec.spec import Spec
 from ...spec.tables import label_but
@@ -106,7 +106,7 @@ def _draw_parted(analysis: Analysis) -> Figures:
         fields = np.array([[by_name[setting, name] for name in row] for row in PARTED], dtype=float)
         axes.imshow(fields[..., 0], "Blues", vmin=0, vmax=1)
         for row, column in np.ndindex(2, 2):
-            value, low, high = map(two_figures, fields[row, column])
+            value, low, high = map(format_number, fields[row, column])
             colour = "white" if fields[row, column, 0] > 0.5 else "black"
             write = partial(axes.text, column, ha="center", color=colour)
             write(row, value, va="bottom", fontsize=15)

@@ -15,7 +15,7 @@ from textwrap import wrap
 from ....scenarios.matrix_games.plays import whole_episode
 from ...errors import WIDTH
 from ...results.analysis import Analysis, Case, Figures, Summary
-from ...results.notation import two_figures
+from ...results.notation import format_number
 from ...results.results import Results
 from ...results.statistics import rate
 from ...store.database import EVALUATION
@@ -89,7 +89,7 @@ def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
             line = f"{', '.join(setting):{widest}}"
             for system in systems:
                 estimate = by_place.get((setting, system), {}).get(plays)
-                line += f"{two_figures(float(estimate.value)) if estimate else '-':>4}"
+                line += f"{format_number(float(estimate.value)) if estimate else '-':>4}"
             yield line
 
 

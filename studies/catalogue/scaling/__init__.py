@@ -27,7 +27,7 @@ from ...results.analysis import (
     evaluated,
     select_shared,
 )
-from ...results.notation import bracketed, two_decimals
+from ...results.notation import format_estimate
 from ...results.results import Results, Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly
 from ...spec.tables import label_but
@@ -138,7 +138,7 @@ def analyse(results: Results) -> Analysis:
         table.append(Summary(label, len(results.seeds(condition)), point.values))
     notes = [
         f"\n{evaluator}, time with n agents:\n  "
-        + "\n  ".join(f"{what} n^{bracketed(e, two_decimals)}" for what, e in by_what.items())
+        + "\n  ".join(f"{what} n^{format_estimate(e)}" for what, e in by_what.items())
         for evaluator, by_what in exponents_of(points).items()
     ]
     return Analysis(tuple(table), tuple(notes), points)

@@ -9,7 +9,7 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 import numpy as np
 
 from ...results.analysis import EVALUATED, Analysis, Difference, Figures, Summary, adjust, ratio
-from ...results.notation import bracketed, two_decimals
+from ...results.notation import format_estimate
 from ...results.power import power_lines
 from ...results.results import Results
 from ...results.statistics import bootstrap, rate
@@ -49,7 +49,7 @@ def analyse(results: Results) -> Analysis:
         if compared:
             notes.append(f"\n{condition}, ratio to the box of training:")
             for d in compared:
-                shown = bracketed(d.estimate, two_decimals)
+                shown = format_estimate(d.estimate)
                 notes.append(f"  {d.condition}: {shown}, p = {d.p:.2g} (adjusted)")
             notes += power_lines([d.sample for d in compared], "evaluation success")
     return Analysis(tuple(table), tuple(notes), ratios)

@@ -10,7 +10,7 @@ from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.learning_curve import analyse, curves_of, draw, metrics_of
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import Cell, write_rows
-from nested_agents.studies.results.notation import two_figures
+from nested_agents.studies.results.notation import format_number
 from nested_agents.studies.results.statistics import Estimate
 
 
@@ -94,7 +94,7 @@ def test_the_interval_of_a_cell():
     assert Cell.of(Estimate(*map(np.asarray, (0.5, np.nan, np.nan)))).interval == ""
     assert Cell.of(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))).interval == "[.25, 1.0]"
     assert Cell.of(Estimate(*map(np.asarray, (-0.6, -0.72, -0.53)))).interval == "[-.72, -.53]"
-    assert two_figures(float("nan")) == "?"
+    assert format_number(float("nan")) == "?"
 
 
 @pytest.mark.parametrize("form", ["table", "csv", "json"])

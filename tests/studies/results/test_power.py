@@ -4,7 +4,7 @@ from scipy import special, stats
 
 from nested_agents.studies.results import laws
 from nested_agents.studies.results.analysis import Difference, adjust, verdict_lines
-from nested_agents.studies.results.notation import two_figures
+from nested_agents.studies.results.notation import format_number
 from nested_agents.studies.results.power import (
     detectable,
     deviation_of,
@@ -156,7 +156,9 @@ def test_exponents_are_told_apart_by_more_seeds_or_larger_sizes() -> None:
     said = " ".join(" ".join(exponent_text([2.0, 4.0, 8.0, 16.0], 20)).split())
     # Logarithms of sizes lie log 2 apart: their squares about the mean sum up to 5 (log 2) ** 2.
     deviation = 0.5 / (5.0**0.5 * np.log(2.0))
-    assert f"differ by {two_figures(detectable(deviation, 20))} are significantly different" in said
+    assert (
+        f"differ by {format_number(detectable(deviation, 20))} are significantly different" in said
+    )
     assert f"takes about {seeds_for(0.2, deviation)} seeds, or sizes to 32." in said
     few = " ".join(" ".join(exponent_text([2.0, 3.0, 4.0], 5, comparisons=3)).split())
     assert few.startswith(
