@@ -29,7 +29,7 @@ def rows(name: str) -> na.StudyResults:
 
 
 def cell(name: str, condition: str, column: str) -> str:
-    """Return an estimate with its 95 % interval, as the table of its study has it."""
+    """Return an estimate with its 95% interval, as the table of its study has it."""
     return _of_table(name, condition, column).text()
 
 

@@ -26,7 +26,7 @@ class FaultCost(NamedTuple):
     fault: str
     measure: str
     difference: Estimate
-    """Of quality, from no fault, with its 95 % interval over seeds."""
+    """Of quality, from no fault, with its 95% interval over seeds."""
     p: float
     """Adjusted by Holm over a task's comparisons."""
 

@@ -34,7 +34,7 @@ class Check(NamedTuple):
     law: str
     """Which law it is."""
     predicted: Estimate
-    """The mean of as many seeds, with its 90 % interval."""
+    """The mean of as many seeds, with its 90% interval."""
     measured: float
 
     @property

@@ -39,7 +39,7 @@ class Criterion:
     Examples
     --------
     >>> at_least(0.8).text, within(0.15).text
-    ('at least 0.8', 'within 0.15 of 0, no p < .05')
+    ('at least 0.8', 'within 0.15 of 0, no p < 0.05')
     """
 
     text: str
@@ -54,7 +54,7 @@ class Criterion:
     )
 
     def decide(self, measured: Measured) -> Verdict:
-        """Compare the whole interval with the bounds, and p with .05."""
+        """Compare the whole interval with the bounds, and p with 0.05."""
         e = measured.estimate
         if (
             e.high < self.low
@@ -67,18 +67,18 @@ class Criterion:
 
 @dataclass(frozen=True)
 class Benefit:
-    """A difference helps or harms if p < .05, and is none if it lies within a margin.
+    """A difference helps or harms if p < 0.05, and is none if it lies within a margin.
 
     Examples
     --------
     >>> Benefit(0.1).text
-    'p < .05, or equal within .10'
+    'p < 0.05, or equal within 0.10'
     """
 
     margin: float
     """Within which a difference is none that matters, named before the runs."""
     legend: ClassVar = (
-        "It helps or harms by p < .05, adjusted over all comparisons of a study (Holm), is equal "
+        "It helps or harms by p < 0.05, adjusted over all comparisons of a study (Holm), is equal "
         "if the whole interval lies within the margin, which its spec named before the runs, and "
         "is not decided otherwise."
     )
@@ -86,10 +86,10 @@ class Benefit:
     @property
     def text(self) -> str:
         """The criterion in words."""
-        return f"p < .05, or equal within {format_number(self.margin)}"
+        return f"p < 0.05, or equal within {format_number(self.margin)}"
 
     def decide(self, measured: Measured) -> Verdict:
-        """Compare p with .05, and the whole interval with the margin."""
+        """Compare p with 0.05, and the whole interval with the margin."""
         value, low, high = map(float, measured.estimate)
         if measured.p is not None and measured.p < LEVEL:
             return "helps" if value > 0.0 else "harms"
@@ -108,7 +108,7 @@ def at_most(threshold: float) -> Criterion:
 
 def within(margin: float) -> Criterion:
     """Return the criterion that a value is zero but for a margin."""
-    return Criterion(f"within {margin:g} of 0, no p < .05", -margin, margin)
+    return Criterion(f"within {margin:g} of 0, no p < 0.05", -margin, margin)
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ def print_claims(findings: Sequence[Finding], form: Format) -> None:
         )
     Console().print(table)
     print_text("")
-    print_wrapped(f"With 95 % intervals. {findings[0].claim.criterion.legend}", indent=0)
+    print_wrapped(f"With 95% intervals. {findings[0].claim.criterion.legend}", indent=0)
 
 
 def markdown(findings: Sequence[Finding]) -> str:

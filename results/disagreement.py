@@ -117,9 +117,10 @@ def _threshold(less: Array, errors: Sequence[float]) -> Estimate:
 def _brief(threshold: Estimate, greatest: float) -> str:
     """Return a threshold and its interval, ends that were not reached as more than the greatest."""
     value, low, high = (
-        f"> {greatest:.2g}" if end >= greatest else f"{end:.2g}" for end in map(float, threshold)
+        f"> {format_number(greatest)}" if end >= greatest else format_number(end)
+        for end in map(float, threshold)
     )
-    return f"{value} [{low}, {high}]".replace("0.", ".")
+    return f"{value} [{low}, {high}]"
 
 
 def rows() -> list[Disagreement]:
@@ -140,7 +141,7 @@ def lines(every: list[Disagreement]) -> list[str]:
             told, silent = (format_estimate(own.success[side][k]) for side in SIDES)
             d = own.compared[k]
             difference = f"{format_estimate(d.estimate)}, p {format_p(d.p)}"
-            right = " and ".join(f"{own.agreement[side][k]:.2f}"[1:] for side in SIDES)
+            right = " and ".join(format_number(own.agreement[side][k]) for side in SIDES)
             spent = " and ".join(
                 format_number(float(own.decisions[side][k].value)) for side in SIDES
             )
@@ -177,7 +178,7 @@ def draw(every: list[Disagreement]) -> Figure:
         axes.set_title(f"{own.robots} robots", loc="left")
         axes.set_xlabel("error of each agent's weights [SD]")
         figures.as_rates(axes)
-    figures.name_lines(figure, list(SIDES), "success; bars: 95 %; dotted: the threshold")
+    figures.name_lines(figure, list(SIDES), "success; bars: 95%; dotted: the threshold")
     return figure
 
 

@@ -197,7 +197,7 @@ def edge_lines() -> Iterator[str]:
             str(worth.compared.seeds),
             f"{TASKS[worth.name].shown[-1]:,}",
             format_estimate(worth.compared.estimate),
-            format_p(worth.compared.p).removeprefix("= ").replace("0.", "."),
+            format_p(worth.compared.p).removeprefix("= "),
             format_number(worth.margin),
             worth.finding.verdict,
         )

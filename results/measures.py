@@ -1,7 +1,7 @@
 """What the claims of papers are decided by: a measure for each.
 
 A measure is a function of a study's results and of the arguments that ``claims.toml`` names. It
-returns an estimate with its 95 % interval over seeds. It returns None, or raises KeyError, where
+returns an estimate with its 95% interval over seeds. It returns None, or raises KeyError, where
 the results have not what it takes.
 """
 

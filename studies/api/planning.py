@@ -204,10 +204,10 @@ def plan(
     jobs
         Trials at a time; by default one for every core.
     deviation
-        Standard deviation that is supposed of the differences of single seeds; by default .25 of
+        Standard deviation that is supposed of the differences of single seeds; by default 0.25 of
         success rates, and unknown of returns.
     smallest
-        The smallest difference that is of interest; by default .2 of success rates.
+        The smallest difference that is of interest; by default 0.2 of success rates.
     timed
         Whether to try the conditions out.
 

@@ -156,7 +156,7 @@ def _table(rows: Sequence[CostRow]) -> str:
         lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
         most = max((len(row.measured.repeats) for row in rows if row.measured), default=1)
         if most > 1:
-            lines += [f"[]: 95 % interval of the mean of {most} repeats, each with a new team;"]
+            lines += [f"[]: 95% interval of the mean of {most} repeats, each with a new team;"]
         lines += ["-: not measured, beyond a second or so a step."]
         lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
     if "network" in tables:

@@ -75,7 +75,7 @@ class Difference:
     seeds: int
     """How many seeds both have finished."""
     estimate: Estimate
-    """The mean difference with its 95 % bootstrap interval."""
+    """The mean difference with its 95% bootstrap interval."""
     raw: float
     """p of no difference, by permutation of signs."""
     p: float
@@ -138,7 +138,7 @@ def adjust(
 
 
 def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
-    """Return the mean difference of paired values ``(n_seeds,)`` with its 95 % interval.
+    """Return the mean difference of paired values ``(n_seeds,)`` with its 95% interval.
 
     By bootstrap over seeds; of rates that differ alike for every seed, as of independent ones: the
     interval of a bootstrap would have no width.

@@ -57,7 +57,7 @@ class ScalingLaw(NamedTuple):
         for group, law, *_ in self.fits:
             if law is not None:
                 estimates = {**law.exponents()}
-                estimates |= {f"at {n} (90 %)": law.predict(n) for n in self.predicted}
+                estimates |= {f"at {n} (90%)": law.predict(n) for n in self.predicted}
                 lines.append(Summary(group or "all", law.seeds, estimates))
         return tuple(lines)
 
@@ -66,7 +66,7 @@ class ScalingLaw(NamedTuple):
         """How the table's intervals are made, in lines."""
         return tuple(
             wrapped(
-                "Intervals of parameters: 95 %, seeds resampled, Student's. Predictions: of the "
+                "Intervals of parameters: 95%, seeds resampled, Student's. Predictions: of the "
                 "mean of as many seeds."
             )
         )
@@ -99,8 +99,8 @@ class ScalingLaw(NamedTuple):
         seeds = seeds_for(APART, spread, len(pairs)) if spread > 0.0 else None
         if seeds is not None:
             lines += wrapped(
-                f"Power: exponents that differ by {format_number(APART)} are significantly different "
-                f"with probability .80 by about {seeds} seeds at these sizes."
+                f"Power: exponents that differ by {format_number(APART)} are significantly "
+                f"different with probability 0.80 by about {seeds} seeds at these sizes."
             )
         return lines
 
@@ -126,8 +126,8 @@ def _sentence(fitted: Fitted, size: str) -> str:
     text = f"{head}{law.curve.name} ({counted}{unreached})"
     for n, measured, e in law.held_out:
         inside = "inside" if e.low <= measured <= e.high else "outside"
-        text += f"; {n:g} left out: predicted {format_estimate(e)}, measured {format_number(measured)}, "
-        text += inside
+        text += f"; {n:g} left out: predicted {format_estimate(e)}, "
+        text += f"measured {format_number(measured)}, {inside}"
     if law.noise <= laws.FLAT:
         text += "; all seeds agree, so that intervals of parameters tell nothing of the law"
     return f"{text}."

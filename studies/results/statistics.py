@@ -25,8 +25,8 @@ from ...core.plugins.words import expect_each, show
 Array = NDArray[np.float64]
 
 FEW = 8
-"""Below so many seeds a bootstrap interval covers too seldom: of normal values a 95 % interval from
-2, 3, 4, 5 seeds would cover 51, 74, 87, 92 %."""
+"""Below so many seeds a bootstrap interval covers too seldom: of normal values a 95% interval from
+2, 3, 4, 5 seeds would cover 51, 74, 87, 92%."""
 
 AT_ONCE = 2**20
 """Values that are resampled at a time, so that memory does not grow with the study; 8 MB."""
@@ -36,8 +36,8 @@ NOT_NEGATIVE = (0.0, np.inf)
 
 ALIKE = 2.0
 """Failures that `rate` supposes beside those seen. With seeds of which one in twenty never learns,
-and .99 succeed of the others' episodes, intervals of 10 to 30 seeds and 10 episodes then cover the
-truth in 94 to 97 % of simulations, without it in 69 to 75 %."""
+and 0.99 succeed of the others' episodes, intervals of 10 to 30 seeds and 10 episodes then cover the
+truth in 94 to 97% of simulations, without it in 69 to 75%."""
 
 
 class Estimate(NamedTuple):

@@ -56,7 +56,7 @@ def test_the_planner(capsys: pytest.CaptureFixture[str]) -> None:
 
 SIZES = (2, 4, 8, 16)
 IN_A_ROW = 5
-"""Training episodes over which a success rate of .8 is looked for."""
+"""Training episodes over which a success rate of 0.8 is looked for."""
 
 
 def test_decisions_to_a_success_rate() -> None:

@@ -23,5 +23,5 @@ def test_the_table_of_results(capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_table_of_theory(agents: int) -> None:
     told = cascade(agents, 0.7)
     cells = [0.7, majority(agents, 0.7), float(told.right[-1]), told.vote]
-    shown = " | ".join([".70" if cell == 0.7 else format_number(cell) for cell in cells])
+    shown = " | ".join(map(format_number, cells))
     assert f"| {agents:,} | {shown} |" in PAGE

@@ -14,7 +14,7 @@ from nested_agents.studies.catalogue.chain_order import equivalence
 from nested_agents.studies.catalogue.edges import TRAINED, analyse
 from nested_agents.studies.catalogue.hierarchies.pooled import effects
 from nested_agents.studies.results.contrasts import contrasts
-from nested_agents.studies.results.notation import format_estimate, format_number
+from nested_agents.studies.results.notation import format_estimate, format_number, format_p
 from nested_agents.studies.results.results import Results
 from nested_agents.studies.results.statistics import Estimate, bootstrap, paired_permutation
 from nested_agents.studies.store.database import EVALUATION
@@ -83,7 +83,7 @@ def times(logarithms: np.ndarray) -> str:
 
 def p_of(of_seeds: np.ndarray) -> str:
     p = paired_permutation(of_seeds, np.zeros_like(of_seeds))
-    return "< .001" if p < 0.001 else f"{p:.1g}".removeprefix("0") if p < 0.1 else f"{p:.2f}"[1:]
+    return format_p(p).removeprefix("= ")
 
 
 def test_what_is_equal_to_the_chain() -> None:

@@ -19,7 +19,7 @@ PUBLISHED = ("success",)
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     return compared_with_first(results, results.of_phase("training"))
 
 

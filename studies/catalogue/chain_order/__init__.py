@@ -18,7 +18,7 @@ import numpy as np
 
 from ...results.analysis import Analysis, Figures, phases_of, select_shared
 from ...results.contrasts import Group, contrasts
-from ...results.notation import format_number
+from ...results.notation import format_number, format_p
 from ...results.results import Results
 from ...results.statistics import LEVEL, Friedman, friedman, holm
 from .. import ablation
@@ -31,7 +31,7 @@ MARGIN = 0.1
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("training")
     if any({"name", "topology"} <= results.columns.get(c, {}).keys() for c in conditions):
         by_order = contrasts(results, results.main.name, by="topology")
@@ -77,8 +77,9 @@ class OrderTest(NamedTuple):
         """What the test found, in words."""
         differ = "differ" if self.p < LEVEL else "do not differ significantly"
         return (
-            f"{self.title}: {self.orders} orders {differ} (Friedman {self.test.statistic:.1f}, "
-            f"p = {self.test.p:.2g}, adjusted {self.p:.2g}; W = {self.test.concordance:.3f}; "
+            f"{self.title}: {self.orders} orders {differ} (Friedman "
+            f"{format_number(self.test.statistic)}, p {format_p(self.test.p)}, adjusted "
+            f"{format_p(self.p).removeprefix('= ')}; W = {format_number(self.test.concordance)}; "
             f"{self.seeds} seeds)"
         )
 

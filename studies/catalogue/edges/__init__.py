@@ -63,7 +63,7 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     sizes = Sizes.of(results, results.of_phase("evaluation"))
     cases = []
     for condition, robots in sizes.counts.items():
@@ -116,5 +116,5 @@ def _draw_parted(analysis: Analysis) -> Figures:
         axes.set_yticks((0, 1), ("not told", "told"))
         axes.tick_params(length=0, labelsize=7.5)
         axes.spines[:].set_visible(False)
-    figure.suptitle("evaluation success of the same weights, 95 % intervals", fontsize=9)
+    figure.suptitle("evaluation success of the same weights, 95% intervals", fontsize=9)
     return {"edges": figure}

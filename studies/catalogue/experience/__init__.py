@@ -88,7 +88,7 @@ class ReturnCourse(NamedTuple):
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("evaluation")
     is_rate = all(results.has(condition, "evaluation", SUCCESS.name) for condition in conditions)
     is_rate = is_rate and any(results.success(c, "evaluation").any() for c in conditions)
@@ -130,7 +130,7 @@ def analyse(results: Results) -> Analysis:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: evaluations against decisions experienced, bands 95 % intervals."""
+    """Return the figure: evaluations against decisions experienced, bands 95% intervals."""
     from matplotlib.ticker import LogLocator
 
     from ...presentation import figures as f  # matplotlib takes its time

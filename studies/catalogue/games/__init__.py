@@ -45,7 +45,7 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate; 95 % Wilson intervals, seeds as the unit of sampling."""
+    """Estimate; 95% Wilson intervals, seeds as the unit of sampling."""
     cases = []
     table = []
     for condition in results.of_phase("evaluation"):
@@ -94,7 +94,7 @@ def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: probabilities of the optimum with their 95 % intervals.
+    """Return the figure: probabilities of the optimum with their 95% intervals.
 
     A panel for each game (the first thing that settings differ in), the systems one below the
     other, a colour and a marker for the rest of the setting; what is filled has been measured after
@@ -133,7 +133,7 @@ def draw(analysis: Analysis) -> Figures:
         f.handle(", ".join((*rest, f"{count:,} plays")), **look)
         for (rest, count), look in looks.items()
     ]
-    f.add_legend(figure, handles, "bars: 95 % intervals", ncols=2)
+    f.add_legend(figure, handles, "bars: 95% intervals", ncols=2)
     return {"games": figure}
 
 

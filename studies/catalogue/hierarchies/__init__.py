@@ -64,7 +64,7 @@ def check(spec: Spec) -> None:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling.
 
     Cases are sorted by number of robots, whose value decides, and hierarchy. Times are of one
     decision of the whole team.
@@ -161,7 +161,7 @@ def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
     figures.name_rows(panels[0, 0], rows)
     if len(whose) > 1:
         names = [f"value of: {value_of}" for value_of in whose]
-        figures.name_points(figure, names, "means over seeds, bars: 95 % intervals")
+        figures.name_points(figure, names, "means over seeds, bars: 95% intervals")
     return figure
 
 
@@ -170,7 +170,7 @@ def draw(analysis: Analysis) -> Figures:
 
     Of one size it is a chart of success and messages, with a row for each hierarchy. Otherwise
     there is a column of panels for each choice of whose value decides. Points are means over seeds,
-    bars their 95 % intervals; hierarchies differ by colour and marker, and stand a little beside
+    bars their 95% intervals; hierarchies differ by colour and marker, and stand a little beside
     each other.
     """
     from ...presentation import figures  # matplotlib takes its time
@@ -200,7 +200,7 @@ def draw(analysis: Analysis) -> Figures:
     figures.log_axis(panels[1, 0])
     for axes, title in zip(panels[:, 0], (main, "deciding [ms]"), strict=True):
         axes.set_ylabel(title)
-    figures.name_lines(figure, hierarchies, "means over seeds, bars: 95 % intervals")
+    figures.name_lines(figure, hierarchies, "means over seeds, bars: 95% intervals")
     return {"hierarchies": figure}
 
 

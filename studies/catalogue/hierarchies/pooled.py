@@ -5,7 +5,7 @@ small difference that is the same everywhere is found. Success saturates near 1,
 the goal do not: both count alike. That a difference is not significant does not make it none:
 hierarchies are *equal* if the whole interval lies within a margin, `MARGIN` of success and `SLOWER`
 of decisions, which were named before the comparisons that rest on them (two one-sided tests at
-.025, Schuirmann 1987).
+0.025, Schuirmann 1987).
 """
 
 from __future__ import annotations

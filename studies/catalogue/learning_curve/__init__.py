@@ -126,7 +126,7 @@ def _of_evaluations(results: Results) -> Analysis:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure, a panel for every measure that is followed.
 
-    Lines are means over seeds, bands their 95 % intervals. A condition has a colour and a style of
+    Lines are means over seeds, bands their 95% intervals. A condition has a colour and a style of
     line of its own, so that lines upon each other are distinguished.
     """
     from ...presentation import figures as f  # matplotlib takes its time
@@ -155,5 +155,5 @@ def draw(analysis: Analysis) -> Figures:
     same = len(set(seeds.values())) == 1
     labels = [c if same else f"{c} ({n} seeds)" for c, n in seeds.items()]
     note = f"mean over {next(iter(seeds.values()))} seeds" if same else "mean over seeds"
-    f.name_curves(figure, labels, f"{note}, band: 95 % interval")
+    f.name_curves(figure, labels, f"{note}, band: 95% interval")
     return {"learning-curves": figure}

@@ -84,7 +84,7 @@ def evaluated_after(results: Results, condition: str) -> dict[int, str]:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("evaluation")
     main = results.main
     title = f"evaluation {main.heading}"
@@ -123,7 +123,7 @@ def analyse(results: Results) -> Analysis:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: evaluations against experience, a panel for each condition.
 
-    The condition's line has a colour, and a band for its 95 % intervals; those of the others are
+    The condition's line has a colour, and a band for its 95% intervals; those of the others are
     grey.
     """
     from matplotlib.ticker import LogLocator

@@ -9,7 +9,7 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 import numpy as np
 
 from ...results.analysis import EVALUATED, Analysis, Difference, Figures, Summary, adjust, ratio
-from ...results.notation import format_estimate
+from ...results.notation import format_estimate, format_p
 from ...results.power import power_lines
 from ...results.results import Results
 from ...results.statistics import bootstrap, rate
@@ -27,7 +27,7 @@ def check(spec: Spec) -> None:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling.
 
     Ratios are the cases: by condition, p of no difference, adjusted over its boxes.
     """
@@ -50,7 +50,7 @@ def analyse(results: Results) -> Analysis:
             notes.append(f"\n{condition}, ratio to the box of training:")
             for d in compared:
                 shown = format_estimate(d.estimate)
-                notes.append(f"  {d.condition}: {shown}, p = {d.p:.2g} (adjusted)")
+                notes.append(f"  {d.condition}: {shown}, p {format_p(d.p)} (adjusted)")
             notes += power_lines([d.sample for d in compared], "evaluation success")
     return Analysis(tuple(table), tuple(notes), ratios)
 

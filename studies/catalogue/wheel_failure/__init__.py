@@ -158,7 +158,7 @@ class Course(NamedTuple):
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling.
 
     Differences are success at the end of every case over that of the same fault when nothing
     adapts.
@@ -224,7 +224,7 @@ def draw(analysis: Analysis) -> Figures:
     """Return the figure: success from episode to episode, fault by fault.
 
     A panel for every fault, a line for what adapts; running means over seeds and episodes, bands
-    their 95 % intervals. Wheels fail at grey lines.
+    their 95% intervals. Wheels fail at grey lines.
     """
     from ...presentation import figures as f  # matplotlib takes its time
 
@@ -251,7 +251,7 @@ def draw(analysis: Analysis) -> Figures:
         f.as_episodes(axes)
     handles = [f.handle(case, **f.look(i)) for i, case in enumerate(cases)]
     seeds = f.count_seeds(len(course.success) for course in courses)
-    title = f"what adapts\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95 % bands"
+    title = f"what adapts\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95% bands"
     f.add_legend(figure, handles, title, ncols=len(cases))
     return {"wheel-failure": figure}
 

@@ -27,7 +27,7 @@ def test_a_plan_tells_trials_time_memory_and_power() -> None:
     assert 5e7 < plan.memory < 1e10
     text = str(plan)
     assert "trials   10, each 4 episodes of up to 20 steps" in text
-    assert "5 seeds cannot give an adjusted p below .05" in text
+    assert "5 seeds cannot give an adjusted p below 0.05" in text
     assert f"time     about {duration(plan.likely)} with 2 processes" in text
     assert "at most" not in text
     assert max(map(len, text.splitlines())) <= 80

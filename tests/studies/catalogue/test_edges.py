@@ -77,7 +77,7 @@ def test_told_by_considered_is_drawn_as_four_fields_for_each_size() -> None:
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["2 robots", "4 robots"]
     fields = [text.get_text() for text in figure.axes[0].texts[::2]]
     assert fields[0] == "0"  # neither
-    assert fields[2].startswith(".3")  # told only
+    assert fields[2].startswith("0.3")  # told only
     assert figure.axes[0].images[0].get_array().shape == (2, 2)
 
 

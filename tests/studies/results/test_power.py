@@ -90,10 +90,10 @@ def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
     found = compared([1.0] * 5, [0.0] * 5, "other", "third")
     assert [round(d.raw, 4) for d in found] == [0.0625, 0.0625]
     text = " ".join(" ".join(verdict_lines(found)).split())
-    assert "+1.00 [+.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
+    assert "+1.00 [+0.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
     said = " ".join(line.strip() for line in power_lines([d.sample for d in found]))
-    assert "5 seeds and 2 comparisons cannot give an adjusted p below .05" in said
-    assert "It needs at least 7 seeds; for a difference of .20, about" in said
+    assert "5 seeds and 2 comparisons cannot give an adjusted p below 0.05" in said
+    assert "It needs at least 7 seeds; for a difference of 0.20, about" in said
 
 
 def test_without_deviation_nothing_is_promised() -> None:

@@ -94,14 +94,14 @@ def test_figures_of_a_report_are_of_measures_with_a_law() -> None:
 def test_the_published_study_of_scaling_by_command_and_in_python(capsys, tmp_path) -> None:
     file = ROWS / "scaling.json"
     figure = tmp_path / "law.svg"
-    command = ["fit", str(file), "--criterion", ".8", "--predict", "32", "--plot", str(figure)]
+    command = ["fit", str(file), "--criterion", "0.8", "--predict", "32", "--plot", str(figure)]
     assert main(command) == 0
     out = capsys.readouterr().out
-    assert out.startswith("decisions to .80 of success")
+    assert out.startswith("decisions to 0.80 of success")
     assert all(len(line) <= 80 for line in out.splitlines())
     assert "<svg" in figure.read_text()
     growth = na.scaling_law(na.load(file), criterion=0.8, predict=[32])
-    assert growth.table.titles == ("exponent", "at 32 (90 %)")
+    assert growth.table.titles == ("exponent", "at 32 (90%)")
     assert str(growth.table).splitlines()[1].split()[1] in out
     assert main([*command[:2], "--format", "csv"]) == 0
     assert capsys.readouterr().out.startswith("condition,")
