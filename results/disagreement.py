@@ -15,13 +15,14 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..core.interface.measures import RETURN
 from ..studies.cli.display import print_text
 from ..studies.presentation import figures
 from ..studies.results import published
 from ..studies.results.analysis import Difference, differences
 from ..studies.results.notation import format_estimate, format_number, format_p
 from ..studies.results.results import Results
-from ..studies.results.statistics import Array, Estimate, bootstrap, rate
+from ..studies.results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate
 from ..studies.store.database import EVALUATION
 from . import ROWS
 
@@ -67,7 +68,7 @@ def disagreement(results: Results, robots: int) -> Disagreement:
             phase = f"{EVALUATION}{side}, {name}"
             success[side].append(rate(results.values(condition, "success", phase)))
             steps = results.means(condition, phase, "steps").to_numpy()
-            decisions[side].append(bootstrap(steps))
+            decisions[side].append(bootstrap(steps, bounds=NOT_NEGATIVE))
             agreement[side].append(float(results.values(condition, "agreement", phase).mean()))
             means[side].append(results.means(condition, phase).to_numpy())
     pairs = [
@@ -94,7 +95,7 @@ def disagreement(results: Results, robots: int) -> Disagreement:
         decisions,
         agreement,
         differences({"": pairs})[""],
-        differences({"": logs}, of_rates=False)[""],
+        differences({"": logs}, RETURN)[""],
         _threshold(less, list(errors.values())),
     )
 

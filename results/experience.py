@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.interface import measures as interface
 from ..core.interface.measures import SUCCESS
 from ..core.numerics import FloatArray, pd
 from ..studies.api.loading import load
@@ -175,7 +176,9 @@ def edge(name: str, rows: pd.DataFrame) -> EdgeWorth:
     last = of_networks[of_networks["decisions"] == task.shown[-1]]
     ends = last.pivot_table(index="seed", columns="condition", values=measure)
     pairs = [(c, measure, ends[task.edges], ends[c]) for c in ends if c != task.edges]
-    compared = differences({name: pairs}, of_rates=measure == SUCCESS.name)[name]
+    compared = differences({name: pairs}, SUCCESS if measure == SUCCESS.name else interface.RETURN)[
+        name
+    ]
     (worth,) = [d for d in compared if d.condition == task.without]
     means = ends.mean()
     span = SPAN * float(means.max() - means[RANDOM])

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.agents.cost import Problem
+from ..core.interface.measures import SUCCESS
 from ..core.numerics import pd
 from ..studies.catalogue.chain_order import order_tests
 from ..studies.catalogue.shapes import ratios_of
@@ -106,7 +107,7 @@ def contact_gained(results: Results) -> Measured | None:
         contact = results.values(condition, CONTACT)
         more = contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1)
         gained.append(pd.Series(more, results.seeds(condition)))
-    return _paired(gained[0], gained[1], lambda own, base: bootstrap(own - base))
+    return _paired(gained[0], gained[1], lambda own, base: bootstrap(own - base, bounds=(-2, 2)))
 
 
 def cost_error(results: Results) -> Measured:
@@ -165,7 +166,7 @@ def gained_by_edges(results: Results, edges: str, less: str) -> Measured | None:
     success_of = select_shared([results.means(c, "evaluation") for pair in pairs for c in pair])
     own = np.mean(success_of[::2], axis=0)
     other = np.mean(success_of[1::2], axis=0)
-    return Measured(paired_difference(own, other, of_rates=True), len(own)) if len(own) else None
+    return Measured(paired_difference(own, other, SUCCESS), len(own)) if len(own) else None
 
 
 def order_matters(results: Results) -> Measured | None:

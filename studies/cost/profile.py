@@ -305,7 +305,8 @@ def _growth(rows: Sequence[Profile]) -> Iterator[str]:
         text = (
             f"{f'{group}: ' * bool(group)}{first.agents} to {last.agents} agents: decisions take "
             f"{format_number(longer)} times as long: {format_number(tried)} times the joint "
-            f"actions, each {format_number(longer / tried)} times as long. {shares[most]:.0%} is {most}"
+            f"actions, each {format_number(longer / tried)} times as long. {shares[most]:.0%} is "
+            f"{most}"
         )
         yield from wrap(f"{text}; {_evaluators(own)}.", WIDTH, subsequent_indent="  ")
 

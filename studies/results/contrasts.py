@@ -23,10 +23,6 @@ from .power import power_lines
 from .results import SECONDS, Results, describe_number
 from .statistics import Array, Estimate, bootstrap
 
-STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
-EPISODES = (STEPS, RETURN)
-"""What is known of every episode besides the measures of its scenario."""
-
 
 class Group(NamedTuple):
     """Conditions that are compared with each other."""
@@ -79,8 +75,7 @@ class Contrasts(NamedTuple):
         for group in self.groups:
             head = ": ".join(filter(None, (group.setting, self.title)))
             groups[f"{head}, less that of {group.reference}"] = group.differences
-        is_rate = self.measure.is_rate
-        lines = verdicts(groups, self.measure.better, self.title, of_rates=is_rate)
+        lines = verdicts(groups, self.measure, self.title)
         return (*(lines or [NOTHING]), *identity_lines(self.identical))
 
 
@@ -124,7 +119,7 @@ def contrasts(
         setting: [(name, measure, values[c], values[members[0][1]]) for name, c in members[1:]]
         for setting, members in groups
     }
-    compared = differences(pairs, of_rates=shown_as.is_rate)
+    compared = differences(pairs, shown_as)
     compared_groups = []
     for setting, members in groups:
         less = {d.condition: {"difference": d.estimate} for d in compared[setting]}
@@ -184,7 +179,7 @@ _Pairs = list[tuple[str, str]]
 
 def values_of(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, BySeed], str]:
     """Return a measure, its means of seeds by condition, and the phase that they are of."""
-    measures = {m.name: m for m in (*results.measures, *EPISODES)}
+    measures = {m.name: m for m in (*results.measures, results.steps(phase), RETURN)}
     name = next((m.name for m in measures.values() if m.heading == name), name)
     if not results.phases:
         raise SpecError("no trial has finished")

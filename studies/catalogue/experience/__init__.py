@@ -11,15 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.interface.measures import SUCCESS
+from ....core.interface.measures import RETURN, SUCCESS
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, differences, verdicts
-from ...results.results import Results
-from ...results.statistics import Array, Estimate, bootstrap, rate, stack_estimates
+from ...results.results import CPU, Results
+from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stack_estimates
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..peers import AFTER, CPU, evaluated_after
+from ..peers import AFTER, evaluated_after
 from ..study import check_evaluated
 
 FIRST = 1000
@@ -27,7 +27,6 @@ FIRST = 1000
 DECISIONS = "decisions"
 """Name of the number of decisions that a trial was trained for."""
 NUMBERS = (DECISIONS,)
-RETURN = "evaluation return"
 
 
 def stops(decisions: int) -> list[int]:
@@ -92,8 +91,9 @@ def analyse(results: Results) -> Analysis:
     conditions = results.of_phase("evaluation")
     is_rate = all(results.has(condition, "evaluation", SUCCESS.name) for condition in conditions)
     is_rate = is_rate and any(results.success(c, "evaluation").any() for c in conditions)
-    name = SUCCESS.name if is_rate else "return"
-    title = EVALUATED if is_rate else RETURN
+    measure = SUCCESS if is_rate else RETURN
+    name = measure.name
+    title = EVALUATED if is_rate else "evaluation return"
     unknown = next((c for c in conditions if not results.has(c, "evaluation", name)), None)
     if unknown is not None:  # published results keep no returns
         raise SpecError(f"study = 'experience': results of {unknown!r} have no {name}")
@@ -112,7 +112,7 @@ def analyse(results: Results) -> Analysis:
         seconds = [key for key in numbers if key.startswith(CPU)]
         if seconds:
             last = max(seconds, key=lambda key: int(key.removeprefix(CPU)))
-            estimates["CPU [s]"] = bootstrap(numbers[last])
+            estimates["CPU [s]"] = bootstrap(numbers[last], bounds=NOT_NEGATIVE)
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
         stacked = stack_estimates([*values.values()])
         courses.append(ReturnCourse(condition, np.array([*values], float), stacked))
@@ -120,11 +120,11 @@ def analyse(results: Results) -> Analysis:
         return Analysis(())
     means = [results.means(condition, "evaluation", name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
-    compared = differences({title: pairs[1:]}, of_rates=is_rate)
+    compared = differences({title: pairs[1:]}, measure)
     heads = {f"{title}, less that of {conditions[0]}": compared[title]}
     notes = (
         "after N: when evaluated after N joint decisions of training, of all worlds.",
-        *verdicts(heads, of_rates=is_rate),
+        *verdicts(heads, measure),
     )
     return Analysis(tuple(table), notes, courses, compared)
 
@@ -143,7 +143,7 @@ def draw(analysis: Analysis) -> Figures:
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     axes.set_xlabel("joint decisions of training")
     is_rate = EVALUATED in analysis.differences
-    axes.set_ylabel(EVALUATED if is_rate else RETURN)
+    axes.set_ylabel(EVALUATED if is_rate else "evaluation return")
     axes.grid(axis="y", alpha=0.25)
     if is_rate:
         f.as_rates(axes)

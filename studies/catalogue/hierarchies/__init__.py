@@ -104,7 +104,7 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
     for case, own in zip(cases, means, strict=True):
         if case.setting in bases and case.hierarchy != reference:
             pairs[case.setting].append((case.hierarchy, title, own, bases[case.setting]))
-    judgement, lines = judged(pairs, reference, title, of_rates=main.is_rate)
+    judgement, lines = judged(pairs, reference, main, title)
     compared = {setting: own for setting, own in judgement.items() if own}
     notes = ["Rows: what else is swept, hierarchy."] * any(case.value_of for case in cases)
     return Analysis(tuple(table), (*notes, MESSAGES, "", *(lines or [NOTHING])), cases, compared)
@@ -119,7 +119,7 @@ def estimates(
     values = {f"evaluation {main.heading}": estimate_of(results, condition, phase, main)}
     decisions = to_the_goal(success, results.values(condition, "steps", phase))
     if len(decisions):
-        values["decisions to goal"] = bootstrap(decisions, bounds=NOT_NEGATIVE)
+        values["decisions to goal"] = bootstrap(decisions, bounds=results.steps(phase).bounds)
     values[DECIDING] = bootstrap(1e3 * deciding, bounds=NOT_NEGATIVE)
     values["messages"] = exactly(messages[0])
     return values

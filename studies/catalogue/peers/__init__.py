@@ -20,7 +20,7 @@ from ...results.analysis import (
     evaluated,
     judged,
 )
-from ...results.results import Results
+from ...results.results import CPU, Results
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, stack_estimates
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
@@ -30,8 +30,6 @@ CHECKPOINTS = (0.01, 0.03, 0.1, 0.3)
 """Shares of the episodes after which training stops for an evaluation, before the last one."""
 AFTER = "after "
 """With what the phase of such an evaluation begins; the number of episodes follows."""
-CPU = "cpu."
-"""With what the name of the CPU seconds until then begins; the number of episodes follows."""
 
 
 def stops(episodes: int) -> list[int]:
@@ -115,7 +113,7 @@ def analyse(results: Results) -> Analysis:
         return Analysis(())
     means = [results.means(condition, "evaluation", main.name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
-    compared, lines = judged({title: pairs[1:]}, conditions[0], of_rates=main.is_rate)
+    compared, lines = judged({title: pairs[1:]}, conditions[0], main)
     notes = (f"{main.heading}, N: when evaluated after N episodes of training.", *lines)
     return Analysis(tuple(table), notes, courses, compared)
 

@@ -11,6 +11,7 @@ from nested_agents.studies.catalogue.learning_curve import analyse, curves_of, d
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import Cell, write_rows
 from nested_agents.studies.results.notation import format_number
+from nested_agents.studies.results.results import STEPS
 from nested_agents.studies.results.statistics import Estimate
 
 
@@ -124,6 +125,6 @@ def test_there_is_a_panel_for_every_number(further, tmp_path):
 
 
 def test_success_alone_makes_a_table():
-    assert [title for title, *_ in metrics_of((SUCCESS,), SUCCESS, 20)] == [
+    assert [title for title, *_ in metrics_of((SUCCESS,), SUCCESS, STEPS, 20)] == [
         "success first 5", "success last 5", "evaluation success", "evaluation steps",
     ]  # fmt: skip
