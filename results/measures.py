@@ -263,7 +263,10 @@ FAULTS = ("4 wheels, seized", "4 wheels, reversed")
 def recovered(results: Results, adapts: str) -> Measured | None:
     """Measure success at the end relative to before the failure, worst fault."""
     courses = (c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts)
-    return _worst(Measured(ratio(c.end, c.before), len(c.success), note=c.fault) for c in courses)
+    return _worst(
+        Measured(ratio(c.measured.end, c.measured.before), len(c.measured.success), note=c.fault)
+        for c in courses
+    )
 
 
 def worst_shape(results: Results, condition: str = "") -> Measured | None:

@@ -18,7 +18,7 @@ from ..errors import WIDTH
 from .notation import format_estimate, format_p, wrapped
 from .power import power_lines
 from .results import STEPS, Results
-from .statistics import LEVEL, Array, Estimate, bootstrap, exactly, paired_tests, rate
+from .statistics import LEVEL, NOT_NEGATIVE, Array, Estimate, bootstrap, exactly, paired_tests, rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,8 +61,23 @@ def estimate_of(
     values = results.values(condition, measure.name, phase)[:, part]
     if measure.is_rate:
         return rate(values)
-    known = results.steps(phase) if measure.name == STEPS.name else measure
-    return bootstrap(values.mean(axis=1), bounds=known.bounds)
+    if measure.name == STEPS.name:
+        return steps_estimate(values.mean(axis=1), results.steps(phase))
+    return bootstrap(values.mean(axis=1), bounds=measure.bounds)
+
+
+def estimate_over_seeds(values: Array, measure: Measure) -> Estimate:
+    """Return the mean of values ``(n_seeds,)`` of whole trials with its interval."""
+    return rate(values[:, None]) if measure.is_rate else bootstrap(values, bounds=measure.bounds)
+
+
+def steps_estimate(means: Array, steps: Measure) -> Estimate:
+    """Return the mean length of episodes, whose interval ends at the longest allowed.
+
+    Unlike that of a share, the interval has no width where all episodes are equally long.
+    """
+    value, low, high = bootstrap(means, bounds=NOT_NEGATIVE)
+    return Estimate(value, low, np.minimum(high, steps.bounds[1]))
 
 
 @dataclass(frozen=True)

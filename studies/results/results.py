@@ -35,6 +35,8 @@ DONE = "done"
 """State of a trial that has finished."""
 
 
+KEPT = "weights kept"
+"""Phase of a copied team that keeps the weights it had when the failure began."""
 STEPS = Measure("steps", "steps", better="lower", least=0.0)
 """Length of an episode [decisions]."""
 
@@ -84,7 +86,7 @@ class Results:
     def steps(self, phase: str) -> Measure:
         """Return the measure of the length of episodes, which ends at the longest allowed."""
         limit = self.step_limits
-        is_training = phase.partition(":")[0] in ("training", "weights kept")
+        is_training = phase.partition(":")[0] in ("training", KEPT)
         return replace(STEPS, greatest=limit.training if is_training else limit.evaluation)
 
     @cached_property

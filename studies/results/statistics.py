@@ -227,32 +227,6 @@ def stack_estimates(estimates: Sequence[Estimate]) -> Estimate:
     return Estimate(*np.array(estimates, dtype=float).T)
 
 
-BLOCK = 5
-"""Episodes that a level is measured over."""
-REGAINED = 0.9
-"""Share of what a fault has cost that counts as recovered when it is back."""
-
-
-def recovery(short: ArrayLike, allowed: ArrayLike) -> tuple[Array, Array]:
-    """Return per seed whether it recovered from a fault, and after how many episodes.
-
-    It has at the first episode from which on `BLOCK` of them fall short by no more than is allowed.
-    A seed that never does counts with all the episodes that were run: a lower bound.
-
-    Parameters
-    ----------
-    short
-        What each episode from the fault on falls short of one without ``(n_seeds, n_episodes)``.
-    allowed
-        What a recovered one may fall short by: a number, or ``(n_seeds, 1)``.
-    """
-    blocks = np.lib.stride_tricks.sliding_window_view(np.asarray(short), BLOCK, axis=1)
-    regained = blocks.mean(axis=2) <= np.asarray(allowed) + 1e-12
-    recovered = regained.any(axis=1)
-    episodes = np.where(recovered, regained.argmax(axis=1), np.shape(short)[1])
-    return recovered.astype(float), episodes.astype(float)
-
-
 LEVEL = 0.05
 """What p must stay below for a difference to be called one."""
 EXACT = 99_999

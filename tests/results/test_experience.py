@@ -36,7 +36,7 @@ def test_the_page_has_what_edges_and_foresight_are_worth() -> None:
 @pytest.mark.parametrize(
     ("name", "decisions", "text"),
     [
-        ("arm", 100_000, "0.07 [0.01, 0.17]"),
+        ("arm", 100_000, "0.08 [0.01, 0.17]"),
         ("box", 100_000, "0.20 [-0.03, 0.39]"),
         ("box", 30_000, "-0.10 [-0.40, 0.10]"),
     ],

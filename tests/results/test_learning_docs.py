@@ -97,4 +97,4 @@ def test_failures_of_large_teams(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def _rounded(rate: str) -> str:
-    return f"{float(rate):.2f}".removeprefix("0") if 0 < float(rate) < 1 else rate.split(".")[0]
+    return format_number(float(rate))

@@ -84,12 +84,12 @@ def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
     yield from ("", *wrap(legend, WIDTH))
     for plays in distinct(plays for case in cases for plays in case.values):
         yield f"\nProbability of the optimal joint action after {plays:,} plays"
-        yield " " * widest + "".join(f"{letter:>4}" for letter in letters.values())
+        yield " " * widest + "".join(f"{letter:>5}" for letter in letters.values())
         for setting in settings:
             line = f"{', '.join(setting):{widest}}"
             for system in systems:
                 estimate = by_place.get((setting, system), {}).get(plays)
-                line += f"{format_number(float(estimate.value)) if estimate else '-':>4}"
+                line += f"{format_number(float(estimate.value)) if estimate else '-':>5}"
             yield line
 
 

@@ -28,6 +28,7 @@ from ...results.analysis import (
     Summary,
     estimate_of,
     judged,
+    steps_estimate,
 )
 from ...results.results import Results, Sizes
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exactly
@@ -119,7 +120,7 @@ def estimates(
     values = {f"evaluation {main.heading}": estimate_of(results, condition, phase, main)}
     decisions = to_the_goal(success, results.values(condition, "steps", phase))
     if len(decisions):
-        values["decisions to goal"] = bootstrap(decisions, bounds=results.steps(phase).bounds)
+        values["decisions to goal"] = steps_estimate(decisions, results.steps(phase))
     values[DECIDING] = bootstrap(1e3 * deciding, bounds=NOT_NEGATIVE)
     values["messages"] = exactly(messages[0])
     return values

@@ -30,7 +30,7 @@ COLUMNS = 3
 def check(spec: Spec) -> None:
     """Raise `SpecError` if something is to fail after the last episode of training."""
     for condition in spec.conditions():
-        for onset in condition.settings.scenario.onsets:
+        for onset, _ in condition.settings.scenario.failure_spans:
             if onset >= spec.episodes:
                 raise SpecError(
                     f"scenario.failures: one begins in episode {onset}, allowed 0 to "
