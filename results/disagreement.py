@@ -148,7 +148,7 @@ def lines(every: list[Disagreement]) -> list[str]:
             )
             longer = Estimate(*map(np.exp, own.longer[k].estimate))
             times = f"{format_estimate(longer)}, p {format_p(own.longer[k].p)}"
-            shown = name.removeprefix(SHOWN)
+            shown = format_number(own.errors[name])
             table.append(
                 f"| {own.robots} | {shown} | {told} | {silent} | {difference} | {right} | {spent} "
                 f"| {times} |"

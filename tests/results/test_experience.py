@@ -94,7 +94,7 @@ def test_claims_of_networks_are_the_lines_of_the_page(capsys, monkeypatch) -> No
     assert len(printed) == len(experience.TASKS)
     for name, line in zip(experience.TASKS, printed, strict=True):
         study, _, criterion, result, verdict = line.strip("| ").split(" | ")[-5:]
-        estimate, seeds, p = re.fullmatch(r"(.*]), (\d+) seeds, p (?:= 0?)?(.*)", result).groups()
+        estimate, seeds, p = re.fullmatch(r"(.*]), (\d+) seeds, p (?:= )?(.*)", result).groups()
         margin = criterion.removeprefix("p < 0.05, or equal within ")
         last = f"{experience.TASKS[name].shown[-1]:,}"
         row = (name, seeds, last, estimate, p, margin, verdict.strip("*"))
