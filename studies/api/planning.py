@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.interface.measures import Measure, main_measure
+from ...core.isolation import python_command
 from ...core.numerics import FloatArray, IntArray, optimize, pd
 from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
@@ -260,7 +261,7 @@ def _estimate(
     begin = time.perf_counter()
     used = _used()
     # Ctrl-C is for this process, which then kills that one: it would print a traceback.
-    subprocess.run([sys.executable, "-c", START], check=True, process_group=0)
+    subprocess.run(python_command(START), check=True, process_group=0)
     starting = STARTS * (_used() - used)
     with spec.sources.active():
         by_label = {
