@@ -35,6 +35,11 @@ from nested_agents.core.numerics.arrays import wrap_each
 
 wrap_each(np.zeros(1))
 assert wrap_each.compiled.stats.cache_hits  # another process has compiled it
+
+from numba import config
+
+config.reload_config()
+assert not config.DISABLE_JIT
 """
 SPAWN = """
 from multiprocessing import get_context
@@ -66,7 +71,7 @@ def traps(tmp_path: Path) -> Path:
         (folder / f"{name}.py").write_text(text)
     (folder / "pandas" / "__init__.py").write_text(text)
     (folder / "matplotlibrc").write_bytes(b"backend: module://random\n\xff\n")
-    kernels = f"cache_dir: {tmp_path / 'redirected'}\n"
+    kernels = f"cache_dir: {tmp_path / 'redirected'}\ndisable_jit: 1\n"
     (folder / ".numba_config.yaml").write_text(kernels)
     for name in ("pyproject.toml", "setup.cfg", ".env"):
         (folder / name).write_text("[[[\n")
