@@ -268,7 +268,7 @@ def pilot(trial: Trial) -> PilotCost:
         totals = np.full((3, 1), float(trial.decisions))
         decisions = trial.decisions
         rounds = 1 + len(stops(trial.decisions))
-    is_regression = trial.settings.learner.at_once == 1 and steps.max(initial=0.0) < max_steps
+    is_regression = trial.settings.learner.n_environments == 1 and steps.max(initial=0.0) < max_steps
     training = extrapolate(steps, seconds, totals, grows=is_regression)
     evaluating, lengths = _pilot_evaluations(session, longest, max_steps)
     n_evaluations = trial.evaluation * (rounds - 1 + len(lengths))
@@ -338,7 +338,7 @@ def _pilot_rollouts(session: Session, budget: int) -> tuple[FloatArray, FloatArr
 def _train_for(session: Session, decisions: int) -> int:
     """Train until a number of decisions is reached, one whole update at least; return how many."""
     learner = session.trial.settings.learner
-    update = learner.at_once * int(learner.model_dump().get("rollout", 1))
+    update = learner.n_environments * int(learner.model_dump().get("rollout", 1))
     return session.train_until(decisions - 1 + update)
 
 

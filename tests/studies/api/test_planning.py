@@ -127,7 +127,7 @@ def test_a_plan_of_three_sizes_tells_which_exponents_can_be_told_apart() -> None
     assert "Exponents" not in str(planning.plan(two, timed=False))
 
 
-PPO = {"kind": "ippo", "worlds": 8, "rollout": 20, "epochs": 1, "hidden": [8]}
+PPO = {"kind": "ippo", "environments": 8, "rollout": 20, "epochs": 1, "hidden": [8]}
 EXPERIENCE = {"study": "experience", "seeds": 3, "steps": 10, "evaluation": 1}
 
 
