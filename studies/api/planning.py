@@ -268,7 +268,9 @@ def pilot(trial: Trial) -> PilotCost:
         totals = np.full((3, 1), float(trial.decisions))
         decisions = trial.decisions
         rounds = 1 + len(stops(trial.decisions))
-    is_regression = trial.settings.learner.n_environments == 1 and steps.max(initial=0.0) < max_steps
+    is_regression = (
+        trial.settings.learner.n_environments == 1 and steps.max(initial=0.0) < max_steps
+    )
     training = extrapolate(steps, seconds, totals, grows=is_regression)
     evaluating, lengths = _pilot_evaluations(session, longest, max_steps)
     n_evaluations = trial.evaluation * (rounds - 1 + len(lengths))
@@ -406,4 +408,3 @@ def _peak_memory() -> float:
 
     peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     return peak * (1 if sys.platform == "darwin" else 1024)
-
