@@ -27,6 +27,5 @@ def test_every_source_is_in_the_bibliography() -> None:
     assert sorted(set(re.findall(r"@(\w+)", TEMPLATE))) == sorted(listed)
 
 
-def test_it_has_the_parts_and_the_length_of_a_paper_of_joss() -> None:
+def test_it_has_the_parts_of_a_paper_of_joss() -> None:
     assert re.findall(r"^# (.+)$", TEMPLATE, re.MULTILINE)[:2] == ["Summary", "Statement of need"]
-    assert 250 <= len((PAPER / "paper.md").read_text(encoding="utf-8").split()) <= 1100

@@ -76,10 +76,6 @@ def test_the_table_of_the_readme_is_published(capsys: pytest.CaptureFixture[str]
     assert price in " ".join(PAGES["README.md"].split())
 
 
-def test_the_readme_is_short() -> None:
-    assert len(PAGES["README.md"].splitlines()) <= 100
-
-
 def test_the_replay_is_small_and_the_version_is_one() -> None:
     assert (ROOT / "docs" / "push.gif").stat().st_size < 1_000_000
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]

@@ -116,8 +116,8 @@ class Plan:
     """What looks wrong and is not refused, a line each."""
     costs: Mapping[str, ConditionCost] = field(default_factory=dict)
     """By label, what conditions take that were tried."""
-    worlds: int = 1
-    """In how many worlds the learner that has the most learns at once."""
+    environments: int = 1
+    """Number of environments in which a learner learns at once, the largest of all conditions."""
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -132,8 +132,8 @@ class Plan:
         processes = count(self.processes, "process", "es")
         yield f"study    {outline.study}: {conditions} x {count(n_seeds, 'seed')}"
         yield f"trials   {self.trials}, each {outline.lengths} of up to {steps}"
-        if self.worlds > 1:
-            yield f"worlds   at most {self.worlds} at once; decisions are those of all together"
+        if self.environments > 1:
+            yield f"learning in up to {self.environments} environments, whose decisions add up"
         if self.seconds is not None and self.likely is not None:
             quick, slow = map(duration, self.seconds)
             usual = duration(self.likely)
@@ -246,7 +246,7 @@ def plan(
         smallest=smallest,
         warnings=spec.warnings(),
         costs=costs,
-        worlds=max(c.settings.learner.at_once for c in spec.conditions()),
+        environments=max(c.settings.learner.n_environments for c in spec.conditions()),
     )
 
 
@@ -343,14 +343,14 @@ def try_out(trial: Trial, seeds: int = 1) -> ConditionCost:
 def try_out_decisions(trial: Trial, budget: int, seeds: int = 1) -> ConditionCost:
     """Return what the trials of a condition take that train for a budget of decisions.
 
-    Rollouts of many worlds, or episodes of one, are tried; then two episodes of evaluation, of
-    which there are as many more as there are stops on the way.
+    Rollouts of many environments, or episodes of one, are tried; then two episodes of
+    evaluation, of which there are as many more as there are stops on the way.
     """
     begin = time.process_time()
     session = Session(replace(trial, seed=SEED, evaluation=min(trial.evaluation, EPISODES)))
     held = _bytes(session)
-    worlds = trial.settings.learner.at_once
-    piece = max(1, worlds * trial.settings.learner.model_dump().get("rollout", 1))
+    environments = trial.settings.learner.n_environments
+    piece = max(1, environments * trial.settings.learner.model_dump().get("rollout", 1))
     learns = trial.settings.learner.kind not in LEARN_NOTHING
     done = session.train_until(min(piece, budget)) if learns else 0
     loading = time.process_time() - begin
@@ -363,14 +363,14 @@ def try_out_decisions(trial: Trial, budget: int, seeds: int = 1) -> ConditionCos
     training = np.zeros(3)
     if taken:
         counts, seconds = np.array(taken).T
-        if worlds > 1:  # what is kept between updates does not grow
+        if environments > 1:  # what is kept between updates does not grow
             training += budget * seconds.sum() / counts.sum()
         else:
             rounds = np.array([budget / counts.mean()])
             training += learning_time(counts, seconds, np.array([counts.mean()]), rounds)
     elif learns:
         training += loading * budget / done
-    held += max(_bytes(session) - held, 0.0) if worlds > 1 else 0.0
+    held += max(_bytes(session) - held, 0.0) if environments > 1 else 0.0
     evaluating = _seconds(session.finish)
     rows = pd.DataFrame(session.result().rows)
     lengths = rows[rows["phase"] != "training"].groupby("phase")["steps"]

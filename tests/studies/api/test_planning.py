@@ -32,7 +32,7 @@ def test_a_plan_tells_trials_time_memory_and_power() -> None:
     assert "at most" not in text
     assert max(map(len, text.splitlines())) <= 80
     single = {"study": "peers", "seeds": 1, "episodes": 1}
-    assert "worlds" not in str(na.plan(single, timed=False))
+    assert "environments" not in str(na.plan(single, timed=False))
 
 
 def test_more_seeds_find_smaller_differences() -> None:
@@ -132,7 +132,7 @@ def test_a_plan_of_three_sizes_tells_which_exponents_can_be_told_apart() -> None
     assert "Exponents" not in str(planning.plan(two, timed=False))
 
 
-PPO = {"kind": "ippo", "worlds": 8, "rollout": 20, "epochs": 1, "hidden": [8]}
+PPO = {"kind": "ippo", "environments": 8, "rollout": 20, "epochs": 1, "hidden": [8]}
 EXPERIENCE = {"study": "experience", "seeds": 3, "steps": 10, "evaluation": 1}
 
 
@@ -162,7 +162,7 @@ def test_a_plan_counts_decisions_and_tells_of_checkpoints():
     text = str(na.plan(table))
     assert "each 1,000,000,000 decisions in episodes of up to 10 steps" in text
     assert "killed   a trial goes on from its checkpoint, every 5 min" in text
-    assert f"worlds   at most {PPO['worlds']} at once; decisions are those of all together" in text
+    assert f"up to {PPO['environments']} environments, whose" in text
     assert max(map(len, text.splitlines())) <= 80
     single = {"study": "peers", "seeds": 1, "episodes": 1}
-    assert "worlds" not in str(na.plan(single, timed=False))
+    assert "environments" not in str(na.plan(single, timed=False))
