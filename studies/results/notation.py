@@ -14,8 +14,8 @@ from .statistics import Estimate
 MAX_DECIMALS = 2
 MIN_SCIENTIFIC = 1e6
 """Smallest magnitude that is shown with a power of ten."""
-SIGNIFICANT = 12
-"""Digits that are taken for exact: values that differ beyond them are shown alike."""
+SIGNIFICANT, EXACT_DECIMALS = 12, 9
+"""Digits that are not rounding errors: values that differ beyond them are shown alike."""
 
 
 def format_number(value: float, *, signed: bool = False) -> str:
@@ -91,7 +91,7 @@ def _fixed(value: float, decimals: int, rounding: str = ROUND_HALF_UP, *, signed
     """Return a number with so many decimals, or with a power of ten; zero has neither."""
     if not math.isfinite(value):
         return "?" if math.isnan(value) else f"{value:+}" if signed else f"{value}"
-    exact = Decimal(f"{value:.{SIGNIFICANT}g}")
+    exact = Decimal(f"{round(value, EXACT_DECIMALS):.{SIGNIFICANT}g}")
     places = 1 - exact.adjusted() if abs(value) >= MIN_SCIENTIFIC else decimals
     rounded = exact.quantize(Decimal(1).scaleb(-places), rounding)
     if rounded == 0:
