@@ -31,9 +31,9 @@ REFUSING = ("strict", "surrogateescape")
 LEAST_ADDRESSES = 10**9
 """Of the process [bytes]: with less, libraries of linear algebra crash or wait for ever."""
 
-PUBLISHED = "...results.commands"
+PUBLISHED = "...research.commands"
 """Module of the commands on what has been published."""
-RESULTS = Path(__file__).parents[2] / "results"
+RESULTS = Path(__file__).parents[2] / "research"
 """Where that is in a checkout; an installed package does not have it."""
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": (".commands.running", "Train two e-Pucks to push a box: table, figures and replay."),
@@ -67,7 +67,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
 """The module of each command, imported when it is asked for, and what the help says of it."""
 FORMER = {
     "watch": "nested-agents status DIR --watch",
-    "course": "python examples/course/grade.py",
+    "course": "python research/course/grade.py",
     "--log": "--track tensorboard, mlflow or wandb",
     "--publish": "nested-agents export DIR --format json",
     "--wheels": "--agents, of which a robot has two, and --robots",
@@ -102,7 +102,7 @@ class _Commands(click.Group):
         if command is None and args[0] in COMMANDS:
             raise SpecError(
                 f"{args[0]}: is a command on published results, which are in the repository, in "
-                "results/, not in the installed package"
+                "research/, not in the installed package"
             )
         if command is None and args[0] in FORMER:
             raise SpecError(f"{args[0]}: of version 0.3.0; now {FORMER[args[0]]}")
