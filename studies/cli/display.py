@@ -37,7 +37,10 @@ def print_data(text: str) -> None:
 def print_wrapped(text: str, first: str = "", indent: int = 4) -> None:
     """Print a text over the width of the terminal, after `first`; further lines are indented."""
     width = get_terminal_size().columns
-    print_text(fill(text, width, initial_indent=first, subsequent_indent=" " * indent))
+    later = " " * indent
+    print_text(
+        fill(text, width, initial_indent=first, subsequent_indent=later, break_on_hyphens=False)
+    )
 
 
 def print_lines(lines: Iterable[str]) -> None:

@@ -114,7 +114,7 @@ decisions = 200
 steps = 5
 evaluation = 2
 scenario.kind = "spread"
-learner = { kind = "hierarchy-ppo", worlds = 4, rollout = 25, batch_size = 50 }
+learner = { kind = "hierarchy-ppo", environments = 4, rollout = 25, batch_size = 50 }
 [[overrides]]
 name = "hierarchy-ppo, chain"
 topology = { kind = "chain", told = "ancestors" }

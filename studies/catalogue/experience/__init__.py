@@ -1,8 +1,8 @@
 """The experience study: what teams return after more and more decisions, on a logarithmic axis.
 
 A trial trains for `decisions` joint decisions, and stops at 1,000, 3,000, 10,000 and so on for an
-evaluation without exploration, on the same worlds every time. Learners in many worlds at once count
-the decisions of all of them. Conditions that learn nothing are evaluated without training. The
+evaluation without exploration, on the same worlds every time. Learners in many environments
+count the decisions of all. Conditions that learn nothing are evaluated without training. The
 first condition is compared with all others at the end, paired by seed.
 """
 
@@ -55,11 +55,11 @@ def check(spec: Spec) -> None:
         raise SpecError("decisions: missing; experience needs a budget, as decisions = 1000000")
     for condition in spec.conditions():
         learner = condition.settings.learner
-        rollout = learner.model_dump().get("rollout", 0) * learner.at_once
+        rollout = learner.model_dump().get("rollout", 0) * learner.n_environments
         if spec.decisions < rollout:
             raise SpecError(
                 f"decisions = {spec.decisions}: less than a rollout of {rollout} decisions in "
-                f"{learner.at_once} worlds, nothing would be learned (condition "
+                f"{learner.n_environments} environments, nothing would be learned (condition "
                 f"{condition.label!r})"
             )
 
@@ -136,7 +136,7 @@ def analyse(results: Results) -> Analysis:
     compared = differences({title: pairs[1:]}, of_rates=is_rate)
     heads = {f"{title}, less that of {conditions[0]}": compared[title]}
     notes = (
-        "after N: when evaluated after N joint decisions of training, of all worlds.",
+        "after N: when evaluated after N joint decisions of training, of all environments.",
         *verdicts(heads, of_rates=is_rate),
     )
     return Analysis(tuple(table), notes, courses, compared)

@@ -96,7 +96,9 @@ def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> N
     with pytest.raises(SpecError, match=r"'ippo': needs the extra peers, pip install") as raised:
         check_conditions(spec_of("ippo"))
     assert "\n" not in str(raised.value)
-    assert str(raised.value).endswith("learner.worlds = 16 in study = 'experience' does without")
+    assert str(raised.value).endswith(
+        "learner.environments = 16 in study = 'experience' does without"
+    )
 
 
 @pytest.mark.parametrize("kind", SHORT)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.interface.plain import as_scenario
-from nested_agents.core.interface.stacked import LoopedWorlds
+from nested_agents.core.interface.stacked import LoopedEnvironments
 from nested_agents.scenarios import SCENARIOS
 
 TABLES = {
@@ -46,8 +46,8 @@ def seeds_from(first):
 
 @pytest.mark.parametrize("name", TABLES)
 def test_many_worlds_are_each_by_itself(name):
-    many = build(name).worlds(COUNT)
-    single = LoopedWorlds([build(name) for _ in range(COUNT)])
+    many = build(name).environments(COUNT)
+    single = LoopedEnvironments([build(name) for _ in range(COUNT)])
     assert np.array_equal(many.reset(seeds_from(0)), single.reset(seeds_from(0)))
     rng = np.random.default_rng(0)
     n, n_actions = len(build(name).agents), len(build(name).action_set)
@@ -66,8 +66,8 @@ def test_permuting_worlds_permutes_what_they_return(name):
     n, n_actions = len(build(name).agents), len(build(name).action_set)
     order = np.array([3, 0, 4, 1, 2])
     joint = np.random.default_rng(1).integers(0, n_actions, (6, COUNT, n))
-    plain = build(name).worlds(COUNT)
-    mixed = build(name).worlds(COUNT)
+    plain = build(name).environments(COUNT)
+    mixed = build(name).environments(COUNT)
     seeds = seeds_from(0)
     states = plain.reset(seeds)
     assert np.array_equal(mixed.reset([seeds[k] for k in order]), states[order])
@@ -79,4 +79,4 @@ def test_permuting_worlds_permutes_what_they_return(name):
 def test_an_arm_that_fails_is_stepped_by_itself():
     failure = {"kind": "stuck", "joints": "joint2"}
     settings = SCENARIOS.parsed("kinematic-chain", failures=(failure,))
-    assert settings.build().worlds(2) is None
+    assert settings.build().environments(2) is None

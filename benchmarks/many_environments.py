@@ -1,8 +1,7 @@
-"""Joint decisions a second of learners in many worlds at once, updates included.
+"""Joint decisions per second of PPO in many environments, updates included.
 
-``python -m benchmarks.many_worlds`` prints them for chains of PPO agents in spread, on arms and at
-boxes, by processor time, with 64 worlds and with two, the least that NumPy learns in. Linear
-algebra is to have one thread, as in studies: set ``OPENBLAS_NUM_THREADS=1``.
+``python -m benchmarks.many_environments`` measures chains of agents by CPU time. Linear algebra
+must use one thread, as in studies: set ``OPENBLAS_NUM_THREADS=1``.
 """
 
 from itertools import pairwise
@@ -11,7 +10,7 @@ from time import process_time
 import numpy as np
 
 from nested_agents.core.agents.loop import policy_seed
-from nested_agents.core.agents.many_worlds import ManyWorldsLoop
+from nested_agents.core.agents.many_environments import ManyEnvironmentsLoop
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.networks.settings import HierarchyPPOSettings
@@ -29,28 +28,28 @@ CASES = (
     ("box, 4", "box-pushing", {"robots": 4}, 64, 5),
     ("box, 8", "box-pushing", {"robots": 8, "state_space": "crowd"}, 64, 5),
 )
-"""What acts where, in how many worlds, and how often an update passes over a rollout."""
+"""Title, scenario kind, its settings, number of environments, and epochs of an update."""
 TRANSITIONS = 6400
-"""Joint decisions of a rollout, of all worlds."""
+"""Joint decisions of a rollout, in all environments."""
 
 
 def decisions_a_second(
-    kind: str, table: dict[str, int | str], worlds: int, epochs: int, *, updates: bool = True
+    kind: str, table: dict[str, int | str], environments: int, epochs: int, *, updates: bool = True
 ) -> float:
     """Return joint decisions a second of processor time, over one rollout and its update."""
     world = SCENARIOS.parsed(kind, **table).build()
     agents = world.agents
     chain = Hierarchy(agents, list(pairwise(agents)))
-    size = TRANSITIONS // worlds
+    size = TRANSITIONS // environments
     rollout = size if updates else 2 * size
     settings = HierarchyPPOSettings(
-        worlds=worlds, rollout=rollout, batch_size=1200, epochs=epochs, discount=0.95
+        environments=environments, rollout=rollout, batch_size=1200, epochs=epochs, discount=0.95
     )
     team = Team(settings, world, chain, policy_seed(10_000))
-    many = world.worlds(worlds)
+    many = world.environments(environments)
     if many is None:
         raise ValueError(f"{kind}: steps one world at a time")
-    loop = ManyWorldsLoop(many, world, team, 150, 10_000)
+    loop = ManyEnvironmentsLoop(many, world, team, 150, 10_000)
     if updates:
         for _ in range(size):  # the first rollout compiles and makes room
             loop.step()
@@ -60,16 +59,18 @@ def decisions_a_second(
     steps = size if updates else size - 2
     for _ in range(steps):
         loop.step()
-    return steps * worlds / (process_time() - begin)
+    return steps * environments / (process_time() - begin)
 
 
 def main() -> None:
     """Print a line for every case."""
-    print("case       worlds epochs  decisions/s  without updates")
-    for title, kind, table, worlds, epochs in CASES:
-        whole = decisions_a_second(kind, table, worlds, epochs)
-        acting = decisions_a_second(kind, table, worlds, epochs, updates=False)
-        print(f"{title:<10} {worlds:>6} {epochs:>6} {np.round(whole):>12,.0f} {acting:>16,.0f}")
+    print("case       environments epochs  decisions/s  without updates")
+    for title, kind, table, environments, epochs in CASES:
+        whole = decisions_a_second(kind, table, environments, epochs)
+        acting = decisions_a_second(kind, table, environments, epochs, updates=False)
+        print(
+            f"{title:<10} {environments:>6} {epochs:>6} {np.round(whole):>12,.0f} {acting:>16,.0f}"
+        )
 
 
 if __name__ == "__main__":
