@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...studies.studies.catalogue import ablation
-from ...studies.studies.catalogue.study import measure as measure
-from ...studies.studies.results.analysis import Analysis, Figures, phases_of, select_shared
-from ...studies.studies.results.contrasts import Group, contrasts
-from ...studies.studies.results.notation import two_figures
-from ...studies.studies.results.results import Results
-from ...studies.studies.results.statistics import LEVEL, Friedman, friedman, holm
+from ...studies.catalogue import ablation
+from ...studies.catalogue.study import measure as measure
+from ...studies.results.analysis import Analysis, Figures, phases_of, select_shared
+from ...studies.results.contrasts import Group, contrasts
+from ...studies.results.notation import two_figures
+from ...studies.results.results import Results
+from ...studies.results.statistics import LEVEL, Friedman, friedman, holm
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -121,6 +121,6 @@ def _legend(orders: Sequence[str]) -> list[str]:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: what each order differs from the first one by."""
-    from ...studies.studies.presentation.figures import draw_forest
+    from ...studies.presentation.figures import draw_forest
 
     return draw_forest("chain-order", analysis.differences, "difference from the first order")

@@ -16,23 +16,23 @@ from functools import partial
 
 import numpy as np
 
-from ...studies.core.agents.loop import StepRecord
-from ...studies.studies.catalogue.hierarchies import analysis_of, estimates
-from ...studies.studies.catalogue.hierarchies.cases import HierarchyCase
-from ...studies.studies.catalogue.hierarchies.pooled import effects, lines_of
-from ...studies.studies.catalogue.study import (
+from ...core.agents.loop import StepRecord
+from ...studies.catalogue.hierarchies import analysis_of, estimates
+from ...studies.catalogue.hierarchies.cases import HierarchyCase
+from ...studies.catalogue.hierarchies.pooled import effects, lines_of
+from ...studies.catalogue.study import (
     check_evaluated,
     check_evaluations,
     check_rule_bases,
     distinct,
 )
-from ...studies.studies.results.analysis import EVALUATED, Analysis, Figures
-from ...studies.studies.results.notation import two_figures
-from ...studies.studies.results.results import Results, Sizes
-from ...studies.studies.spec.spec import Spec
-from ...studies.studies.spec.tables import label_but
-from ...studies.studies.trials.session import Session
-from ...studies.studies.trials.trial import Trial, TrialResult
+from ...studies.results.analysis import EVALUATED, Analysis, Figures
+from ...studies.results.notation import two_figures
+from ...studies.results.results import Results, Sizes
+from ...studies.spec.spec import Spec
+from ...studies.spec.tables import label_but
+from ...studies.trials.session import Session
+from ...studies.trials.trial import Trial, TrialResult
 
 PUBLISHED = ("success", "agreement")
 """Measures of an episode that published results keep."""
@@ -88,7 +88,7 @@ def draw(analysis: Analysis) -> Figures:
 
     The second figure has a panel for each setting, if there are enough seeds to compare.
     """
-    from ...studies.studies.presentation.figures import draw_forest
+    from ...studies.presentation.figures import draw_forest
 
     names = {case.hierarchy for case in analysis.cases if EVALUATED in case.values}
     figures = _draw_parted(analysis) if {*sum(PARTED, ())} <= names else {}
@@ -98,7 +98,7 @@ def draw(analysis: Analysis) -> Figures:
 
 def _draw_parted(analysis: Analysis) -> Figures:
     """Draw success by telling and considering: four fields of a colour for each setting."""
-    from ...studies.studies.presentation import figures
+    from ...studies.presentation import figures
 
     cases = sorted(analysis.cases, key=lambda case: (case.value_of, case.robots))
     by_name = {(case.setting, case.hierarchy): case.values[EVALUATED] for case in cases}

@@ -9,17 +9,17 @@ that are optimal: if one play is evaluated, that of seeds that reach the optimum
 edges are compared with none, as in the study `hierarchies`.
 """
 
-from ...studies.studies.catalogue.hierarchies import analysis_of
-from ...studies.studies.catalogue.hierarchies.cases import HierarchyCase
-from ...studies.studies.catalogue.study import check_evaluated, distinct
-from ...studies.studies.errors import SpecError
-from ...studies.studies.results.analysis import EVALUATED, Analysis, Figures
-from ...studies.studies.results.results import Results, Sizes
-from ...studies.studies.results.statistics import exactly, rate
-from ...studies.studies.spec.spec import Spec
-from ...studies.studies.spec.tables import label
-from ...studies.studies.trials.session import Session
-from ...studies.studies.trials.trial import Trial, TrialResult
+from ...studies.catalogue.hierarchies import analysis_of
+from ...studies.catalogue.hierarchies.cases import HierarchyCase
+from ...studies.catalogue.study import check_evaluated, distinct
+from ...studies.errors import SpecError
+from ...studies.results.analysis import EVALUATED, Analysis, Figures
+from ...studies.results.results import Results, Sizes
+from ...studies.results.statistics import exactly, rate
+from ...studies.spec.spec import Spec
+from ...studies.spec.tables import label
+from ...studies.trials.session import Session
+from ...studies.trials.trial import Trial, TrialResult
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -66,7 +66,7 @@ def analyse(results: Results) -> Analysis:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: success by edges, a panel for each game."""
-    from ...studies.studies.presentation import figures as f  # matplotlib takes its time
+    from ...studies.presentation import figures as f  # matplotlib takes its time
 
     cases = analysis.cases
     games = distinct(case.setting for case in cases)

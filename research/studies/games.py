@@ -12,17 +12,17 @@ from itertools import product
 from string import ascii_uppercase
 from textwrap import wrap
 
-from ...studies.scenarios.matrix_games.plays import whole_episode
-from ...studies.studies.catalogue.study import check_evaluated as check
-from ...studies.studies.catalogue.study import distinct, system_of
-from ...studies.studies.errors import WIDTH
-from ...studies.studies.results.analysis import Analysis, Case, Figures, Summary
-from ...studies.studies.results.notation import two_figures
-from ...studies.studies.results.results import Results
-from ...studies.studies.results.statistics import rate
-from ...studies.studies.store.database import EVALUATION
-from ...studies.studies.trials.session import Session
-from ...studies.studies.trials.trial import Trial, TrialResult
+from ...scenarios.matrix_games.plays import whole_episode
+from ...studies.catalogue.study import check_evaluated as check
+from ...studies.catalogue.study import distinct, system_of
+from ...studies.errors import WIDTH
+from ...studies.results.analysis import Analysis, Case, Figures, Summary
+from ...studies.results.notation import two_figures
+from ...studies.results.results import Results
+from ...studies.results.statistics import rate
+from ...studies.store.database import EVALUATION
+from ...studies.trials.session import Session
+from ...studies.trials.trial import Trial, TrialResult
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -100,7 +100,7 @@ def draw(analysis: Analysis) -> Figures:
     other, a colour and a marker for the rest of the setting; what is filled has been measured after
     all plays.
     """
-    from ...studies.studies.presentation import figures as f  # matplotlib takes its time
+    from ...studies.presentation import figures as f  # matplotlib takes its time
 
     cases = analysis.cases
     systems = distinct(case.system for case in cases)

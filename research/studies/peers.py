@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...studies.studies.catalogue.experience import AFTER, CPU, evaluated_after
-from ...studies.studies.catalogue.study import check_evaluated as check
-from ...studies.studies.results.analysis import (
+from ...studies.catalogue.experience import AFTER, CPU, evaluated_after
+from ...studies.catalogue.study import check_evaluated as check
+from ...studies.results.analysis import (
     EVALUATED,
     Analysis,
     Figures,
@@ -22,16 +22,16 @@ from ...studies.studies.results.analysis import (
     evaluated,
     judged,
 )
-from ...studies.studies.results.results import Results
-from ...studies.studies.results.statistics import (
+from ...studies.results.results import Results
+from ...studies.results.statistics import (
     NOT_NEGATIVE,
     Array,
     Estimate,
     bootstrap,
     stack_estimates,
 )
-from ...studies.studies.trials.session import Session
-from ...studies.studies.trials.trial import Trial, TrialResult
+from ...studies.trials.session import Session
+from ...studies.trials.trial import Trial, TrialResult
 
 CHECKPOINTS = (0.01, 0.03, 0.1, 0.3)
 """Shares of the episodes after which training stops for an evaluation, before the last one."""
@@ -121,7 +121,7 @@ def draw(analysis: Analysis) -> Figures:
     """
     from matplotlib.ticker import LogLocator
 
-    from ...studies.studies.presentation import figures as f  # matplotlib takes its time
+    from ...studies.presentation import figures as f  # matplotlib takes its time
 
     courses = analysis.cases
     (title,) = analysis.differences

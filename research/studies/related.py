@@ -17,14 +17,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...studies.core.agents.fuzzy import FuzzyAgents
-from ...studies.studies.catalogue.study import (
+from ...core.agents.fuzzy import FuzzyAgents
+from ...studies.catalogue.study import (
     check_evaluated,
     check_rule_bases,
     distinct,
     system_of,
 )
-from ...studies.studies.results.analysis import (
+from ...studies.results.analysis import (
     EVALUATED,
     Analysis,
     Case,
@@ -32,11 +32,11 @@ from ...studies.studies.results.analysis import (
     Summary,
     evaluated,
 )
-from ...studies.studies.results.results import Results
-from ...studies.studies.results.statistics import NOT_NEGATIVE, bootstrap
-from ...studies.studies.spec.spec import Spec
-from ...studies.studies.trials.session import Session
-from ...studies.studies.trials.trial import Trial, TrialResult
+from ...studies.results.results import Results
+from ...studies.results.statistics import NOT_NEGATIVE, bootstrap
+from ...studies.spec.spec import Spec
+from ...studies.trials.session import Session
+from ...studies.trials.trial import Trial, TrialResult
 
 COUNTS = ("messages", "formula", "counted")
 """Numbers of whole trials that the table shows as they are."""
@@ -126,7 +126,7 @@ def draw(analysis: Analysis) -> Figures:
     """
     from matplotlib.ticker import SymmetricalLogLocator  # matplotlib takes its time
 
-    from ...studies.studies.presentation import figures as f
+    from ...studies.presentation import figures as f
 
     cases = analysis.cases
     systems = distinct(case.system for case in cases)

@@ -8,9 +8,9 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 import numpy as np
 
-from ...studies.studies.catalogue.study import check_evaluations
-from ...studies.studies.catalogue.study import measure as measure
-from ...studies.studies.results.analysis import (
+from ...studies.catalogue.study import check_evaluations
+from ...studies.catalogue.study import measure as measure
+from ...studies.results.analysis import (
     EVALUATED,
     Analysis,
     Difference,
@@ -19,11 +19,11 @@ from ...studies.studies.results.analysis import (
     adjust,
     ratio,
 )
-from ...studies.studies.results.notation import bracketed, two_decimals
-from ...studies.studies.results.power import power_lines
-from ...studies.studies.results.results import Results
-from ...studies.studies.results.statistics import bootstrap, rate
-from ...studies.studies.spec.spec import Spec
+from ...studies.results.notation import bracketed, two_decimals
+from ...studies.results.power import power_lines
+from ...studies.results.results import Results
+from ...studies.results.statistics import bootstrap, rate
+from ...studies.spec.spec import Spec
 
 TRAINED = "trained on"
 """How the box of training is called among the others."""
@@ -78,7 +78,7 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figures of an analysis by name."""
-    from ...studies.studies.presentation.figures import draw_forest
+    from ...studies.presentation.figures import draw_forest
 
     unit = "success over that with the box of training"
     return draw_forest("shapes", dict(analysis.cases), unit, null=1.0)

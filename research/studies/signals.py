@@ -10,18 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...studies.scenarios.signals.bayesian import Bayesian
-from ...studies.scenarios.signals.scenario import SignalsSettings
-from ...studies.scenarios.signals.theory import expected
-from ...studies.studies.catalogue.study import check_evaluated, distinct
-from ...studies.studies.errors import SpecError
-from ...studies.studies.results.analysis import Analysis, Figures, Summary
-from ...studies.studies.results.results import Results, Sizes
-from ...studies.studies.results.statistics import Estimate, bootstrap, exactly
-from ...studies.studies.spec.spec import Spec
-from ...studies.studies.spec.tables import label_but
-from ...studies.studies.trials.session import Session
-from ...studies.studies.trials.trial import Trial, TrialResult
+from ...scenarios.signals.bayesian import Bayesian
+from ...scenarios.signals.scenario import SignalsSettings
+from ...scenarios.signals.theory import expected
+from ...studies.catalogue.study import check_evaluated, distinct
+from ...studies.errors import SpecError
+from ...studies.results.analysis import Analysis, Figures, Summary
+from ...studies.results.results import Results, Sizes
+from ...studies.results.statistics import Estimate, bootstrap, exactly
+from ...studies.spec.spec import Spec
+from ...studies.spec.tables import label_but
+from ...studies.trials.session import Session
+from ...studies.trials.trial import Trial, TrialResult
 
 SHARES = {"right": "share right", "last": "last right", "vote": "vote right"}
 """What is compared with theory: measures of an episode, and their titles."""
@@ -123,7 +123,7 @@ def _notes(cases: list[SignalsCase]) -> list[str]:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: shares by number of agents; in grey, what theory says."""
-    from ...studies.studies.presentation import figures as f  # matplotlib takes its time
+    from ...studies.presentation import figures as f  # matplotlib takes its time
 
     cases = analysis.cases
     systems = distinct(case.system for case in cases)
