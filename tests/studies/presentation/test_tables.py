@@ -36,7 +36,7 @@ def test_latex_escapes_and_has_as_many_cells_in_every_row():
     rows = [line for line in lines if line.endswith(r"\\")]
     assert [row.replace(r"\&", "").count("&") for row in rows] == [3, 3, 3]
     assert rows[0] == r"condition & seeds & success & x\_1 [m] \\"
-    assert rows[1] == r"order=1, 50 \% & 8 & $0.33\;[0.20, 0.50]$ & $2.0\;[1.0, 3.0]$ \\"
+    assert rows[1] == r"order=1, 50\% & 8 & $0.33\;[0.20, 0.50]$ & $2\;[1, 3]$ \\"
     # A bracket after the end of a line would be an option of that end.
     assert rows[2] == r"{}[a \& b] & 1 & $0$ & -- \\"
 
