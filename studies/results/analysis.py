@@ -17,7 +17,7 @@ from ...core.numerics import pd
 from ..errors import WIDTH
 from .notation import format_estimate, format_p, wrapped
 from .power import power_lines
-from .results import STEPS, Results
+from .results import STEPS, Results, row_means
 from .statistics import LEVEL, NOT_NEGATIVE, Array, Estimate, bootstrap, exactly, paired_tests, rate
 
 if TYPE_CHECKING:
@@ -58,12 +58,12 @@ def estimate_of(
     results: Results, condition: str, phase: str, measure: Measure, part: slice = slice(None)
 ) -> Estimate:
     """Return the mean of a measure of episodes, or of a part, with its interval over seeds."""
-    values = results.values(condition, measure.name, phase)[:, part]
-    if measure.is_rate:
+    values = results.values(condition, measure.name, phase, part)
+    if measure.is_rate and not np.isnan(values).any():
         return rate(values)
     if measure.name == STEPS.name:
-        return steps_estimate(values.mean(axis=1), results.steps(phase))
-    return bootstrap(values.mean(axis=1), bounds=measure.bounds)
+        return steps_estimate(row_means(values), results.steps(phase))
+    return bootstrap(row_means(values), bounds=measure.bounds)
 
 
 def estimate_over_seeds(values: Array, measure: Measure) -> Estimate:

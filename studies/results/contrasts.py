@@ -138,7 +138,7 @@ def contrasts(
                 table=tuple(lines),
                 values={name: values[c].to_numpy() for name, c in members},
                 training={
-                    name: results.values(c, shown_as.name)
+                    name: results.by_seed(c, "training", shown_as.name).dropna(axis=1).to_numpy()
                     for name, c in members
                     if phase and results.has(c, "training", shown_as.name)
                 },

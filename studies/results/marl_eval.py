@@ -54,7 +54,8 @@ def _runs(results: Results, condition: str) -> Iterator[tuple[str, dict[str, Any
         if results.has(condition, phase)
     }
     for i, seed in enumerate(results.seeds(condition)):
-        training = {name: own[i].tolist() for name, own in measured.get("training", {}).items()}
+        known = {name: own[i] for name, own in measured.get("training", {}).items()}
+        training = {name: own[~np.isnan(own)].tolist() for name, own in known.items()}
         steps = np.cumsum(training.get("steps", [])).astype(int).tolist()
         run: dict[str, Any] = {
             f"{STEP}{k}": {"step_count": n, **{name: [own[k]] for name, own in training.items()}}

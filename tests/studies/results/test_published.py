@@ -96,7 +96,7 @@ REFUSED = {
     "less than all": (f"{STEPS}/1/0", -INF, "steps[1][0] = -inf"),
     "huge integer": (f"{STEPS}/1/0", 10**400, "steps[1][0] = 1.000e+400"),
     "large integer": (f"{STEPS}/1/0", 2**70, "steps[1][0] = 1180591620717411303424"),
-    "rows differ": (f"{STEPS}/1", [30], "steps = [[30, 6], [30], [30, 30]]"),
+    "rows differ": (f"{STEPS}/1", [30], "must have as many episodes of every measure"),
     "row is none": (f"{STEPS}/1", 30, "steps[1] = 30"),
     "rows too deep": (STEPS, [[[1]], [[1]], [[1]]], "steps[0][0] = [1]"),
     "no rows": (STEPS, [], "steps = []"),
