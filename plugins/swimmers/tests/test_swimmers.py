@@ -11,7 +11,7 @@ from nested_agents.scenarios import SCENARIOS
 
 pytest.importorskip("mujoco", reason="extra mujoco")
 
-SWIMMER = "nested_agents.scenarios.swimmers:NestedAgents/Swimmer-v0"
+SWIMMER = "nested_agents_swimmers:NestedAgents/Swimmer-v0"
 
 
 def test_the_swimmer_of_two_joints_is_that_of_gymnasium() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents import Hierarchy
-from nested_agents.scenarios.signals.theory import (
+from nested_agents_signals.theory import (
     cascade,
     enumerated,
     evidence,

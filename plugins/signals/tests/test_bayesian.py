@@ -8,10 +8,10 @@ from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.interface.experience import Observation
 from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios.line_up import LineUpSettings
-from nested_agents.scenarios.signals.scenario import SignalEnvironments, SignalsSettings
-from nested_agents.scenarios.signals.theory import cascade, enumerated, majority
+from nested_agents_signals.scenario import SignalEnvironments, SignalsSettings
+from nested_agents_signals.theory import cascade, enumerated, majority
 
-KIND = "nested_agents.scenarios.signals.bayesian:Bayesian"
+KIND = "bayesian"
 WORLDS = 4000
 
 
