@@ -70,9 +70,7 @@ class BayesianAgents(na.Agents[Beliefs]):
         self.indifferent = settings.indifferent
         scenario = placement.scenario
         if not isinstance(scenario, Signals):
-            raise ValueError(
-                f"learner.kind = {settings.kind!r}: needs scenario.kind = 'signals'"
-            )
+            raise ValueError(f"learner.kind = {settings.kind!r}: needs scenario.kind = 'signals'")
         self.accuracy = scenario.settings.accuracy
         if placement.messages_fail:
             raise ValueError(

@@ -28,7 +28,9 @@ STATES = ("a", "b")
 """Possible states, which are also the signals and the actions."""
 
 
-def _share(name: str, title: str, better: Literal["higher", "lower"] | None = "higher") -> na.Measure:
+def _share(
+    name: str, title: str, better: Literal["higher", "lower"] | None = "higher"
+) -> na.Measure:
     return na.Measure(name, title, gathering="mean", better=better, least=0.0, greatest=1.0)
 
 

@@ -27,7 +27,6 @@ from math import log
 from typing import Literal, NamedTuple
 
 import numpy as np
-
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -154,7 +153,7 @@ def cascade(agents: int, accuracy: float, indifferent: Indifferent = "signal") -
 
 
 def unweighed(hierarchy: na.Hierarchy) -> tuple[int, int] | None:
-    """Return an agent and a sender that heard an agent which it does not hear; None if there is none.
+    """Return an agent and one of its senders that heard more than the agent hears, or None.
 
     Without such a pair, every agent knows the log odds by which its senders decided.
 

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from nested_agents import Hierarchy
 from nested_agents_signals.theory import (
     cascade,
     enumerated,
@@ -15,6 +13,8 @@ from nested_agents_signals.theory import (
     expected,
     majority,
 )
+
+from nested_agents import Hierarchy
 
 ACCURACIES = st.floats(0.51, 0.97)
 

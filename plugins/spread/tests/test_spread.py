@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from nested_agents_spread import DAMPING, PERIOD_S, SpreadSettings, advance, score
 
 

@@ -28,7 +28,9 @@ IntArray = NDArray[np.int64]
 if TYPE_CHECKING:
     from vmas.simulator.environment import Environment
 
-SUCCEEDED = na.Measure(na.SUCCESS.name, na.SUCCESS.title, source="succeeded", better="higher", is_rate=True)
+SUCCEEDED = na.Measure(
+    na.SUCCESS.name, na.SUCCESS.title, source="succeeded", better="higher", is_rate=True
+)
 RANGE_ENVIRONMENTS = 64
 """Number of environments of random agents that give the ranges of the state variables."""
 REPEAT_PROBABILITY = 0.7
@@ -218,7 +220,9 @@ def ranges_of(settings: VmasSettings) -> tuple[FloatArray, FloatArray]:
     environments = VmasEnvironments(settings, RANGE_ENVIRONMENTS)
     rng = np.random.default_rng(0)
     seen = [environments.reset(np.random.SeedSequence(0).spawn(RANGE_ENVIRONMENTS))]
-    action = rng.integers(environments.n_actions, size=(RANGE_ENVIRONMENTS, len(environments.agents)))
+    action = rng.integers(
+        environments.n_actions, size=(RANGE_ENVIRONMENTS, len(environments.agents))
+    )
     for _ in range(settings.most_decisions):
         drawn = rng.integers(environments.n_actions, size=action.shape)
         action = np.where(rng.random(action.shape) < REPEAT_PROBABILITY, action, drawn)

@@ -19,9 +19,12 @@ from ...results.statistics import Array, Estimate, bootstrap, rate, stack_estima
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..peers import AFTER, CPU, evaluated_after
 from ..study import check_evaluated
 
+AFTER = "after "
+"""With what the phase of such an evaluation begins; how much came before follows."""
+CPU = "cpu."
+"""With what the name of the CPU seconds until then begins; the same follows."""
 FIRST = 1000
 """Decisions before the first evaluation."""
 DECISIONS = "decisions"
@@ -74,6 +77,16 @@ def measure(trial: Trial) -> TrialResult:
                 session.evaluate(phase=f"{AFTER}{stop}")
             session.put_down()
     return session.finish({DECISIONS: float(done)}, session.usage)
+
+
+def evaluated_after(results: Results, condition: str) -> dict[int, str]:
+    """Return the phases in which a condition was evaluated on its way, by how much came before."""
+    phases = {
+        int(phase.removeprefix(AFTER)): phase
+        for phase in results.phases
+        if phase.startswith(AFTER) and results.has(condition, phase)
+    }
+    return dict(sorted(phases.items()))
 
 
 class ReturnCourse(NamedTuple):
