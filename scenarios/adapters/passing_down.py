@@ -73,8 +73,8 @@ class PassingDownEnv(parallel_to_aec_wrapper):
     ('robot1.right', [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     """
 
-    terminations: dict[str, bool]
-    truncations: dict[str, bool]
+    terminations: Any
+    truncations: Any
 
     def __init__(
         self,
