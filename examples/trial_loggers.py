@@ -1,10 +1,10 @@
 """
-A tracker of your own
+An experiment tracker
 =====================
 
-``nested-agents run --track tensorboard`` (or mlflow, wandb) writes every finished trial to a tool
-of others. One for yours takes a method: here each trial becomes a line of a file. It is an
-observer, which shows the progress on the terminal as usual::
+An observer receives the outcome of every trial when it finishes. This one writes each trial as one
+line of a file and shows the usual progress on the terminal; call TensorBoard, MLflow or Weights &
+Biases in its method ``write`` to log there::
 
     import nested_agents as na
     from trial_loggers import Lines
@@ -21,16 +21,16 @@ from nested_agents.studies.presentation.progress import Terminal
 
 
 class Lines(Terminal):
-    """Writes a line for each trial that has finished, once its result is in the study."""
+    """Writes one line per finished trial, after its result has been stored."""
 
     def __init__(self, path):
         super().__init__(self.write)
         self.path = Path(path)
 
     def write(self, outcome):
-        """Write what became of a trial."""
+        """Write the condition, the seed and the returns of a trial."""
         line = {"condition": outcome.trial.condition, "seed": outcome.trial.seed}
-        if outcome.result is not None:  # it has not failed
+        if outcome.result is not None:  # the trial succeeded
             line |= {"return": [row.return_ for row in outcome.result.rows]}
         with self.path.open("a") as file:
             print(json.dumps(line), file=file)

@@ -112,7 +112,6 @@ SEQUENCES: dict[tuple[str, str], tuple[object, ...]] = {
     ("compare_table", "score"): ("score",),
     ("cost_table", "topologies"): ("chain",),
     ("cost_table", "agents"): (2,),
-    ("run", "track"): (),
     ("Hierarchy", "agents"): ("a",),
     ("Hierarchy", "edges"): (("a", "b"),),
     ("Hierarchy", "neighbours"): (("a", "b"),),

@@ -15,7 +15,7 @@ from pathlib import Path
 from ...core.functions.recorded import AnswersError, RecordedAnswers
 from ...core.interface.measures import Measure
 from ...core.plugins.sources import ANSWERS, Answers, Checkpoints, is_reference
-from ...core.plugins.words import expect, expect_each
+from ...core.plugins.words import expect
 from ..catalogue.study import load_study, measure_by_name
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
@@ -194,7 +194,6 @@ def run(
     accept_code: bool = False,
     progress: bool = True,
     observer: Observer | None = None,
-    track: Sequence[str] = (),
     answers: Place | None = None,
     calls: bool = True,
     checkpoint: float = CHECKPOINT,
@@ -214,9 +213,6 @@ def run(
         Whether to show how it goes.
     observer
         Who is notified of progress instead, see `nested_agents.studies.workers.runner.Observer`.
-    track
-        Trackers that are told of every trial which finishes: ``tensorboard``, ``mlflow``,
-        ``wandb``; see `nested_agents.studies.api.tracking`.
 
     Warns
     -----
@@ -232,11 +228,6 @@ def run(
     out = Path(out)
     spec = Spec.read(spec, study=out)
     listener = observer or (Terminal() if progress else Observer())
-    expect_each("names of trackers", str, track=track)
-    if track:
-        from .tracking import Tracking
-
-        listener = Tracking(track, out, listener)
     with run_study(
         spec,
         out,

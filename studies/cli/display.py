@@ -37,7 +37,10 @@ def print_data(text: str) -> None:
 def print_wrapped(text: str, first: str = "", indent: int = 4) -> None:
     """Print a text over the width of the terminal, after `first`; further lines are indented."""
     width = get_terminal_size().columns
-    print_text(fill(text, width, initial_indent=first, subsequent_indent=" " * indent))
+    later = " " * indent
+    print_text(
+        fill(text, width, initial_indent=first, subsequent_indent=later, break_on_hyphens=False)
+    )
 
 
 def print_lines(lines: Iterable[str]) -> None:
@@ -48,7 +51,7 @@ def print_lines(lines: Iterable[str]) -> None:
 
 
 def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> None:
-    """Print estimates by condition, each over its 95 % interval, and its legend or another one."""
+    """Print estimates by condition, each over its 95% interval, and its legend or another one."""
     from rich.console import Console
 
     table.print(Console())

@@ -31,48 +31,47 @@ REFUSING = ("strict", "surrogateescape")
 LEAST_ADDRESSES = 10**9
 """Of the process [bytes]: with less, libraries of linear algebra crash or wait for ever."""
 
-PUBLISHED = "...results.commands"
+PUBLISHED = "...research.commands"
 """Module of the commands on what has been published."""
-RESULTS = Path(__file__).parents[2] / "results"
+RESULTS = Path(__file__).parents[2] / "research"
 """Where that is in a checkout; an installed package does not have it."""
-COMMANDS: dict[str, tuple[str, str]] = {
-    "demo": (".commands.running", "Train two e-Pucks to push a box: table, figures and replay."),
-    "run": (".commands.running", "Run the study of a spec, or continue it."),
-    "tune": (".commands.running", "Look for better settings of a spec, on seeds of their own."),
-    "plan": (".commands.running", "Tell what a study will take, and what it can find."),
-    "table": (".commands.reading", "Print the results of a study: conditions against estimates."),
-    "compare": (".commands.reading", "Compare conditions of one study or several, seed by seed."),
-    "fit": (".commands.fitting", "Fit how results grow with the size of teams, and predict."),
-    "results": (".commands.reading", "Print what every episode of a study measured."),
-    "status": (".commands.reading", "Tell how far a study is, what failed, and how long is left."),
-    "retry": (".commands.running", "Run the failed trials of a study again."),
-    "export": (".commands.reading", "Write what a study holds as files for other programs."),
-    "report": (".commands.reading", "Write a study as one self-contained HTML file."),
-    "explain": (".commands.reading", "Explain a trained team in words and figures."),
-    "presets": (".commands.describing", "List the named starting points of a spec, or print one."),
-    "keys": (
-        ".commands.describing",
-        "List the keys of a spec: type, default, what is allowed, meaning.",
-    ),
-    "schema": (".commands.describing", "Write the JSON schema of specs, for editors."),
-    "topology": (".commands.describing", "List the topologies, or show one of them."),
-    "check": (".commands.checking", "Check that scenarios keep their promises."),
-    "combine": (".commands.describing", "Try every learner with every part of a condition."),
-    "cost": (".commands.describing", "Print what hierarchies cost, by formula and measured."),
-    "profile": (".commands.describing", "Tell what the time of decisions goes to, part by part."),
-    "atlas": (PUBLISHED, "Print what small teams tell of large ones, task by task."),
-    "benchmark": (PUBLISHED, "Enter a learner in the benchmark push-n, and compare entries."),
-    "claims": (PUBLISHED, "Print the claims of the paper and the verdict on each."),
+GROUPS: dict[str, dict[str, tuple[str, str]]] = {
+    "Run": {
+        "demo": (".commands.running", "Train two robots to push a box: table, figures, report."),
+        "plan": (".commands.running", "Estimate the time of a study and its statistical power."),
+        "run": (".commands.running", "Run the study of a spec, or resume it."),
+        "status": (".commands.reading", "Show progress, failures and remaining time."),
+        "retry": (".commands.running", "Run the failed trials of a study again."),
+        "tune": (".commands.running", "Search for better settings on separate seeds."),
+    },
+    "Analyze": {
+        "table": (".commands.reading", "Print the results of a study, one row per condition."),
+        "compare": (".commands.reading", "Compare conditions of one or more studies by seed."),
+        "fit": (".commands.fitting", "Fit scaling laws over team sizes, and predict."),
+        "results": (".commands.reading", "Print the measures of every episode."),
+        "report": (".commands.reading", "Write the study as one self-contained HTML file."),
+        "explain": (".commands.reading", "Explain a trained team in words and figures."),
+        "export": (".commands.reading", "Write results as files for other programs."),
+    },
+    "Describe": {
+        "presets": (".commands.describing", "List the presets, or print one in full."),
+        "keys": (".commands.describing", "List the tables of a spec, or the keys of one table."),
+        "schema": (".commands.describing", "Write the JSON schema of specs, for editors."),
+        "topology": (".commands.describing", "List the topologies, or show one of them."),
+        "check": (".commands.checking", "Check that scenarios satisfy their interface."),
+        "combine": (".commands.describing", "Try every learner with every part of a condition."),
+        "cost": (".commands.describing", "Print the cost of hierarchies, by formula or measured."),
+        "profile": (".commands.describing", "Show the time of a decision, part by part."),
+    },
+    "Published results": {
+        "atlas": (PUBLISHED, "Print what small teams tell of large ones, task by task."),
+        "benchmark": (PUBLISHED, "Enter a learner in the benchmark push-n, and compare entries."),
+        "claims": (PUBLISHED, "Print the claims of the paper and the verdict on each."),
+    },
 }
-"""The module of each command, imported when it is asked for, and what the help says of it."""
-FORMER = {
-    "watch": "nested-agents status DIR --watch",
-    "course": "python examples/course/grade.py",
-    "--log": "--track tensorboard, mlflow or wandb",
-    "--publish": "nested-agents export DIR --format json",
-    "--wheels": "--agents, of which a robot has two, and --robots",
-}
-"""Commands and options of version 0.3.0, and what has taken their place."""
+"""Groups of commands as `--help` shows them: the module of each command, imported on first use,
+and its summary."""
+COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
 
 
 def load_command(name: str) -> click.Command | None:
@@ -102,10 +101,8 @@ class _Commands(click.Group):
         if command is None and args[0] in COMMANDS:
             raise SpecError(
                 f"{args[0]}: is a command on published results, which are in the repository, in "
-                "results/, not in the installed package"
+                "research/, not in the installed package"
             )
-        if command is None and args[0] in FORMER:
-            raise SpecError(f"{args[0]}: of version 0.3.0; now {FORMER[args[0]]}")
         if command is None:
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
         parts = command.commands if isinstance(command, click.Group) else {}
@@ -113,8 +110,9 @@ class _Commands(click.Group):
         return args[0], command, list(complete(owner, args[1:]))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+        for title, group in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name, text) for name, (_, text) in group.items()])
 
 
 @click.group(
@@ -205,9 +203,6 @@ def _run(arguments: list[str]) -> int:
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
     except click.UsageError as error:
-        option = error.option_name if isinstance(error, click.NoSuchOption) else ""
-        if option in FORMER:
-            raise SpecError(f"{option}: of version 0.3.0; now {FORMER[option]}") from None
         command = error.ctx.command_path if error.ctx else f"{PROGRAM} {arguments[0]}"
         raise SpecError(f"{error.format_message().rstrip('.')}; see {command} --help") from None
     except SystemExit as error:

@@ -131,9 +131,8 @@ def running(command: Callable[..., int]) -> Callable[..., int]:
 
 
 class AnswerOptions(TypedDict):
-    """The options of what is kept of trials on the way, and of who is told of them."""
+    """The options of recorded answers and checkpoints."""
 
-    track: tuple[str, ...]
     answers: Path | None
     calls: bool
     checkpoint: float
@@ -160,14 +159,7 @@ def recorded(command: Callable[..., int]) -> Callable[..., int]:
         help="Whether functions may be called for answers that are not recorded; if not, a trial "
         "that lacks one fails.",
     )
-    track = click.option(
-        "--track",
-        multiple=True,
-        metavar="NAME",
-        help="Also write every trial that finishes to tensorboard (below DIR/tensorboard), mlflow "
-        "or wandb, which must be installed.",
-    )
-    return track(answers(calls(checkpoint(command))))
+    return answers(calls(checkpoint(command)))
 
 
 trust = flag(

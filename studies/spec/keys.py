@@ -112,6 +112,16 @@ def of_functions() -> Table:
     return _table("learner", (OWN_FUNCTION, ""), FunctionSettings, {})
 
 
+def outline() -> dict[str, list[str]]:
+    """Return what each table of a spec can be or hold: its kinds, or else the names of its keys."""
+    kinds = dict[str, list[str]]()
+    keys = dict[str, list[str]]()
+    for table in tables():
+        kinds.setdefault(table.name, []).extend([table.kind] if table.kind else [])
+        keys.setdefault(table.name, []).extend(key.name for key in table.keys)
+    return {name: list(dict.fromkeys(kinds[name] or keys[name])) for name in keys}
+
+
 def keys_below(prefix: str) -> tuple[Table, ...]:
     """Return the tables whose name begins with a dotted prefix, with the keys that fit it.
 

@@ -48,17 +48,21 @@ def presets(name: str | None) -> int:
 @click.command()
 @click.argument("prefix", metavar="[PREFIX]", required=False)
 def keys(prefix: str | None) -> int:
-    """List the keys of a spec: default, type, what is allowed, meaning.
+    """List the tables of a spec; with PREFIX list keys: default, type, allowed values, meaning.
 
-    A spec begins from the preset default; where that has another value, both are listed.
-
-    PREFIX is a table or a key, such as learner.rule_base or scenario.box.mass.
+    PREFIX is a table or a key, such as learner.rule_base or scenario.box.mass. A spec starts from
+    the preset default; where a key has another value there, both values are listed.
     """
-    from ...spec.keys import keys_below, nearest
+    from ...spec.keys import keys_below, nearest, outline
 
-    tables = keys_below(prefix or "")
+    if prefix is None:
+        for name, parts in outline().items():
+            print_wrapped(", ".join(parts), f"[{name}]  " if name else "top of the spec  ")
+        print_text("", "To list the keys of a table or of one key: nested-agents keys PREFIX")
+        return 0
+    tables = keys_below(prefix)
     if not tables:
-        raise SpecError(f"{prefix}: there is no such key; {nearest(prefix or '')}")
+        raise SpecError(f"{prefix}: unknown key; {nearest(prefix)}")
     for number, table in enumerate(tables):
         if number:
             print_text("")

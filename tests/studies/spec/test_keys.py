@@ -132,6 +132,9 @@ def test_the_command(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
         "    cm.\n"
     )
     assert main(["keys", "lerner"]) == 2
-    assert "lerner: there is no such key; did you mean 'learner'?" in capsys.readouterr().err
+    assert "lerner: unknown key; did you mean 'learner'?" in capsys.readouterr().err
     assert main(["keys"]) == 0
-    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert len(lines) <= 60
+    assert "[scenario.infrared]  reach, normalisation, decay, noise" in lines
