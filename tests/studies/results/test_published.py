@@ -83,7 +83,11 @@ REFUSED = {
     "flags as a number": (SUCCESS, {"flags": 10, "shape": [1, 2]}, "success.flags = 10"),
     "digits that are no bits": (SUCCESS, ["01", "00", "02"], "success[2] = '02'"),
     "other digits": (SUCCESS, ["01", "00", "0\u0661"], "success[2] = "),
-    "rows of bits differ": (SUCCESS, ["01", "00", "0"], "success = ['01', '00', '0']"),
+    "rows of bits differ": (
+        SUCCESS,
+        ["01", "00", "0"],
+        "must have as many episodes of every measure",
+    ),
     "numbers for bits": (SUCCESS, [[0, 1], [0, 0], [0, 0]], "success[0] = [0, 1]"),
     "text for numbers": (STEPS, [["a", "b"]] * 3, "steps[0][0] = 'a'"),
     "digits in quotes": (STEPS, [[30, 30], [30, "30"], [30, 30]], "steps[1][1] = '30'"),
