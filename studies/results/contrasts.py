@@ -3,25 +3,28 @@
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
+import numpy as np
+
 from ...core.interface.measures import RETURN, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
 from .analysis import (
+    MIN_RUNS,
     NOTHING,
     BySeed,
     Difference,
     Summary,
     differences,
-    estimate_of,
     identity_lines,
     select_shared,
     verdicts,
 )
 from .power import power_lines
-from .results import SECONDS, Results, describe_number
-from .statistics import Array, Estimate, bootstrap
+from .results import SECONDS, Results, describe_number, row_means
+from .series import LAST_STEP
+from .statistics import Array, Estimate, bootstrap, rate
 
 STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
 EPISODES = (STEPS, RETURN)
@@ -118,19 +121,22 @@ def contrasts(
     SpecError
         If the results have no such measure, phase, key or reference.
     """
-    shown_as, values, phase = values_of(results, measure, phase or _usual_phase(results))
+    shown_as, values, phase = values_by_seed(results, measure, phase)
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
     pairs = {
-        setting: [(name, measure, values[c], values[members[0][1]]) for name, c in members[1:]]
+        setting: [
+            (name, measure, *_pair(values[c], values[members[0][1]], results.pairs_episodes))
+            for name, c in members[1:]
+        ]
         for setting, members in groups
     }
     compared = differences(pairs, of_rates=shown_as.is_rate)
     compared_groups = []
     for setting, members in groups:
-        less = {d.condition: {"difference": d.estimate} for d in compared[setting]}
+        less = {d.condition: {DIFFERENCE[d.paired]: d.estimate} for d in compared[setting]}
         lines = []
         for name, c in members:
-            own = {title_of(shown_as, phase): _estimate(results, shown_as, phase, c, values[c])}
+            own = {title_of(shown_as, phase): _estimate(shown_as, values[c])}
             whose = ", ".join(filter(None, (setting, name)))
             lines.append(Summary(whose, len(values[c]), own | less.get(name, {})))
         compared_groups.append(
@@ -139,9 +145,9 @@ def contrasts(
                 reference=members[0][0],
                 differences=compared[setting],
                 table=tuple(lines),
-                values={name: values[c].to_numpy() for name, c in members},
+                values={name: row_means(values[c]).to_numpy() for name, c in members},
                 training={
-                    name: results.values(c, shown_as.name)
+                    name: results.by_seed(c, "training", shown_as.name).dropna(axis=1).to_numpy()
                     for name, c in members
                     if phase and results.has(c, "training", shown_as.name)
                 },
@@ -155,44 +161,93 @@ def power_with_first(results: Results) -> tuple[str, ...]:
 
     As `contrasts` of the same say it, whose tests take seconds where seeds are thousands.
     """
-    measure, values, phase = values_of(results, results.main.name, _usual_phase(results))
+    measure, values, phase = values_of(results, results.main.name)
     base, *others = (values[c] for c in results.columns if c in values)
     pairs = [select_shared([own, base]) for own in others]
     samples = [own - reference for own, reference in pairs if len(own) >= 2]
     return tuple(power_lines(samples, title_of(measure, phase), of_rates=measure.is_rate))
 
 
-def _usual_phase(results: Results) -> str:
-    """Return the phase of evaluation, if all trained conditions have it, else that of training."""
-    evaluated = {*results.of_phase("evaluation")}
-    is_whole = evaluated and evaluated >= {*results.of_phase("training")}
-    return "evaluation" if is_whole else "training"
+def usual_phase(results: Results, measure: str) -> str:
+    """Return the phase of evaluation, if all trained conditions have it, else that of training.
+
+    Series of other tools that were not evaluated are compared at their last step.
+
+    Raises
+    ------
+    SpecError
+        If there are several other phases.
+    """
+    trained = {*results.of_phase("training")}
+    for phase in ("evaluation", LAST_STEP):
+        known = {c for c in results.of_phase(phase) if results.has_any(c, phase, measure)}
+        if known and known >= trained:
+            return phase
+    if trained or len(results.phases) < 2:
+        return next(iter(results.phases), "training")
+    raise SpecError(f"phase: name one, known: {', '.join(results.phases)}")
 
 
-def _estimate(
-    results: Results, measure: Measure, phase: str, condition: str, means: BySeed
-) -> Estimate:
-    """Return the mean over seeds of a measure, or of a number of trials, with its interval."""
-    if phase:
-        return estimate_of(results, condition, phase, measure)
-    return bootstrap(means.to_numpy().astype(float), bounds=measure.bounds)
+DIFFERENCE = {True: "difference", False: "difference (independent samples)"}
+"""Headings of the column of differences, of paired and of independent runs."""
+
+
+def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[BySeed, BySeed]:
+    """Return the means of two conditions by seed, over common episodes if these are paired."""
+    if pairs_episodes:
+        seeds = own.index.intersection(base.index, sort=False)
+        episodes = own.columns.intersection(base.columns)
+        shared = [values.loc[seeds, episodes] for values in (own, base)]
+        both = shared[0].notna() & shared[1].notna()
+        shared = [values.where(both).dropna(how="all") for values in shared]
+        if len(shared[0]) >= MIN_RUNS:
+            own, base = shared
+    return row_means(own), row_means(base)
+
+
+def _estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
+    """Return the mean over seeds of a measure with its interval."""
+    outcomes = values.to_numpy(dtype=float)
+    if not measure.is_rate:
+        return bootstrap(row_means(values).to_numpy(), bounds=measure.bounds)
+    if np.isnan(outcomes).any():
+        return bootstrap(row_means(values).to_numpy(), bounds=(0.0, 1.0))
+    return rate(outcomes)
 
 
 _Pairs = list[tuple[str, str]]
 """Names of the conditions of a group, and their labels; the reference first."""
 
 
-def values_of(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, BySeed], str]:
+def values_of(
+    results: Results, name: str, phase: str | None = None
+) -> tuple[Measure, dict[str, BySeed], str]:
     """Return a measure, its means of seeds by condition, and the phase that they are of."""
+    measure, values, phase = values_by_seed(results, name, phase)
+    return measure, {condition: row_means(own) for condition, own in values.items()}, phase
+
+
+def values_by_seed(
+    results: Results, name: str, phase: str | None = None
+) -> tuple[Measure, dict[str, pd.DataFrame], str]:
+    """Return a measure, its values by condition, and the phase that they are of.
+
+    Values have a row for each seed and a column for each episode, or one for a number of trials.
+    The phase is by default the usual one; it is empty for a number of trials.
+    """
     measures = {m.name: m for m in (*results.measures, *EPISODES)}
     name = next((m.name for m in measures.values() if m.heading == name), name)
-    if not results.phases:
+    if not results.conditions:
         raise SpecError("no trial has finished")
-    if name in measures:
-        if phase not in results.phases:
-            raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
-        of_phase = (c for c in results.of_phase(phase) if results.has(c, phase, name))
-        return measures[name], {c: results.means(c, phase, name) for c in of_phase}, phase
+    if phase is not None and phase not in results.phases:
+        raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
+    if name in measures and results.phases:
+        phase = phase or usual_phase(results, name)
+        of_phase = {c: results.by_seed(c, phase, name) for c in results.of_phase(phase)}
+        known = {c: own for c, own in of_phase.items() if own.size}
+        if not known:
+            raise SpecError(f"measure = {name!r}: no condition has it in the phase {phase!r}")
+        return measures[name], known, phase
     numbers = {c: results.numbers(c) for c in results.conditions}
     columns = dict.fromkeys(n for own in numbers.values() for n in own)
     names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
@@ -200,8 +255,12 @@ def values_of(results: Results, name: str, phase: str) -> tuple[Measure, dict[st
     if column is None:
         raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *columns})}")
     measure, factor = describe_number(column)
-    of_trials = {c: factor * own[column] for c, own in numbers.items() if column in own}
-    return measure, {c: pd.Series(own, results.seeds(c)) for c, own in of_trials.items()}, ""
+    of_trials = {
+        c: pd.DataFrame(factor * own[column], results.seeds(c))
+        for c, own in numbers.items()
+        if column in own
+    }
+    return measure, of_trials, ""
 
 
 def _groups(
