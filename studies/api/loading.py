@@ -28,9 +28,7 @@ Roles = Mapping[str, str | Sequence[str]]
 """Column of a table by its role, see `ScoreColumns`."""
 
 
-def load(
-    *places: Place, columns: Sequence[str] = (), better: Better | None = None
-) -> StudyResults:
+def load(*places: Place, columns: Sequence[str] = (), better: Better | None = None) -> StudyResults:
     """Return the results of a study that is kept in a directory, or of several together.
 
     Parameters
@@ -129,17 +127,25 @@ def compare_table(
     -0.23
     """
     expect("a table of pandas or the path of a file", pd.DataFrame | str | PathLike, table=table)
-    for role in ("condition", "score"):
-        expect_each("names of columns", str, **{role: columns.get(role)})
-    roles = {role: column for role, column in columns.items() if column is not None}
-    if unknown := roles.keys() - {*ScoreColumns._fields}:
-        raise SpecError(f"{unknown.pop()}: {closest('', ScoreColumns._fields)}")
+    condition, score = columns.get("condition", ()), columns.get("score", ())
+    expect_each("names of columns", str, condition=condition, score=score)
+    roles = _roles(columns)
     if isinstance(table, pd.DataFrame):
         results = _of_table(table_of(table), None, roles, better)
     else:
         path = Path(table)
         results = _results_of([path], [_open(path)], roles, better)[path]
     return results.compare(by, measure, phase=phase, reference=reference)
+
+
+def _roles(columns: Columns) -> Roles:
+    """Return the roles that are given; an unknown one is refused."""
+    known = Columns.__annotations__
+    for role in columns:
+        if role not in known:
+            raise TypeError(f"compare_table: unknown argument {role!r}; {closest(role, known)}")
+    given = {role: columns.get(role) for role in known}
+    return {r: c for r, c in given.items() if isinstance(c, str | Sequence)}
 
 
 Opened = StudyResults | ScoreTable | list[marl_eval.Run]
@@ -176,9 +182,7 @@ def _open(path: Path) -> Opened:
 def _of_published(path: Path, file: JsonValue) -> StudyResults:
     kept = published.read_file(file)
     remarks = (f"{path}: {kept.note}",) if kept.note else ()
-    return StudyResults(
-        kept.outline, kept.results, (), remarks, Sources(brought_by=str(path))
-    )
+    return StudyResults(kept.outline, kept.results, (), remarks, Sources(brought_by=str(path)))
 
 
 def _results_of(
@@ -201,9 +205,7 @@ def _results_of(
     return loaded
 
 
-def _of_table(
-    table: ScoreTable, path: Path | None, roles: Roles, better: Better
-) -> StudyResults:
+def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better) -> StudyResults:
     """Return the results of a table of scores, or of an exported one; messages name its file."""
     before = f"{path}: " if path else ""
     measure = None

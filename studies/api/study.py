@@ -82,7 +82,7 @@ class StudyResults:
     _settings: Mapping[str, TomlTable] = field(default_factory=dict, repr=False)
     _directories: tuple[Path, ...] = ()
     _is_whole: bool = True
-    _defaults: Defaults = Defaults()
+    _defaults: Defaults = field(default_factory=Defaults)
 
     @classmethod
     def of(cls, store: Store) -> StudyResults:

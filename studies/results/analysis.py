@@ -172,8 +172,8 @@ def compare_pair(
 
 def adjusted(compared: Sequence[Difference]) -> list[Difference]:
     """Return differences whose p is adjusted over all of them by Holm's method."""
-    ps = holm([d.raw for d in compared]) if compared else []
-    return [replace(d, p=float(p)) for d, p in zip(compared, ps, strict=True)]
+    ps = holm([d.raw for d in compared]).tolist()
+    return [replace(d, p=p) for d, p in zip(compared, ps, strict=True)]
 
 
 def adjust(

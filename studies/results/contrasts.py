@@ -21,6 +21,7 @@ from .analysis import (
     select_shared,
     verdicts,
 )
+from .notation import wrapped
 from .power import power_lines
 from .results import SECONDS, Results, describe_number, row_means
 from .series import LAST_STEP
@@ -46,6 +47,8 @@ class Group(NamedTuple):
     """By the name of each, the means of its seeds ``(n_seeds,)``."""
     training: Mapping[str, Array]
     """Values of each episode of training ``(n_seeds, n_episodes)``, if it is measured there."""
+    left_out: tuple[str, ...] = ()
+    """By condition, how many runs or scores have no partner in the reference, or it in them."""
 
 
 class Contrasts(NamedTuple):
@@ -84,6 +87,9 @@ class Contrasts(NamedTuple):
             groups[f"{head}, less that of {group.reference}"] = group.differences
         is_rate = self.measure.is_rate
         lines = verdicts(groups, self.measure.better, self.title, of_rates=is_rate)
+        left_out = "; ".join(text for group in self.groups for text in group.left_out)
+        if left_out:
+            lines += wrapped(f"Without a partner and left out of the difference: {left_out}.")
         return (*(lines or [NOTHING]), *identity_lines(self.identical))
 
 
@@ -134,6 +140,13 @@ def contrasts(
     compared_groups = []
     for setting, members in groups:
         less = {d.condition: {DIFFERENCE[d.paired]: d.estimate} for d in compared[setting]}
+        paired = {d.condition for d in compared[setting] if d.paired}
+        left_out = [
+            (", ".join(filter(None, (setting, name))), _left_out(results, values[c], base))
+            for base in [values[members[0][1]]]
+            for name, c in members[1:]
+            if name in paired
+        ]
         lines = []
         for name, c in members:
             own = {title_of(shown_as, phase): _estimate(shown_as, values[c])}
@@ -151,6 +164,7 @@ def contrasts(
                     for name, c in members
                     if phase and results.has(c, "training", shown_as.name)
                 },
+                left_out=tuple(f"{name}, {text}" for name, text in left_out if text),
             )
         )
     return Contrasts(shown_as, phase, tuple(compared_groups), results.identical)
@@ -203,6 +217,18 @@ def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[
         if len(shared[0]) >= MIN_RUNS:
             own, base = shared
     return row_means(own), row_means(base)
+
+
+def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
+    """Return how many runs, or scores if these are paired, only one of two conditions has."""
+    index, other = own.index, base.index
+    unit = "runs"
+    if results.pairs_episodes:
+        index, other = own.stack().index, base.stack().index
+        unit = "scores"
+    total = len(index) + len(other)
+    count = total - 2 * len(index.intersection(other))
+    return f"{count} of {total} {unit}" if count else ""
 
 
 def _estimate(measure: Measure, values: pd.DataFrame) -> Estimate:

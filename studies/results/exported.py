@@ -77,9 +77,7 @@ def results_of(table: ScoreTable, known: Description | None) -> Exported:
     return Exported(pack(frame, conditions, measures), conditions, tuple(notes))
 
 
-def _trials(
-    table: ScoreTable, conditions: Mapping[str, SpecTable], labels: pd.Series
-) -> Exported:
+def _trials(table: ScoreTable, conditions: Mapping[str, SpecTable], labels: pd.Series) -> Exported:
     """Return the numbers of whole trials; those of trials that have not finished are left out."""
     names = table.columns
     swept = names[names.index("condition") + 1 : names.index("seed")]
@@ -91,8 +89,8 @@ def _trials(
     refuse_repeated(table, frame, {key: key for key in ("condition", "seed")})
     results = assemble([], [frame], (), conditions, (), ())
     unfinished = int((frame["state"] != DONE).sum())
-    notes = [f"{unfinished} of {len(frame)} trials have not finished: left out"] if unfinished else []
-    return Exported(results, conditions, tuple(notes))
+    note = f"{unfinished} of {len(frame)} trials have not finished: left out"
+    return Exported(results, conditions, (note,) if unfinished else ())
 
 
 def _conditions(

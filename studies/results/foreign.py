@@ -164,13 +164,12 @@ def results_of(table: ScoreTable, columns: ScoreColumns, better: Better = "highe
 def _keys(table: ScoreTable, columns: ScoreColumns, levels: pd.DataFrame) -> dict[str, object]:
     """Return the columns of the long form that name a score."""
     item = table.text(columns.item) if columns.item else ""
-    is_run = columns.seed is None  # an item stands for a run
     return {
         "condition": _labels(levels),
         "phase": table.filled(columns.phase) if columns.phase else PHASE,
         "step": _steps(table, columns.step) if columns.step else 0.0,
-        "seed": item if is_run else table.text(columns.seed),
-        "episode": "" if is_run else item,
+        "seed": table.text(columns.seed) if columns.seed else item,  # an item stands for a run
+        "episode": item if columns.seed else "",
     }
 
 
@@ -179,7 +178,7 @@ def _pairing_notes(columns: ScoreColumns) -> list[str]:
     if columns.seed is not None:
         return []
     if columns.item is not None:
-        return [f"a seed below is one value of {columns.item!r}: conditions are compared on these"]
+        return [f"no column 'seed': a seed below is one value of {columns.item!r}"]
     return [
         "no column 'seed' or 'item': runs cannot be paired, independent samples are compared; "
         "--columns seed=COLUMN names the runs"
@@ -236,9 +235,7 @@ def _labels(levels: pd.DataFrame) -> pd.Series:
 
 def _conditions(labels: pd.Series, levels: pd.DataFrame) -> dict[str, dict[str, object]]:
     """Return the levels of each condition, sorted by the labels of the conditions."""
-    named = {
-        _own_name(name): plain_levels(levels[name]) for name in levels if name != "condition"
-    }
+    named = {_own_name(name): plain_levels(levels[name]) for name in levels if name != "condition"}
     rows = pd.DataFrame({LABEL: labels, **named}).drop_duplicates(LABEL).to_dict("records")
     known = {row.pop(LABEL): row for row in rows}
     return {condition: known[condition] for condition in sort_labels(known)}

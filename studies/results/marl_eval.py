@@ -252,7 +252,7 @@ def _columns(
     runs: Sequence[Run], labels: Mapping[tuple[str, str], str]
 ) -> dict[str, dict[str, object]]:
     several = len({run.task for run in runs}) > 1
-    columns = {
+    columns: dict[str, dict[str, object]] = {
         label: {"algorithm": algorithm, **({"task": task} if several else {})}
         for (task, algorithm), label in labels.items()
     }
@@ -290,23 +290,33 @@ def _phases(
     phases = []
     for metric in metrics:
         every = frame[frame["measure"] == metric]
-        own = every[every["step"] != FINAL]
+        own = every[every["step"] != FINAL].assign(phase=LAST_STEP)
         absolute = final[final["measure"] == metric]
-        has_absolute = {*absolute["condition"]} == {*every["condition"]}
-        if has_absolute:
-            text = f"{ABSOLUTE} are compared{left_out_note(every, absolute)}"
-            phases += _final(absolute)
         step = last_common_step(own) if len(own) else None
-        if step is not None:
-            rows = own[own["step"] == step].assign(phase=LAST_STEP, episode=0)
-            phases.append(rows)
-            if not has_absolute:
-                text = step_note(every, rows, f"step_count {step:.0f}")
-            phases.append(_curves(own[own["step"] <= step], rows))
-        elif not has_absolute:
+        rows = own[own["step"] == step]
+        if {*absolute["condition"]} == {*every["condition"]}:
+            phases += _final(absolute)
+            text = f"{ABSOLUTE} are compared{_best_note(own, absolute)}"
+            text += left_out_note(every, absolute)
+            text += f"; --phase '{LAST_STEP}' compares step_count {step:.0f}" if step else ""
+        elif step is None:
             text = "most runs of every algorithm share no step_count: not compared"
+        else:
+            text = step_note(every, rows, f"step_count {step:.0f}")
+        if step is not None:
+            phases += [rows.assign(episode=0), _curves(own[own["step"] <= step], rows)]
         chosen.setdefault(text, []).append(metric)
     return phases, [f"{', '.join(names)}: {text}" for text, names in chosen.items()]
+
+
+def _best_note(series: pd.DataFrame, absolute: pd.DataFrame) -> str:
+    """Return that absolute metrics are the best single values of runs, if they are."""
+    keys = ["condition", "seed"]
+    best = series["values"].map(max).groupby([series[k] for k in keys]).max()
+    many = series["values"].map(len).groupby([series[k] for k in keys]).sum()
+    own = absolute.set_index(keys)["values"]
+    is_best = (own.map(len) == 1).all() and own.map(max).equals(best.reindex(own.index))
+    return " (the best single value of each run)" if is_best and (many > 1).all() else ""
 
 
 def _final(absolute: pd.DataFrame) -> list[pd.DataFrame]:
@@ -356,7 +366,7 @@ def _without_prefix(names: pd.Series) -> pd.Series:
 
 def _measures(wide: pd.DataFrame, metrics: Sequence[str], better: Better) -> list[Measure]:
     """Return the measures of metrics; returns are compared unless success is measured."""
-    measures = []
+    measures: list[Measure] = []
     for name in metrics:
         if name in (STEPS, RETURN.name):
             continue

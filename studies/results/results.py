@@ -139,7 +139,7 @@ class Results:
 
     @cached_property
     def main(self) -> Measure:
-        """The measure by which conditions are compared: the first, or the return if it never varies.
+        """The measure that is compared: the first, or the return if that never varies.
 
         Where returns are left out, it is the first measure that can vary.
         """

@@ -7,7 +7,6 @@ scores become numbers. Every message names the line or row of the file.
 from __future__ import annotations
 
 import csv
-import json
 import re
 from collections.abc import Iterator, Sequence
 from io import StringIO
