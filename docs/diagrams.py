@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Wedge
 
 from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.results import ROWS
+from nested_agents.research import ROWS
 from nested_agents.studies.presentation import figures
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
 from nested_agents.studies.results import published

@@ -20,11 +20,11 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from ..core.interface.environments import Transitions
 from ..core.interface.measures import NO_SUCCESS, Measure
 from ..core.interface.scenario import Scenario, Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
-from ..core.interface.stacked import StackedWorlds
-from ..core.interface.worlds import Transitions
+from ..core.interface.stacked import StackedEnvironments
 from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 
@@ -112,31 +112,31 @@ class Spread(Scenario):
         is_over = self.done >= self.settings.most_decisions
         return Transition(states, rewards, False, is_over, info)
 
-    def worlds(self, count: int) -> SpreadWorlds:
-        """Return many such worlds, stepped in one call."""
-        return SpreadWorlds(self, count)
+    def environments(self, count: int) -> SpreadEnvironments:
+        """Return many environments, stepped in one call."""
+        return SpreadEnvironments(self, count)
 
 
-class SpreadWorlds(StackedWorlds[Spread]):
-    """Many worlds of particles."""
+class SpreadEnvironments(StackedEnvironments[Spread]):
+    """Many environments of particles."""
 
-    def stack(self, world: Spread, count: int) -> None:
-        """Make room."""
-        shape = count, *world.places.shape
+    def allocate(self, scenario: Spread, count: int) -> None:
+        """Allocate the state of all environments."""
+        shape = count, *scenario.places.shape
         self.places = np.zeros(shape)
         self.velocities = np.zeros(shape)
         self.landmarks = np.zeros(shape)
         self.done = np.zeros(count, dtype=np.int64)
 
-    def take(self, place: int, world: Spread) -> None:
-        """Put what a world has begun with in its place."""
-        self.places[place] = world.places
-        self.velocities[place] = world.velocities
-        self.landmarks[place] = world.landmarks
-        self.done[place] = 0
+    def store(self, index: int, scenario: Spread) -> None:
+        """Copy the initial state into an environment."""
+        self.places[index] = scenario.places
+        self.velocities[index] = scenario.velocities
+        self.landmarks[index] = scenario.landmarks
+        self.done[index] = 0
 
     def step(self, joint_actions: IntArray) -> Transitions:
-        """Push all particles of all worlds."""
+        """Push all particles of all environments."""
         self.places, self.velocities = advance(self.places, self.velocities, joint_actions)
         self.done += 1
         rewards = judge(self.places, self.landmarks)[0]

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from ..core.interface.environments import Environments, Transitions
 from ..core.interface.measures import NO_SUCCESS, SUCCESS, Measure
 from ..core.interface.scenario import Scenario, Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
-from ..core.interface.worlds import Transitions, Worlds
 from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 from ..core.plugins.sources import format_error
@@ -82,7 +82,7 @@ class VmasTask(Scenario):
     def __init__(self, settings: VmasSettings) -> None:
         self.settings = settings
         self.measures = (SUCCEEDED if settings.success_return is not None else NO_SUCCESS,)
-        self._single = VmasWorlds(settings, 1)
+        self._single = VmasEnvironments(settings, 1)
         self.agents = self._single.agents
         self.roles = ("agent",) * len(self.agents)
         names = tuple(map(str, range(self._single.n_actions)))
@@ -114,12 +114,12 @@ class VmasTask(Scenario):
         ends = bool(steps.terminated[0]), bool(steps.truncated[0])
         return Transition(steps.states[0], steps.rewards[0], *ends, info, absorbing=False)
 
-    def worlds(self, count: int) -> VmasWorlds:
+    def environments(self, count: int) -> VmasEnvironments:
         """Return many worlds of the task, stepped in one call."""
-        return VmasWorlds(self.settings, count)
+        return VmasEnvironments(self.settings, count)
 
 
-class VmasWorlds(Worlds):
+class VmasEnvironments(Environments):
     """Worlds of a task, in the batch of one environment of VMAS.
 
     Parameters
@@ -218,7 +218,7 @@ def ranges_of(settings: VmasSettings) -> tuple[FloatArray, FloatArray]:
 
     Numbers that stay the same have a range of 1 about them.
     """
-    worlds = VmasWorlds(settings, MET)
+    worlds = VmasEnvironments(settings, MET)
     rng = np.random.default_rng(0)
     seen = [worlds.reset(np.random.SeedSequence(0).spawn(MET))]
     action = rng.integers(worlds.n_actions, size=(MET, len(worlds.agents)))

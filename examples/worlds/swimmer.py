@@ -7,7 +7,7 @@ that specs can sweep it: see ``studies/catalogue/learning_curve/swimmer_n.toml``
 own angle and speed and the angles of those next to them; an end has one neighbour, twice.
 """
 
-# That spec is in results/specs/learning_curve now. The text above stays, as identities of kept
+# That spec is in research/specs/learning_curve now. The text above stays, as identities of kept
 # trials rest on it.
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings
 

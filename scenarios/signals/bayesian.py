@@ -64,7 +64,7 @@ class BayesianAgents(Agents[Beliefs]):
     """
 
     at_once: ClassVar[bool] = True
-    many_worlds: ClassVar[bool] = True
+    is_vectorized: ClassVar[bool] = True
 
     def __init__(self, settings: Bayesian, placement: Placement) -> None:
         self.rng = np.random.Generator(np.random.PCG64(placement.seed))

@@ -17,10 +17,10 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from ...core.interface.environments import Environments, Transitions
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
-from ...core.interface.worlds import Transitions, Worlds
 from ...core.numerics import BoolArray, FloatArray, IntArray
 from ...core.plugins.settings import ScenarioSettings
 
@@ -141,9 +141,9 @@ class Signals(Scenario):
         reward = right.astype(float) if self.settings.pays == "own" else vote
         return Transition(self._advance(), reward, False, False, info)
 
-    def worlds(self, count: int) -> SignalWorlds:
+    def environments(self, count: int) -> SignalEnvironments:
         """Return many such worlds, played in one call."""
-        return SignalWorlds(self, count)
+        return SignalEnvironments(self, count)
 
     def _advance(self) -> FloatArray:
         draws = self._rng.random(self.settings.players + 2)
@@ -151,7 +151,7 @@ class Signals(Scenario):
         return self._play.seen
 
 
-class SignalWorlds(Worlds):
+class SignalEnvironments(Environments):
     """Many worlds of signals, played in one call; each has the bits that it has by itself.
 
     Parameters
@@ -163,7 +163,7 @@ class SignalWorlds(Worlds):
 
     Examples
     --------
-    >>> worlds = SignalWorlds(SignalsSettings(players=3, pays="vote").build(), 2)
+    >>> worlds = SignalEnvironments(SignalsSettings(players=3, pays="vote").build(), 2)
     >>> worlds.reset([np.random.SeedSequence(seed) for seed in (0, 1)]).shape
     (2, 3, 1)
     >>> worlds.step(np.zeros((2, 3), dtype=int)).rewards.shape

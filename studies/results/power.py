@@ -41,7 +41,7 @@ SUPPOSED = 4.0
 RATES = 1.07
 """By how much more success rates seem to deviate: they have ties and bounds, which cost a test some
 power. Without it studies of ten episodes find up to .04 less than is promised, with it up to .03,
-see `benchmarks.power`."""
+see `research.power`."""
 FEW_PATTERNS = 32
 """If fewer patterns of signs are extreme enough to be significant, the power is simulated."""
 SIMULATED = 4000

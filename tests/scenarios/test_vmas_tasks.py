@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.stacked import LoopedWorlds
+from nested_agents.core.interface.stacked import LoopedEnvironments
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.studies.catalogue.experience import measure
 from nested_agents.studies.spec.spec import Spec
@@ -30,8 +30,8 @@ def _vmas():
 @pytest.mark.usefixtures("_vmas")
 @pytest.mark.parametrize("task", ["navigation", "dispersion"])
 def test_many_worlds_are_each_by_itself(task):
-    many = build(task).worlds(COUNT)
-    single = LoopedWorlds([build(task) for _ in range(COUNT)])
+    many = build(task).environments(COUNT)
+    single = LoopedEnvironments([build(task) for _ in range(COUNT)])
     assert np.array_equal(many.reset(seeds(0)), single.reset(seeds(0)))
     rng = np.random.default_rng(0)
     n, n_actions = len(build(task).agents), len(build(task).action_set)
@@ -88,7 +88,7 @@ def test_without_the_extra_it_says_so(monkeypatch):
 
 @pytest.mark.usefixtures("_vmas")
 def test_networks_train_in_it_to_the_same_rows():
-    learner = {"kind": "mappo", "worlds": 8, "rollout": 10, "batch_size": 80, "epochs": 1}
+    learner = {"kind": "mappo", "environments": 8, "rollout": 10, "batch_size": 80, "epochs": 1}
     table = {
         "study": "experience", "seeds": 1, "decisions": 400, "steps": 20, "evaluation": 1,
         "scenario": {"kind": "vmas", "task": "balance"}, "learner": learner,

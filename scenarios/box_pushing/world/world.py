@@ -28,7 +28,7 @@ from Box2D import _Box2D
 
 from ....core.numerics import BoolArray, FloatArray, IntArray
 from ...faults.settings import Failures, FailureSettings, Free
-from .boxes import BoxSpec
+from .boxes import UNIT, BoxSpec
 from .geometry import gaps, infrared_readings
 from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
@@ -40,8 +40,6 @@ from .stepping import (
     step_address,
 )
 
-UNIT = 10.0
-"""Box2D units per metre."""
 TOUCHING = 0.001
 """Gap [m] below which a robot counts as touching: Box2D keeps polygons `SKIN` apart, up to a slop
 of 0.5 mm."""

@@ -1,8 +1,8 @@
 """The experience study: what teams return after more and more decisions, on a logarithmic axis.
 
 A trial trains for `decisions` joint decisions, and stops at 1,000, 3,000, 10,000 and so on for an
-evaluation without exploration, on the same worlds every time. Learners in many worlds at once count
-the decisions of all of them. Conditions that learn nothing are evaluated without training. The
+evaluation without exploration, on the same worlds every time. Learners in many environments
+count the decisions of all. Conditions that learn nothing are evaluated without training. The
 first condition is compared with all others at the end, paired by seed.
 """
 
@@ -19,9 +19,12 @@ from ...results.statistics import Array, Estimate, bootstrap, rate, stack_estima
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..peers import AFTER, CPU, evaluated_after
 from ..study import check_evaluated
 
+AFTER = "after "
+"""With what the phase of such an evaluation begins; how much came before follows."""
+CPU = "cpu."
+"""With what the name of the CPU seconds until then begins; the same follows."""
 FIRST = 1000
 """Decisions before the first evaluation."""
 DECISIONS = "decisions"
@@ -52,11 +55,11 @@ def check(spec: Spec) -> None:
         raise SpecError("decisions: missing; experience needs a budget, as decisions = 1000000")
     for condition in spec.conditions():
         learner = condition.settings.learner
-        rollout = learner.model_dump().get("rollout", 0) * learner.at_once
+        rollout = learner.model_dump().get("rollout", 0) * learner.n_environments
         if spec.decisions < rollout:
             raise SpecError(
                 f"decisions = {spec.decisions}: less than a rollout of {rollout} decisions in "
-                f"{learner.at_once} worlds, nothing would be learned (condition "
+                f"{learner.n_environments} environments, nothing would be learned (condition "
                 f"{condition.label!r})"
             )
 
@@ -74,6 +77,16 @@ def measure(trial: Trial) -> TrialResult:
                 session.evaluate(phase=f"{AFTER}{stop}")
             session.put_down()
     return session.finish({DECISIONS: float(done)}, session.usage)
+
+
+def evaluated_after(results: Results, condition: str) -> dict[int, str]:
+    """Return the phases in which a condition was evaluated on its way, by how much came before."""
+    phases = {
+        int(phase.removeprefix(AFTER)): phase
+        for phase in results.phases
+        if phase.startswith(AFTER) and results.has(condition, phase)
+    }
+    return dict(sorted(phases.items()))
 
 
 class ReturnCourse(NamedTuple):
@@ -123,7 +136,7 @@ def analyse(results: Results) -> Analysis:
     compared = differences({title: pairs[1:]}, of_rates=is_rate)
     heads = {f"{title}, less that of {conditions[0]}": compared[title]}
     notes = (
-        "after N: when evaluated after N joint decisions of training, of all worlds.",
+        "after N: when evaluated after N joint decisions of training, of all environments.",
         *verdicts(heads, of_rates=is_rate),
     )
     return Analysis(tuple(table), notes, courses, compared)

@@ -8,7 +8,7 @@ from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.interface.experience import Observation
 from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios.line_up import LineUpSettings
-from nested_agents.scenarios.signals.scenario import SignalsSettings, SignalWorlds
+from nested_agents.scenarios.signals.scenario import SignalEnvironments, SignalsSettings
 from nested_agents.scenarios.signals.theory import cascade, enumerated, majority
 
 KIND = "nested_agents.scenarios.signals.bayesian:Bayesian"
@@ -24,7 +24,7 @@ def team(world, topology="chain", indifferent="signal", failures=()):
 def played(n, topology="chain", indifferent="signal", count=WORLDS):
     """Return who is right ``(W, n)``, and the vote ``(W,)``."""
     world = SignalsSettings(players=n, accuracy=0.7).build()
-    worlds = SignalWorlds(world, count)
+    worlds = SignalEnvironments(world, count)
     states = worlds.reset([np.random.SeedSequence(k) for k in range(count)])
     agents = team(world, topology, indifferent)
     joint = agents.act(Observation(states, world), explore=False).joint_action
@@ -63,7 +63,7 @@ def test_who_is_told_nothing_names_its_signal():
 def test_one_world_is_as_many():
     world = SignalsSettings(players=6).build()
     agents = team(world)
-    worlds = SignalWorlds(world, 8)
+    worlds = SignalEnvironments(world, 8)
     seeds = [np.random.SeedSequence(k) for k in range(8)]
     together = agents.act(Observation(worlds.reset(seeds), world), explore=False).joint_action
     alone = [agents.act(Observation(world.reset(seed), world)).joint_action for seed in seeds]

@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios.checking.checker import check_scenario
-from nested_agents.scenarios.signals.scenario import Plays, SignalsSettings, SignalWorlds
+from nested_agents.scenarios.signals.scenario import Plays, SignalEnvironments, SignalsSettings
 
 SEEDS = [np.random.SeedSequence(seed) for seed in range(5)]
 
@@ -46,7 +46,7 @@ def test_signals_are_as_accurate_as_they_should_be():
 @pytest.mark.parametrize("pays", ["own", "vote"])
 def test_worlds_that_are_played_together_are_what_each_is_by_itself(pays):
     settings = SignalsSettings(players=4, pays=pays)
-    worlds = SignalWorlds(settings.build(), len(SEEDS))
+    worlds = SignalEnvironments(settings.build(), len(SEEDS))
     alone = [settings.build() for _ in SEEDS]
     rng = np.random.default_rng(0)
     assert np.array_equal(

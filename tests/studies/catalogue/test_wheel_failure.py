@@ -6,7 +6,7 @@ import pytest
 from acting import fuzzy
 from made_up_results import NOTHING, wheel_failure
 
-from nested_agents.results import SPECS
+from nested_agents.research import SPECS
 from nested_agents.studies.catalogue import wheel_failure as module
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.catalogue.wheel_failure import (
@@ -171,13 +171,13 @@ def test_the_spec_can_be_run_and_crosses_faults_with_self_models() -> None:
     labels = [condition.label for condition in spec.conditions()]
     assert len(spec.seeds) >= 20
     assert "4 wheels, seized, enabled=true" in labels
-    others = Spec.load(SPECS / "wheel_failure" / "wheel_faults.toml")
+    others = Spec.load(SPECS / "wheel-faults.toml")
     check(others)
     assert "2 wheels, seized, enabled=false" in [c.label for c in others.conditions()]
 
 
 def test_large_teams_lose_more_and_more_wheels_of_different_robots() -> None:
-    spec = Spec.load(SPECS / "wheel_failure" / "failures_of_large_teams.toml")
+    spec = Spec.load(SPECS / "large-failures.toml")
     check(spec)
     lost = []
     for condition in spec.conditions():

@@ -82,7 +82,7 @@ def test_what_learns_nothing_is_named(tmp_path, capsys):
 ORDERS = "\x1b]0;owned\x07\x1b[31m[red]x\u202e\x9b31m"
 """A label that would name the window, colour the text and reverse it."""
 WRITTEN = r"\x1b]0;owned\x07\x1b[31m[red]x\u202e\x9b31m"
-PUBLISHED = Path(na.__file__).parents[1] / "results/rows/from-eight-128.json"
+PUBLISHED = Path(na.__file__).parents[1] / "research/results/from-eight-128.json"
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents import studies
-from nested_agents.results import SPECS
+from nested_agents.research import SPECS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.page import extremes, page, rate_of, unfolded

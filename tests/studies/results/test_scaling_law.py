@@ -5,7 +5,7 @@ import pytest
 
 import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS
-from nested_agents.results import ROWS
+from nested_agents.research import ROWS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.growth import growth_figures
