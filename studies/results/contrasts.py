@@ -149,7 +149,7 @@ def contrasts(
         ]
         lines = []
         for name, c in members:
-            own = {title_of(shown_as, phase): _estimate(shown_as, values[c])}
+            own = {title_of(shown_as, phase): mean_estimate(shown_as, values[c])}
             whose = ", ".join(filter(None, (setting, name)))
             lines.append(Summary(whose, len(values[c]), own | less.get(name, {})))
         compared_groups.append(
@@ -231,8 +231,8 @@ def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
     return f"{count} of {total} {unit}" if count else ""
 
 
-def _estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
-    """Return the mean over seeds of a measure with its interval."""
+def mean_estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
+    """Return the mean over seeds of a measure's values, a row for each seed, with its interval."""
     outcomes = values.to_numpy(dtype=float)
     if not measure.is_rate:
         return bootstrap(row_means(values).to_numpy(), bounds=measure.bounds)

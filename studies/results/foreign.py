@@ -8,6 +8,7 @@ names neither holds independent samples.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -70,9 +71,11 @@ class ScoreColumns(NamedTuple):
         several = {
             role: _several(given.get(role) or role, known) for role in ("condition", "score")
         }
-        single = {
-            role: given.get(role) or (role if role in known else None) for role in cls._fields[2:]
-        }
+        single = {role: given.get(role) for role in cls._fields[2:]}
+        taken = {*chain(*several.values()), *single.values()}
+        for role in single:
+            if single[role] is None and role in known and role not in taken:
+                single[role] = role
         return cls(**several, **single)  # type: ignore[arg-type]
 
 

@@ -129,13 +129,16 @@ def runs_of(file: JsonValue) -> list[Run]:
     ValueError
         If the file is not of this form; one line names the key and its value.
     """
-    return [
+    runs = [
         _run((f"{environment}/{task}", algorithm, name), run)
         for environment, by_task in file.table().items()
         for task, by_algorithm in by_task.table().items()
         for algorithm, runs in by_algorithm.table().items()
         for name, run in _some(runs).items()
     ]
+    if not any({*run.series, *run.absolute} - {STEPS} for run in runs):
+        raise ValueError("no run has measured anything")
+    return runs
 
 
 def _some(runs: JsonValue) -> dict[str, JsonValue]:
@@ -204,18 +207,11 @@ def results_of(
         Which values are better.
     conditions, measures
         What is known of an exported study: its conditions with their swept keys, and its measures.
-
-    Raises
-    ------
-    ValueError
-        If no run has measured anything.
     """
     labels = _labels(runs, conditions)
     columns = conditions or _columns(runs, labels)
     frame = _long(runs, labels)
     metrics = sorted(frame["measure"].unique())
-    if not {*metrics} - {STEPS}:
-        raise ValueError("no run has measured anything")
     ignored = sorted({key for run in runs for key in run.ignored})
     notes = [f"keys that are no steps are ignored: {', '.join(ignored)}"] if ignored else []
     empty = sum(not (run.series or run.absolute) for run in runs)

@@ -209,7 +209,8 @@ def table_of(frame: pd.DataFrame) -> ScoreTable:
 
 def records_table(records: object) -> ScoreTable:
     """Return the table of a list of JSON objects, one for each row."""
-    if not isinstance(records, list) or not all(isinstance(row, dict) for row in records):
+    is_table = isinstance(records, list) and all(isinstance(row, dict) for row in records)
+    if not is_table or not records:
         raise SpecError("holds no table of scores: must be a list of objects, [{...}, ...]")
     return ScoreTable(pd.DataFrame(records, dtype=object), range(len(records)))
 
