@@ -163,7 +163,7 @@ def atlas(
     for title, (own, most) in groups.items():
         if own.empty:
             continue
-        print_text("", f"{title}: teams larger than {most} in 90 % intervals")
+        print_text("", f"{title}: teams larger than {most} in 90% intervals")
         print_lines(coverage(checks(own, most)))
     of_tasks = frame[frame["source"] != ALREADY]
     chosen = choices(of_tasks)

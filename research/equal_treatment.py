@@ -13,7 +13,7 @@ from ..studies.catalogue.hierarchies.cases import HierarchyCase
 from ..studies.catalogue.hierarchies.pooled import Effect, effects
 from ..studies.cli.display import print_text
 from ..studies.results.analysis import EVALUATED
-from ..studies.results.notation import bracketed, two_decimals
+from ..studies.results.notation import format_estimate
 from ..studies.results.results import Results
 from . import ROWS
 from .studies.edges import TRAINED, analyse
@@ -53,7 +53,7 @@ def lines() -> list[str]:
     ]
     beside = ["| beside the chain | success | | decisions to the goal | |", "|---|---|---|---|---|"]
     for setting, results, cases in settings():
-        values = {case.hierarchy: bracketed(case.values[EVALUATED]) for case in cases}
+        values = {case.hierarchy: format_estimate(case.values[EVALUATED]) for case in cases}
         n_seeds = len(results.seeds(cases[0].condition))
         cells = " | ".join(values[name] for name in (TRAINED, *HOW))
         table.append(f"| {setting} | {n_seeds} | {cells} |")
@@ -72,8 +72,8 @@ def _compared(setting: str, of: Mapping[str, tuple[Effect, Effect]]) -> Iterator
     for name in HOW:
         success, decisions = of[name]
         yield (
-            f"| {setting}: {name} | {bracketed(success.estimate)} | {success.verdict} "
-            f"| {bracketed(decisions.estimate, two_decimals)} times | {decisions.verdict} |"
+            f"| {setting}: {name} | {format_estimate(success.estimate)} | {success.verdict} "
+            f"| {format_estimate(decisions.estimate)} times | {decisions.verdict} |"
         )
 
 

@@ -128,7 +128,7 @@ def main() -> None:
     parser.add_argument("--times", type=int, nargs="*", default=[8, 16, 64, 128], metavar="AGENTS")
     options = parser.parse_args()
     console = Console(width=80)
-    heads = ("scenario", "n", "teammates", "evaluator", "median", "90 %", "99 %", "regret", "of")
+    heads = ("scenario", "n", "teammates", "evaluator", "median", "90%", "99%", "regret", "of")
     table = Table(*heads, box=SIMPLE, padding=(0, 1, 0, 0))
     for name, settings in SCENARIOS.items():
         for robots in options.robots:

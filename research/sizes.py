@@ -18,7 +18,7 @@ from rich.table import Table
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings
-from nested_agents.studies.results.notation import bracketed
+from nested_agents.studies.results.notation import format_estimate
 from nested_agents.studies.results.statistics import rate
 
 from .scripted.controller import decisions_to_goal
@@ -42,7 +42,7 @@ def solved(settings: BoxPushingSettings, seeds: int) -> str:
     success = rate([[steps is not None] for steps in taken])
     decisions = [steps for steps in taken if steps is not None]
     typical = f", {median(decisions):.0f}" if decisions else ""
-    return f"{bracketed(success)}{typical}"
+    return f"{format_estimate(success)}{typical}"
 
 
 def main() -> None:

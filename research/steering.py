@@ -29,7 +29,7 @@ from nested_agents.research import ROWS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.world.starts import STARTS
 from nested_agents.studies.results import published
-from nested_agents.studies.results.notation import bracketed
+from nested_agents.studies.results.notation import format_estimate, format_number
 from nested_agents.studies.results.statistics import rate
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 
@@ -116,7 +116,8 @@ def scripted(robots: int, seeds: int, episodes: int) -> tuple[list[str], str]:
     typical = ""
     if solved:
         typical = f", {median(solved):.0f} decisions in the median, {max(solved)} at most"
-    words = f"{robots} robots, scripted: {bracketed(success)}{typical}; {seconds:.1f} s an episode"
+    words = f"{robots} robots, scripted: {format_estimate(success)}{typical}"
+    words += f"; {format_number(seconds)} s an episode"
     return counts(robots, range(seeds), successes.reshape(seeds, episodes)), words
 
 

@@ -17,7 +17,7 @@ from nested_agents.research.studies.chain_order import order_tests
 from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results import published
 from nested_agents.studies.results.analysis import Summary
-from nested_agents.studies.results.notation import two_figures
+from nested_agents.studies.results.notation import format_number
 
 FOLDER = Path(__file__).parent
 
@@ -29,7 +29,7 @@ def rows(name: str) -> na.StudyResults:
 
 
 def cell(name: str, condition: str, column: str) -> str:
-    """Return an estimate with its 95 % interval, as the table of its study has it."""
+    """Return an estimate with its 95% interval, as the table of its study has it."""
     return _of_table(name, condition, column).text()
 
 
@@ -70,7 +70,7 @@ def orders() -> dict[str, str]:
     """Return what is tested of all orders of a chain: their number, seeds, and p by measure."""
     tests = order_tests(rows("chain-order").results)
     return {"orders": str(tests[0].orders), "seeds": str(tests[0].seeds)} | {
-        f"p{k}": two_figures(test.p) for k, test in enumerate(tests)
+        f"p{k}": format_number(test.p) for k, test in enumerate(tests)
     }
 
 

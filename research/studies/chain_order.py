@@ -20,7 +20,7 @@ from ...studies.catalogue import ablation
 from ...studies.catalogue.study import measure as measure
 from ...studies.results.analysis import Analysis, Figures, phases_of, select_shared
 from ...studies.results.contrasts import Group, contrasts
-from ...studies.results.notation import two_figures
+from ...studies.results.notation import format_number, format_p
 from ...studies.results.results import Results
 from ...studies.results.statistics import LEVEL, Friedman, friedman, holm
 
@@ -31,7 +31,7 @@ MARGIN = 0.1
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("training")
     if any({"name", "topology"} <= results.columns.get(c, {}).keys() for c in conditions):
         by_order = contrasts(results, results.main.name, by="topology")
@@ -54,7 +54,7 @@ def equivalence(group: Group) -> str:
     else:
         verdict = "equal" if max(-low, high) <= MARGIN else "not decided"
     orders = len(group.differences) + 1
-    ends = f"[{two_figures(low)}, {two_figures(high)}]"
+    ends = f"[{format_number(low)}, {format_number(high)}]"
     return f"{group.setting}, {orders} orders, within {MARGIN:g}: {verdict} {ends}"
 
 
@@ -77,8 +77,9 @@ class OrderTest(NamedTuple):
         """What the test found, in words."""
         differ = "differ" if self.p < LEVEL else "do not differ significantly"
         return (
-            f"{self.title}: {self.orders} orders {differ} (Friedman {self.test.statistic:.1f}, "
-            f"p = {self.test.p:.2g}, adjusted {self.p:.2g}; W = {self.test.concordance:.3f}; "
+            f"{self.title}: {self.orders} orders {differ} (Friedman "
+            f"{format_number(self.test.statistic)}, p {format_p(self.test.p)}, adjusted "
+            f"{format_p(self.p).removeprefix('= ')}; W = {format_number(self.test.concordance)}; "
             f"{self.seeds} seeds)"
         )
 

@@ -27,7 +27,7 @@ from ...studies.catalogue.study import (
     distinct,
 )
 from ...studies.results.analysis import EVALUATED, Analysis, Figures
-from ...studies.results.notation import two_figures
+from ...studies.results.notation import format_number
 from ...studies.results.results import Results, Sizes
 from ...studies.spec.spec import Spec
 from ...studies.spec.tables import label_but
@@ -68,7 +68,7 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     sizes = Sizes.of(results, results.of_phase("evaluation"))
     cases = []
     for condition, robots in sizes.counts.items():
@@ -111,7 +111,7 @@ def _draw_parted(analysis: Analysis) -> Figures:
         fields = np.array([[by_name[setting, name] for name in row] for row in PARTED], dtype=float)
         axes.imshow(fields[..., 0], "Blues", vmin=0, vmax=1)
         for row, column in np.ndindex(2, 2):
-            value, low, high = map(two_figures, fields[row, column])
+            value, low, high = map(format_number, fields[row, column])
             colour = "white" if fields[row, column, 0] > 0.5 else "black"
             write = partial(axes.text, column, ha="center", color=colour)
             write(row, value, va="bottom", fontsize=15)
@@ -121,5 +121,5 @@ def _draw_parted(analysis: Analysis) -> Figures:
         axes.set_yticks((0, 1), ("not told", "told"))
         axes.tick_params(length=0, labelsize=7.5)
         axes.spines[:].set_visible(False)
-    figure.suptitle("evaluation success of the same weights, 95 % intervals", fontsize=9)
+    figure.suptitle("evaluation success of the same weights, 95% intervals", fontsize=9)
     return {"edges": figure}

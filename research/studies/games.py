@@ -17,7 +17,7 @@ from ...studies.catalogue.study import check_evaluated as check
 from ...studies.catalogue.study import distinct, system_of
 from ...studies.errors import WIDTH
 from ...studies.results.analysis import Analysis, Case, Figures, Summary
-from ...studies.results.notation import two_figures
+from ...studies.results.notation import format_number
 from ...studies.results.results import Results
 from ...studies.results.statistics import rate
 from ...studies.store.database import EVALUATION
@@ -45,7 +45,7 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate; 95 % Wilson intervals, seeds as the unit of sampling."""
+    """Estimate; 95% Wilson intervals, seeds as the unit of sampling."""
     cases = []
     table = []
     for condition in results.of_phase("evaluation"):
@@ -84,17 +84,17 @@ def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
     yield from ("", *wrap(legend, WIDTH))
     for plays in distinct(plays for case in cases for plays in case.values):
         yield f"\nProbability of the optimal joint action after {plays:,} plays"
-        yield " " * widest + "".join(f"{letter:>4}" for letter in letters.values())
+        yield " " * widest + "".join(f"{letter:>5}" for letter in letters.values())
         for setting in settings:
             line = f"{', '.join(setting):{widest}}"
             for system in systems:
                 estimate = by_place.get((setting, system), {}).get(plays)
-                line += f"{two_figures(float(estimate.value)) if estimate else '-':>4}"
+                line += f"{format_number(float(estimate.value)) if estimate else '-':>5}"
             yield line
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: probabilities of the optimum with their 95 % intervals.
+    """Return the figure: probabilities of the optimum with their 95% intervals.
 
     A panel for each game (the first thing that settings differ in), the systems one below the
     other, a colour and a marker for the rest of the setting; what is filled has been measured after
@@ -133,7 +133,7 @@ def draw(analysis: Analysis) -> Figures:
         f.handle(", ".join((*rest, f"{count:,} plays")), **look)
         for (rest, count), look in looks.items()
     ]
-    f.add_legend(figure, handles, "bars: 95 % intervals", ncols=2)
+    f.add_legend(figure, handles, "bars: 95% intervals", ncols=2)
     return {"games": figure}
 
 

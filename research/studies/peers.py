@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...studies.catalogue.experience import AFTER, CPU, evaluated_after
+from ...studies.catalogue.experience import AFTER, evaluated_after
 from ...studies.catalogue.study import check_evaluated as check
 from ...studies.results.analysis import (
     EVALUATED,
@@ -22,7 +22,7 @@ from ...studies.results.analysis import (
     evaluated,
     judged,
 )
-from ...studies.results.results import Results
+from ...studies.results.results import CPU, Results
 from ...studies.results.statistics import (
     NOT_NEGATIVE,
     Array,
@@ -77,7 +77,7 @@ class LearningCourse(NamedTuple):
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("evaluation")
     main = results.main
     title = f"evaluation {main.heading}"
@@ -108,7 +108,7 @@ def analyse(results: Results) -> Analysis:
         return Analysis(())
     means = [results.means(condition, "evaluation", main.name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
-    compared, lines = judged({title: pairs[1:]}, conditions[0], of_rates=main.is_rate)
+    compared, lines = judged({title: pairs[1:]}, conditions[0], main)
     notes = (f"{main.heading}, N: when evaluated after N episodes of training.", *lines)
     return Analysis(tuple(table), notes, courses, compared)
 
@@ -116,7 +116,7 @@ def analyse(results: Results) -> Analysis:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: evaluations against experience, a panel for each condition.
 
-    The condition's line has a colour, and a band for its 95 % intervals; those of the others are
+    The condition's line has a colour, and a band for its 95% intervals; those of the others are
     grey.
     """
     from matplotlib.ticker import LogLocator

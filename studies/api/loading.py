@@ -214,7 +214,7 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
             header = published.header_beside(path) if path else None
             own = exported.results_of(table, header and header.description)
             outline = header.outline if header else _outline(own.conditions)
-            results, notes = own.results, own.notes
+            results, notes = header.limited(own.results) if header else own.results, own.notes
             measure = next(iter(map(str, roles.values())), None)
         else:
             columns = ScoreColumns.of(roles, table.columns)
@@ -238,12 +238,12 @@ def _of_runs(path: Path, runs: Sequence[marl_eval.Run], better: Better) -> Study
     with refused(f"{path}: "):
         if header is not None and is_exported:
             own = marl_eval.results_of(runs, better, known, header.measures)
-            outline = header.outline
+            outline, results = header.outline, header.limited(own.results)
         else:
             own = marl_eval.results_of(runs, better)
-            outline = _outline(own.results.columns)
+            outline, results = _outline(own.results.columns), own.results
     remarks = tuple(f"{path}: {line}" for line in own.notes)
-    return StudyResults(outline, own.results, (), remarks, _defaults=Defaults(by=own.by))
+    return StudyResults(outline, results, (), remarks, _defaults=Defaults(by=own.by))
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:

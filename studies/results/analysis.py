@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.interface.measures import Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ..errors import WIDTH
-from .notation import bracketed, signed, wrapped
+from .notation import format_estimate, format_p, wrapped
 from .power import power_lines
-from .results import Results
+from .results import STEPS, Results
 from .statistics import (
     LEVEL,
+    NOT_NEGATIVE,
     Array,
     Estimate,
     bootstrap,
@@ -73,7 +74,23 @@ def estimate_of(
     values = results.values(condition, measure.name, phase)[:, part]
     if measure.is_rate:
         return rate(values)
+    if measure.name == STEPS.name:
+        return steps_estimate(values.mean(axis=1), results.steps(phase))
     return bootstrap(values.mean(axis=1), bounds=measure.bounds)
+
+
+def estimate_over_seeds(values: Array, measure: Measure) -> Estimate:
+    """Return the mean of values ``(n_seeds,)`` of whole trials with its interval."""
+    return rate(values[:, None]) if measure.is_rate else bootstrap(values, bounds=measure.bounds)
+
+
+def steps_estimate(means: Array, steps: Measure) -> Estimate:
+    """Return the mean length of episodes, whose interval ends at the longest allowed.
+
+    Unlike that of a share, the interval has no width where all episodes are equally long.
+    """
+    value, low, high = bootstrap(means, bounds=NOT_NEGATIVE)
+    return Estimate(value, low, np.minimum(high, steps.bounds[1]))
 
 
 @dataclass(frozen=True)
@@ -87,7 +104,7 @@ class Difference:
     seeds: int
     """Number of seeds that both have, or the size of the smaller one of independent samples."""
     estimate: Estimate
-    """The mean difference with its 95 % interval."""
+    """The mean difference with its 95% interval."""
     raw: float
     """Unadjusted p of no difference, by permutation."""
     p: float
@@ -101,14 +118,9 @@ class Difference:
     def shown(self) -> str:
         """Value, interval, adjusted and unadjusted p, as text; says if samples are independent."""
         raw = format_p(self.raw)
-        shown = f"{bracketed(self.estimate, signed)}, p {format_p(self.p)}"
+        shown = f"{format_estimate(self.estimate, signed=True)}, p {format_p(self.p)}"
         kind = "" if self.paired else ", independent samples"
         return f"{shown} ({raw.removeprefix('= ')} unadjusted){kind}"
-
-
-def format_p(p: float) -> str:
-    """Return how p is shown, its sign before it."""
-    return "< .001" if p < 0.001 else f"= {p:.2g}"
 
 
 MIN_RUNS = 2
@@ -120,7 +132,7 @@ Pair = tuple[str, str, BySeed, BySeed]
 
 
 def differences(
-    groups: Mapping[str, Iterable[Pair]], *, of_rates: bool = True
+    groups: Mapping[str, Iterable[Pair]], measure: Measure = SUCCESS
 ) -> dict[str, tuple[Difference, ...]]:
     """Compare conditions with their references; p is adjusted over all groups by Holm's method.
 
@@ -128,14 +140,14 @@ def differences(
     ----------
     groups
         By the name of a group, the pairs to compare, see `compare_pair`.
-    of_rates
-        Whether values are rates.
+    measure
+        The measure whose means are compared: no interval leaves its range.
     """
     names = []
     compared = []
     for group, pairs in groups.items():
-        for condition, measure, own, base in pairs:
-            found = compare_pair(condition, measure, own, base, of_rates=of_rates)
+        for condition, title, own, base in pairs:
+            found = compare_pair(condition, title, own, base, measure)
             if found is not None:
                 names.append(group)
                 compared.append(found)
@@ -144,7 +156,7 @@ def differences(
 
 
 def compare_pair(
-    condition: str, measure: str, own: BySeed, base: BySeed, *, of_rates: bool
+    condition: str, title: str, own: BySeed, base: BySeed, measure: Measure
 ) -> Difference | None:
     """Compare the values of a condition with those of a reference, both by seed.
 
@@ -158,16 +170,16 @@ def compare_pair(
     """
     one, other = select_shared([own, base])
     if len(one) >= MIN_RUNS:
-        estimate = paired_difference(one, other, of_rates=of_rates)
+        estimate = paired_difference(one, other, measure)
         p = paired_permutation(one, other)
-        return Difference(condition, measure, len(one), estimate, p, p, one - other)
+        return Difference(condition, title, len(one), estimate, p, p, one - other)
     if min(len(own), len(base)) < MIN_RUNS:
         return None
     one, other = (np.asarray(values, float) for values in (own, base))
-    estimate = independent_difference(one, other, of_rates=of_rates)
+    estimate = independent_difference(one, other, measure)
     p = independent_permutation(one, other)
     fewer = min(len(one), len(other))
-    return Difference(condition, measure, fewer, estimate, p, p, np.empty(0), paired=False)
+    return Difference(condition, title, fewer, estimate, p, p, np.empty(0), paired=False)
 
 
 def adjusted(compared: Sequence[Difference]) -> list[Difference]:
@@ -190,26 +202,28 @@ def adjust(
     )
 
 
-def independent_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
-    """Return the difference of the means of independent runs with its 95 % interval.
+def independent_difference(own: Array, base: Array, measure: Measure) -> Estimate:
+    """Return the difference of the means of independent runs with its 95% interval.
 
     The interval is Welch's. For constant rates it is Newcombe's, because Welch's has no width.
     """
-    if of_rates and np.ptp(own) == np.ptp(base) == 0.0:
+    if measure.is_rate and np.ptp(own) == np.ptp(base) == 0.0:
         return difference(own[:, None], base[:, None])
-    estimate = welch(own, base)
-    return Estimate(*np.clip(estimate, -1.0, 1.0)) if of_rates else estimate
+    least, greatest = measure.bounds
+    return Estimate(*np.clip(welch(own, base), least - greatest, greatest - least))
 
 
-def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
-    """Return the mean difference of paired values ``(n_seeds,)`` with its 95 % interval.
+def paired_difference(own: Array, base: Array, measure: Measure) -> Estimate:
+    """Return the mean difference of paired values ``(n_seeds,)`` with its 95% interval.
 
-    By bootstrap over seeds; of rates that differ alike for every seed, as of independent ones: the
-    interval of a bootstrap would have no width.
+    The interval is by bootstrap over seeds. It stays within what the range of the measure allows.
+    Rates that differ alike for every seed are taken for independent, because the interval of a
+    bootstrap would have no width.
     """
-    if of_rates and np.ptp(own - base) == 0.0:
+    if measure.is_rate and np.ptp(own - base) == 0.0:
         return difference(own[:, None], base[:, None])
-    return bootstrap(own - base, bounds=(-1.0, 1.0) if of_rates else (-np.inf, np.inf))
+    least, greatest = measure.bounds
+    return bootstrap(own - base, bounds=(least - greatest, greatest - least))
 
 
 def select_shared(values: Sequence[BySeed]) -> list[Array]:
@@ -338,32 +352,28 @@ def verdict_lines(
 
 
 def verdicts(
-    groups: Mapping[str, Sequence[Difference]],
-    better: str | None = "higher",
-    measure: str = "",
-    *,
-    of_rates: bool = True,
+    groups: Mapping[str, Sequence[Difference]], measure: Measure = SUCCESS, title: str = ""
 ) -> list[str]:
     """Return the verdicts of groups below their heads, how p is adjusted, and `power_lines`.
 
-    No lines if nothing is compared. p must be adjusted over all groups. Of what the power is, a
-    `measure` says; without, those of the differences.
+    There are no lines if nothing is compared. p must be adjusted over all groups. The power is
+    that of a `title`, by default of what the differences are called.
     """
     compared = [d for group in groups.values() for d in group]
     lines = []
     for head, group in groups.items():
         if group:
             lines += wrapped(f"{head}:")
-            lines += verdict_lines(group, better)
+            lines += verdict_lines(group, measure.better)
     if compared:
         counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
         tests = [text for paired, text in TESTS.items() if paired in {d.paired for d in compared}]
         lines += wrapped(f"p: {' and '.join(tests)}, adjusted over {counted} (Holm).")
     if any(map(_seems_contradicted, compared)):
         lines += wrapped(TWO_TESTS)
-    measure = measure or " or ".join(dict.fromkeys(d.measure for d in compared))
+    title = title or " or ".join(dict.fromkeys(d.measure for d in compared))
     samples = [d.sample for d in compared if d.paired]
-    return lines + power_lines(samples, measure, of_rates=of_rates)
+    return lines + power_lines(samples, title, of_rates=measure.is_rate)
 
 
 def _seems_contradicted(difference: Difference) -> bool:
@@ -374,16 +384,16 @@ def _seems_contradicted(difference: Difference) -> bool:
 
 
 def judged(
-    groups: Mapping[str, Iterable[Pair]], less: str, measure: str = "", *, of_rates: bool = True
+    groups: Mapping[str, Iterable[Pair]], less: str, measure: Measure = SUCCESS, title: str = ""
 ) -> tuple[dict[str, tuple[Difference, ...]], list[str]]:
     """Return the `differences` of groups, and their `verdicts`.
 
-    `less` is what the reference is, `measure` what is compared, unless the groups say so.
+    `less` is what the reference is, `title` what is compared, unless the groups say so.
     """
-    compared = differences(groups, of_rates=of_rates)
-    heads = {group: ": ".join(filter(None, (group, measure))) for group in groups}
+    compared = differences(groups, measure)
+    heads = {group: ": ".join(filter(None, (group, title))) for group in groups}
     by_head = {f"{heads[g]}, less that of {less}": compared[g] for g in groups}
-    return compared, verdicts(by_head, of_rates=of_rates)
+    return compared, verdicts(by_head, measure)
 
 
 def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:

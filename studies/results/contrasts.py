@@ -3,8 +3,6 @@
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-import numpy as np
-
 from ...core.interface.measures import RETURN, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
@@ -19,17 +17,15 @@ from .analysis import (
     differences,
     identity_lines,
     select_shared,
+    steps_estimate,
     verdicts,
 )
 from .notation import wrapped
 from .power import power_lines
-from .results import SECONDS, Results, describe_number, row_means
+from .recovery import RECOVERY, recovery_by_seed
+from .results import SECONDS, STEPS, Results, describe_number, row_means
 from .series import LAST_STEP
 from .statistics import Array, Estimate, bootstrap, rate
-
-STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
-EPISODES = (STEPS, RETURN)
-"""What is known of every episode besides the measures of its scenario."""
 
 
 class Group(NamedTuple):
@@ -85,8 +81,7 @@ class Contrasts(NamedTuple):
         for group in self.groups:
             head = ": ".join(filter(None, (group.setting, self.title)))
             groups[f"{head}, less that of {group.reference}"] = group.differences
-        is_rate = self.measure.is_rate
-        lines = verdicts(groups, self.measure.better, self.title, of_rates=is_rate)
+        lines = verdicts(groups, self.measure, self.title)
         left_out = "; ".join(text for group in self.groups for text in group.left_out)
         if left_out:
             lines += wrapped(f"Without a partner and left out of the difference: {left_out}.")
@@ -136,7 +131,7 @@ def contrasts(
         ]
         for setting, members in groups
     }
-    compared = differences(pairs, of_rates=shown_as.is_rate)
+    compared = differences(pairs, shown_as)
     compared_groups = []
     for setting, members in groups:
         less = {d.condition: {DIFFERENCE[d.paired]: d.estimate} for d in compared[setting]}
@@ -233,12 +228,12 @@ def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
 
 def mean_estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
     """Return the mean over seeds of a measure's values, a row for each seed, with its interval."""
-    outcomes = values.to_numpy(dtype=float)
-    if not measure.is_rate:
-        return bootstrap(row_means(values).to_numpy(), bounds=measure.bounds)
-    if np.isnan(outcomes).any():
-        return bootstrap(row_means(values).to_numpy(), bounds=(0.0, 1.0))
-    return rate(outcomes)
+    means = row_means(values).to_numpy()
+    if measure.name == STEPS.name:
+        return steps_estimate(means, measure)
+    if measure.is_rate and values.notna().all(axis=None):
+        return rate(values.to_numpy(dtype=float))
+    return bootstrap(means, bounds=measure.bounds)
 
 
 _Pairs = list[tuple[str, str]]
@@ -259,27 +254,35 @@ def values_by_seed(
     """Return a measure, its values by condition, and the phase that they are of.
 
     Values have a row for each seed and a column for each episode, or one for a number of trials.
-    The phase is by default the usual one; it is empty for a number of trials.
+    The phase is by default the usual one; it is empty for a number of trials, and for a measure of
+    recovery from a failure.
     """
-    measures = {m.name: m for m in (*results.measures, *EPISODES)}
+    has_failed = any("onset" in results.numbers(condition) for condition in results.conditions)
+    recovery = RECOVERY if has_failed else {}
+    name = next((m.name for m in recovery.values() if name in (m.heading, m.title)), name)
+    measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
     name = next((m.name for m in measures.values() if m.heading == name), name)
     if not results.conditions:
         raise SpecError("no trial has finished")
     if phase is not None and phase not in results.phases:
         raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
-    if name in measures and results.phases:
+    if name in recovery:
+        measure, values = recovery_by_seed(results, name, phase or "training")
+        return measure, {c: own.to_frame() for c, own in values.items()}, ""
+    if name in measures:
         phase = phase or usual_phase(results, name)
+        measure = results.steps(phase) if name == STEPS.name else measures[name]
         of_phase = {c: results.by_seed(c, phase, name) for c in results.of_phase(phase)}
         known = {c: own for c, own in of_phase.items() if own.size}
         if not known:
             raise SpecError(f"measure = {name!r}: no condition has it in the phase {phase!r}")
-        return measures[name], known, phase
+        return measure, known, phase
     numbers = {c: results.numbers(c) for c in results.conditions}
     columns = dict.fromkeys(n for own in numbers.values() for n in own)
     names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
     column = next((c for c in columns if name in names[c]), None)
     if column is None:
-        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *columns})}")
+        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *recovery, *columns})}")
     measure, factor = describe_number(column)
     of_trials = {
         c: pd.DataFrame(factor * own[column], results.seeds(c))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -24,7 +24,7 @@ from ..store.database import SECONDS as PARTS
 from ..store.durable import read_text
 from .exported import Description
 from .json_values import JsonValue, parse
-from .results import SECONDS, Array, Results, from_arrays
+from .results import SECONDS, Array, Results, StepLimits, from_arrays
 
 GATHERINGS = get_args(Measure.__annotations__["gathering"])
 """How the steps of an episode make one number."""
@@ -83,6 +83,10 @@ class Header(NamedTuple):
         if self.version == RESULTS_VERSION:
             return None
         return f"results of version {self.version}, this is version {RESULTS_VERSION}"
+
+    def limited(self, results: Results) -> Results:
+        """Return results with the limits of the spec."""
+        return replace(results, step_limits=StepLimits.of(self.outline.table))
 
     @property
     def description(self) -> Description:
@@ -156,7 +160,7 @@ def read_file(file: JsonValue) -> Published:
     }
     numbers = _numbers(file.child("numbers"), seeds, (), room)
     usage = _numbers(file.child("usage"), seeds, PARTS, room)
-    results = from_arrays(phases, seeds, numbers, usage, own.columns, measures)
+    results = own.limited(from_arrays(phases, seeds, numbers, usage, own.columns, measures))
     return Published(own.outline, results, own.version, own.note)
 
 
@@ -257,6 +261,8 @@ def _outline(spec: JsonValue, columns: Mapping[str, Mapping[str, object]]) -> St
     for name in ("episodes", "steps", "evaluation"):
         spec.child(name).whole(0, MOST_EPISODES)
     own = spec.table()
+    if "evaluation_steps" in own:
+        own["evaluation_steps"].whole(1, MOST_EPISODES)
     overrides = own["overrides"].items() if "overrides" in own else []
     for part in (spec, *overrides):
         if "curriculum" in part.table():

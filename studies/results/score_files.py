@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Sequence
 from io import StringIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -207,10 +207,10 @@ def table_of(frame: pd.DataFrame) -> ScoreTable:
     return ScoreTable(whole.reset_index(drop=True), whole.index.tolist())
 
 
-def records_table(records: object) -> ScoreTable:
+def records_table(records: Any) -> ScoreTable:
     """Return the table of a list of JSON objects, one for each row."""
-    is_table = isinstance(records, list) and all(isinstance(row, dict) for row in records)
-    if not is_table or not records:
+    is_list = isinstance(records, list) and len(records) > 0
+    if not is_list or not all(isinstance(row, dict) for row in records):
         raise SpecError("holds no table of scores: must be a list of objects, [{...}, ...]")
     return ScoreTable(pd.DataFrame(records, dtype=object), range(len(records)))
 
