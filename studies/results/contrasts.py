@@ -219,7 +219,7 @@ def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
     index, other = own.index, base.index
     unit = "runs"
     if results.pairs_episodes:
-        index, other = own.stack().index, base.stack().index
+        index, other = own.stack().dropna().index, base.stack().dropna().index
         unit = "scores"
     total = len(index) + len(other)
     count = total - 2 * len(index.intersection(other))
