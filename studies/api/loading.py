@@ -71,8 +71,8 @@ def load(*places: Place, columns: Sequence[str] = (), better: Better | None = No
     return _merge(list(loaded), list(loaded.values()))
 
 
-class Columns(TypedDict, total=False):
-    """Columns of a table of scores, by role; see `ScoreColumns`."""
+class RoleColumns(TypedDict, total=False):
+    """RoleColumns of a table of scores, by role; see `ScoreColumns`."""
 
     condition: str | Sequence[str]
     score: str | Sequence[str]
@@ -89,7 +89,7 @@ def compare_table(
     measure: str | None = None,
     phase: str | None = None,
     reference: str | None = None,
-    **columns: Unpack[Columns],
+    **columns: Unpack[RoleColumns],
 ) -> Comparison:
     """Compare conditions whose scores are in a table, by any tool.
 
@@ -138,9 +138,9 @@ def compare_table(
     return results.compare(by, measure, phase=phase, reference=reference)
 
 
-def _roles(columns: Columns) -> Roles:
+def _roles(columns: RoleColumns) -> Roles:
     """Return the roles that are given; an unknown one is refused."""
-    known = Columns.__annotations__
+    known = RoleColumns.__annotations__
     for role in columns:
         if role not in known:
             raise TypeError(f"compare_table: unknown argument {role!r}; {closest(role, known)}")
@@ -148,7 +148,7 @@ def _roles(columns: Columns) -> Roles:
     return {r: c for r, c in given.items() if isinstance(c, str | Sequence)}
 
 
-Opened = StudyResults | ScoreTable | list[marl_eval.Run]
+Opened = StudyResults | ScoreTable | list[marl_eval.AlgorithmRun]
 """What a path holds: a study, a table, or runs of the form of marl-eval."""
 
 
@@ -229,7 +229,7 @@ def _outline(conditions: Mapping[str, Mapping[str, object]]) -> StudyOutline:
     return StudyOutline.noted(table, conditions)
 
 
-def _of_runs(path: Path, runs: Sequence[marl_eval.Run], better: Better) -> StudyResults:
+def _of_runs(path: Path, runs: Sequence[marl_eval.AlgorithmRun], better: Better) -> StudyResults:
     """Return the results of runs of the form of marl-eval."""
     header = published.header_beside(path)
     known = header.columns if header else {}

@@ -101,7 +101,7 @@ def _exported_runs(results: Results, condition: str) -> Iterator[tuple[str, dict
         yield f"{SEED}{seed}", run | {ABSOLUTE: own.get("evaluation", {})}
 
 
-class Run(NamedTuple):
+class AlgorithmRun(NamedTuple):
     """What one run of an algorithm on a task measured."""
 
     task: str
@@ -121,7 +121,7 @@ class Run(NamedTuple):
         return self.task, self.algorithm, self.name
 
 
-def runs_of(file: JsonValue) -> list[Run]:
+def runs_of(file: JsonValue) -> list[AlgorithmRun]:
     """Return the runs of a file.
 
     Raises
@@ -147,7 +147,7 @@ def _some(runs: JsonValue) -> dict[str, JsonValue]:
     return runs.table()
 
 
-def _run(key: tuple[str, str, str], run: JsonValue) -> Run:
+def _run(key: tuple[str, str, str], run: JsonValue) -> AlgorithmRun:
     series: dict[str, dict[int, list[float]]] = {}
     absolute: dict[str, list[float]] = {}
     known: dict[object, str] = {}
@@ -172,7 +172,7 @@ def _run(key: tuple[str, str, str], run: JsonValue) -> Run:
             if count.whole() in at:
                 raise count.refusal("a step count that no other step of the run has")
             at[count.whole()] = listed
-    return Run(*key, series, absolute, tuple(ignored))
+    return AlgorithmRun(*key, series, absolute, tuple(ignored))
 
 
 def _values(metric: JsonValue) -> list[float]:
@@ -192,7 +192,7 @@ class Evaluations(NamedTuple):
 
 
 def results_of(
-    runs: Sequence[Run],
+    runs: Sequence[AlgorithmRun],
     better: Better = "higher",
     conditions: Mapping[str, SpecTable] | None = None,
     measures: Sequence[Measure] = (),
@@ -229,7 +229,7 @@ def results_of(
 
 
 def _labels(
-    runs: Sequence[Run], conditions: Mapping[str, SpecTable] | None
+    runs: Sequence[AlgorithmRun], conditions: Mapping[str, SpecTable] | None
 ) -> dict[tuple[str, str], str]:
     """Return the label of each algorithm on each task; the task is named if that is necessary."""
     pairs = dict.fromkeys((run.task, run.algorithm) for run in runs)
@@ -245,7 +245,7 @@ def _labels(
 
 
 def _columns(
-    runs: Sequence[Run], labels: Mapping[tuple[str, str], str]
+    runs: Sequence[AlgorithmRun], labels: Mapping[tuple[str, str], str]
 ) -> dict[str, dict[str, object]]:
     several = len({run.task for run in runs}) > 1
     columns: dict[str, dict[str, object]] = {
@@ -255,7 +255,7 @@ def _columns(
     return {label: columns[label] for label in sort_labels(columns)}
 
 
-def _long(runs: Sequence[Run], labels: Mapping[tuple[str, str], str]) -> pd.DataFrame:
+def _long(runs: Sequence[AlgorithmRun], labels: Mapping[tuple[str, str], str]) -> pd.DataFrame:
     """Return a row for each metric of each step of each run; the step of absolute metrics is -1.
 
     Values are lists. `episode` is the number of the step in its run.
@@ -274,7 +274,7 @@ def _long(runs: Sequence[Run], labels: Mapping[tuple[str, str], str]) -> pd.Data
 
 
 def _phases(
-    frame: pd.DataFrame, metrics: Sequence[str], runs: Sequence[Run]
+    frame: pd.DataFrame, metrics: Sequence[str], runs: Sequence[AlgorithmRun]
 ) -> tuple[list[pd.DataFrame], list[str]]:
     """Return the scores of each phase in long form, and notes on what is compared."""
     is_final = frame["step"] == FINAL
@@ -342,12 +342,12 @@ def _curves(series: pd.DataFrame, kept: pd.DataFrame) -> pd.DataFrame:
     return own.assign(phase="training", episode=episode)
 
 
-def _counts_episodes(runs: Sequence[Run]) -> bool:
+def _counts_episodes(runs: Sequence[AlgorithmRun]) -> bool:
     """Tell whether a step is an episode, whose length the step counts add up."""
     return any(run.series for run in runs) and all(_adds_up(run) for run in runs)
 
 
-def _adds_up(run: Run) -> bool:
+def _adds_up(run: AlgorithmRun) -> bool:
     lengths = {count: sum(own) for count, own in sorted(run.series.get(STEPS, {}).items())}
     counts = {count for at in run.series.values() for count in at}
     return counts == {*lengths} and [*lengths] == np.cumsum([*lengths.values()]).tolist()
