@@ -147,10 +147,10 @@ def differences(
     compared = []
     for group, pairs in groups.items():
         for condition, title, own, base in pairs:
-            found = compare_pair(condition, title, own, base, measure)
-            if found is not None:
+            compared_pair = compare_pair(condition, title, own, base, measure)
+            if compared_pair is not None:
                 names.append(group)
-                compared.append(found)
+                compared.append(compared_pair)
     made = list(zip(names, adjusted(compared), strict=True))
     return {g: tuple(d for name, d in made if name == g) for g in groups}
 

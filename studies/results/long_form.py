@@ -128,8 +128,8 @@ def refuse_repeated(
         return
     row = int(repeated.argmax())
     first = int((frame[keys] == frame[keys].iloc[row]).all(axis=1).to_numpy().argmax())
-    said = ", ".join(f"{name} = {frame[k].iloc[row]!r}" for k, name in columns.items() if name)
-    raise SpecError(f"{table.place(row)}: {said}: stands in {table.place(first)}, too{hint}")
+    named = ", ".join(f"{name} = {frame[k].iloc[row]!r}" for k, name in columns.items() if name)
+    raise SpecError(f"{table.place(row)}: {named}: stands in {table.place(first)}, too{hint}")
 
 
 def _phase_key(phase: str) -> tuple[int, str]:

@@ -69,9 +69,9 @@ def at_last_step(
         step = last_common_step(own)
         if step is None:
             ends = own.groupby("condition")["step"].max().to_dict()
-            said = ", ".join(f"{condition} ends at {end:g}" for condition, end in ends.items())
+            ends_text = ", ".join(f"{condition} ends at {end:g}" for condition, end in ends.items())
             raise SpecError(
-                f"{column}: most runs of every condition share no step with {measure}: {said}"
+                f"{column}: most runs of every condition share no step with {measure}: {ends_text}"
             )
         rows = own[own["step"] == step]
         kept.append(rows[LAST].assign(measure=measure, value=rows[measure]))
