@@ -53,7 +53,7 @@ _PLACES = {
     "SUCCESS": ("core.interface.measures", "SUCCESS"),
     "Prediction": ("core.interface.prediction", "Prediction"),
     "Peer": ("core.agents.peer", "Peer"),
-    "PeerSettings": ("core.networks.settings", "PeerSettings"),
+    "PeerSettings": ("core.agents.peer", "PeerSettings"),
     "Scenario": ("core.interface.scenario", "Scenario"),
     "ScenarioSettings": ("core.plugins.settings", "ScenarioSettings"),
     "Session": ("studies.trials.session", "Session"),

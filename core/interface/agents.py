@@ -80,7 +80,7 @@ class Counts:
 class Agents(ABC, Generic[I]):
     """A part of a team: agents of one kind."""
 
-    at_once: ClassVar[bool] = False
+    at_once: bool = False
     """Whether members who have been told all that they will be decide in one call; if not, one
     after the other."""
     is_vectorized: ClassVar[bool] = False

@@ -63,7 +63,7 @@ class BayesianAgents(Agents[Beliefs]):
         If that is no world of signals, messages fail, or an agent is told what it cannot weigh.
     """
 
-    at_once: ClassVar[bool] = True
+    at_once = True
     is_vectorized: ClassVar[bool] = True
 
     def __init__(self, settings: Bayesian, placement: Placement) -> None:
