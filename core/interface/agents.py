@@ -140,13 +140,6 @@ class Agents(ABC, Generic[I]):
     def decide(self, inputs: I, turn: Turn) -> IntArray:
         """Return the actions ``(k,)`` of members whose turn it is; what they are told is noted."""
 
-    def decide_all(self, inputs: I) -> IntArray | None:
-        """Return the whole joint action ``(n,)`` in one call; None: turn by turn.
-
-        Asked of the agents of a team that are its only part.
-        """
-        return None
-
     def contents(self, inputs: I) -> Mapping[int, object]:
         """Return by agent what has been said beside its action, in this decision so far."""
         return {}

@@ -21,7 +21,8 @@ from ..interface.experience import Experience, Observation
 from ..interface.scenario import Scenario
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray, set_words, words_of
 from .inputs import InputEncoder
-from .policy import InputNames, Policy, PolicyShape
+from .policy import InputNames, Policy
+from .rollout import PolicyShape
 from .settings import MultiAgentPPOSettings, PPOSettings
 
 

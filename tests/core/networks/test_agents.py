@@ -32,7 +32,8 @@ TREE = [("a", "b"), ("a", "c"), ("b", "d")]
 def spec_of(topology: Any = "chain", **learner: Any) -> Spec:
     return Spec.of(
         {
-            "study": "peers", "seeds": [10_000], "episodes": 3, "steps": 20, "evaluation": 2,
+            "study": "learning-curve", "seeds": [10_000],
+            "episodes": 3, "steps": 20, "evaluation": 2,
             "scenario": {"kind": "line-up", "carts": CARTS}, "topology": topology,
             "learner": {**SHORT, **learner},
         }
@@ -380,7 +381,7 @@ def test_a_learner_of_ones_own_is_given_the_hierarchy_if_it_asks(
 @pytest.mark.parametrize("game", ["climbing", "penalty:-30"])
 def test_a_chain_finds_the_optimum_of_games_where_independent_agents_do_not(game: str) -> None:
     table = {
-        "study": "games", "seeds": [0], "episodes": 5, "steps": 1000, "evaluation": 1,
+        "study": "learning-curve", "seeds": [0], "episodes": 5, "steps": 1000, "evaluation": 1,
         "scenario": {"kind": "matrix-game", "game": game, "observed": "own"},
         "learner": {"kind": "hierarchy-ppo", "discount": 0.0},
         "sweep": {"topology": ["chain", "independent"]},

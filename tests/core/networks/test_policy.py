@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.networks.policy import (
-    Batch,
-    Policy,
-    PolicyShape,
-    generalized_advantages,
-    linear_decay,
-)
+from nested_agents.core.networks.policy import Policy, linear_decay
+from nested_agents.core.networks.rollout import Batch, PolicyShape, generalized_advantages
 from nested_agents.core.networks.settings import HierarchyPPOSettings
 
 SHAPE = PolicyShape(n_told=2, n_own=4, n_joint=3, n_heads=1, n_actions=5)

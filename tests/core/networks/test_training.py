@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from acting import look
 
+from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Experience
@@ -38,7 +39,7 @@ MIXED = [
 
 def spec_of(name: str, **changes: Any) -> Spec:
     table: dict[str, Any] = {
-        "study": "peers",
+        "study": "learning-curve",
         "seeds": [10_000],
         "episodes": 6,
         "steps": 11,
@@ -298,10 +299,8 @@ def test_agents_learn(kind: str) -> None:
     assert rate(100, learn=False) > 0.6  # of a quarter by chance
 
 
-def test_what_needs_rule_bases_says_so() -> None:
-    from nested_agents.studies.catalogue.related import measure
-
-    (trial,) = trials_of(spec_of("ppo", study="related"))
+def test_code_that_needs_rule_bases_says_so() -> None:
+    team = arrange(spec_of("ppo").conditions()[0].settings, 0).team
     with pytest.raises(ValueError, match="needs FuzzyAgents, the team is of Central") as raised:
-        measure(trial)
+        team.only(FuzzyAgents)
     assert "\n" not in str(raised.value)
