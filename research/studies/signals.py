@@ -3,16 +3,16 @@
 Conditions are learners and Bayesian agents, told or not, by number of agents. Measured are how
 often an agent is right, how often the last one is, and how often the team's vote is; beside each
 stands what theory says of Bayesian agents in the same hierarchy, where it can be computed
-(`nested_agents.scenarios.signals.theory`).
+(`nested_agents_signals.theory`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from nested_agents_signals.bayesian import Bayesian
+from nested_agents_signals.scenario import SignalsSettings
+from nested_agents_signals.theory import expected
 
-from ...scenarios.signals.bayesian import Bayesian
-from ...scenarios.signals.scenario import SignalsSettings
-from ...scenarios.signals.theory import expected
 from ...studies.catalogue.study import check_evaluated, distinct
 from ...studies.errors import SpecError
 from ...studies.results.analysis import Analysis, Figures, Summary
