@@ -136,7 +136,7 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
     for trained in ("chain", "tree:2", "teams"):
         rows = [[trained, *(success[f"{trained}, {other}"] for other in others)]]
         for read in ("maintain", "last", "plan"):
-            lost = [success[f"{trained}, lost {p}, {read}"] for p in ("0", "0.3", "0.6", "0.9")]
+            lost = [success[f"{trained}, lost {p}, {read}"] for p in ("0", ".3", ".6", ".9")]
             rows.append([f"{trained}, {read}", *lost])
         for row in rows:
             line = f"| {' | '.join(row)} |"

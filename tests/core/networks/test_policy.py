@@ -63,7 +63,7 @@ def test_the_loss_by_hand():
         np.ones((m, 6)), np.ones((m, 7)), np.array([[0], [1]]),
         np.log([0.5 / 1.5, 0.5 / 0.9]), np.array([1.0, -1.0]), np.array([2.0, 0.0]),
     )  # fmt: skip
-    # Ratios of 1.5, which is clipped to 1.2, and of 0.9; squared errors of 4 and 0.
+    # Ratios of 1.5, which is clipped to 1.2, and of .9; squared errors of 4 and 0.
     expected = -(1.2 * 1.0 - 0.9 * 1.0) / 2 - 0.1 * np.log(2) + 0.5 * 2.0
     assert policy.loss_and_grad(batch, 0.1) == pytest.approx(expected, abs=1e-6)
 
@@ -97,7 +97,7 @@ def test_advantages_by_hand():
     values = np.array([1.0, 1.0, 2.0])[:, None, None]
     last = np.array([False, True, False])[:, None]
     advantages = generalized_advantages(rewards, values, np.array([[8.0]]), last, settings)
-    # 4 + 0.5 8 - 2; an end: 2 - 1; 1 + 0.5 1 - 1 + 0.25 1
+    # 4 + .5 8 - 2; an end: 2 - 1; 1 + .5 1 - 1 + .25 1
     assert advantages.ravel().tolist() == [0.75, 1.0, 6.0]
 
 
