@@ -4,7 +4,7 @@ Enter a learner of another library in push-n
 
 Stable-baselines3's PPO learns in the Gymnasium environment, is evaluated in the worlds of the
 benchmark, and its entry is written. Needs ``pip install stable-baselines3``. Then ``python
-benchmark_ppo.py ppo.json 20000``, and ``nested-agents benchmark table ppo.json``.
+benchmark_ppo.py ppo.json 20000``, and ``python -m research.push_n table ppo.json``.
 """
 
 import sys
@@ -12,8 +12,8 @@ from pathlib import Path
 
 from stable_baselines3 import PPO
 
-from nested_agents.research.push_n import LEAST_SEEDS, STEPS, Entry, TeamScores, evaluate
 from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
+from research.push_n import LEAST_SEEDS, STEPS, Entry, TeamScores, evaluate
 
 PATH, DECISIONS, ROBOTS = Path(sys.argv[1]), int(sys.argv[2]), 2
 success, steps, decisions = [], [], []

@@ -65,6 +65,7 @@ _PLACES = {
     "Spec": ("studies.spec.spec", "Spec"),
     "StateSpace": ("core.interface.spaces", "StateSpace"),
     "SpecError": ("studies.errors", "SpecError"),
+    "Study": ("studies.catalogue.study", "Study"),
     "StudyResults": ("studies.api.study", "StudyResults"),
     "Summary": ("studies.results.analysis", "Summary"),
     "TDLambdaSettings": ("core.learners.td", "TDLambdaSettings"),

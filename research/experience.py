@@ -1,10 +1,10 @@
 """Networks at the field's budgets: tables by decisions, what an edge and foresight are worth.
 
-``python -m nested_agents.research.experience`` prints the tables of docs/peers.md from the rows
+``python -m research.experience`` prints the tables of docs/peers.md from the rows
 of `TASKS` that are there; with directories of kept studies ``experience`` it prints their rows, as
 they are committed (returns if the last word is ``return``). A comparison is of the condition with
-edges, less that without, and is judged as ``nested-agents claims --of networks`` does, see
-`nested_agents.research.claims.Benefit`.
+edges, less that without, and is judged as ``python -m research.claims --of networks`` does, see
+`research.claims.Benefit`.
 """
 
 import sys
@@ -13,17 +13,22 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from ..core.interface.measures import SUCCESS
-from ..core.numerics import FloatArray, pd
-from ..studies.api.loading import load
-from ..studies.catalogue.experience import evaluated_after
-from ..studies.cli.display import print_text
-from ..studies.results.analysis import Difference, differences, format_p
-from ..studies.results.notation import bracketed, two_figures
-from ..studies.results.results import Results
-from ..studies.results.statistics import Estimate, bootstrap, rate
-from . import FOLDER, ROWS, SPECS
+from nested_agents import SUCCESS, bootstrap, load, rate
+from nested_agents.analysis import (
+    Difference,
+    Estimate,
+    Results,
+    bracketed,
+    differences,
+    evaluated_after,
+    format_p,
+    two_figures,
+)
+from nested_agents.terminal import print_text
+
+from . import FOLDER, RESULTS, SPECS, FloatArray
 from .claims import Benefit, Claim, Finding
 from .measures import Measured
 
@@ -84,12 +89,12 @@ TASKS = {
 
 def read(name: str) -> pd.DataFrame:
     """Return the rows of a task: condition, decisions, seed, and success or return."""
-    return pd.read_csv(ROWS / f"{name}-experience.csv").sort_values("seed", kind="stable")
+    return pd.read_csv(RESULTS / f"{name}-experience.csv").sort_values("seed", kind="stable")
 
 
 def committed() -> list[str]:
     """Return the tasks whose rows are there."""
-    return [name for name in TASKS if (ROWS / f"{name}-experience.csv").is_file()]
+    return [name for name in TASKS if (RESULTS / f"{name}-experience.csv").is_file()]
 
 
 def rows_of(results: Results, budget: int, measure: str = SUCCESS.name) -> pd.DataFrame:

@@ -150,7 +150,7 @@ def _load_one(path: Path) -> StudyResults:
     if path.is_file():
         kept = published.load(path)
         remarks = (f"{path}: {kept.note}",) if kept.note else ()
-        sources = Sources(brought_by=str(path))
+        sources = Sources(path.parent, brought_by=str(path))
         return StudyResults(kept.outline, kept.results, (), remarks, sources)
     with Store.open(path) as store:
         store.verify()

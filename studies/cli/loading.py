@@ -8,9 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from ...core.plugins.sources import Sources, files_in
+from ...core.plugins.sources import Sources, files_in, is_reference, split
 from ...core.plugins.trust import LIBRARIES, is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
+from ..errors import refused
 from ..presentation.progress import say
 from ..spec.outline import other_spec
 from ..store.database import DATABASE, SPEC_FILE
@@ -89,7 +90,7 @@ def untrusted(source: Path) -> dict[str, str]:
     """Return the code of others that a study brings along or names, by what it is.
 
     These are the Python files that are kept with it, and modules by name; those of a file of
-    results are named in its spec.
+    results are named in its spec. Of the files that such a spec names, only the study's is run.
     """
     files: dict[str, str] = {}
     if source.is_dir():
@@ -99,7 +100,12 @@ def untrusted(source: Path) -> dict[str, str]:
     else:
         from ..results import published  # pandas takes its time
 
-        tables = published.load(source).outline.table
+        outline = published.load(source).outline
+        tables = outline.table
+        if is_reference(outline.study):
+            name = split(outline.study)[0]
+            with refused(f"{source}: study: "):
+                files = {name: Sources(source.parent).text(name)}
     return _untrusted(source, files, tables)
 
 

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import main
 
 from nested_agents.core.numerics import pd
-from nested_agents.research import SPECS, atlas
-from nested_agents.research import atlas_faults as faults
-from nested_agents.research import atlas_predictions as predictions
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
+from research import SPECS
+from research import atlas_faults as faults
+from research import atlas_predictions as predictions
+from research import atlas_rows as atlas
 
 pytest.importorskip("pyarrow")
 
@@ -120,7 +121,7 @@ def test_the_command_prints_what_the_page_says(capsys: pytest.CaptureFixture[str
 
 
 def test_the_page_has_the_law_of_decisions_to_success(capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["fit", str(atlas.ROWS / "scaling.json"), "--criterion", ".8", "--predict", "32"]
+    arguments = ["fit", str(atlas.RESULTS / "scaling.json"), "--criterion", ".8", "--predict", "32"]
     assert main(arguments) == 0
     page = Path(__file__).resolve().parents[2] / "docs" / "atlas.md"
     shown = capsys.readouterr().out.splitlines()

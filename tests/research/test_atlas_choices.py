@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from nested_agents.core.numerics import pd
-from nested_agents.research.atlas import NO_FAULT
-from nested_agents.research.atlas_choices import HierarchyChoice, choices, shares_right
+from research.atlas_choices import HierarchyChoice, choices, shares_right
+from research.atlas_rows import NO_FAULT
 
 from .test_atlas import rows_of
 

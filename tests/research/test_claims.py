@@ -19,9 +19,19 @@ from made_up_results import (
     shapes,
     wheel_failure,
 )
+from programs import main
 
-from nested_agents.research import QUICK, ROWS, claims, commands
-from nested_agents.research.claims import (
+from nested_agents.scenarios.box_pushing.scenario import MEASURES
+from nested_agents.studies.catalogue.study import load_study
+from nested_agents.studies.results import published
+from nested_agents.studies.results.results import Results
+from nested_agents.studies.results.statistics import Estimate
+from nested_agents.studies.spec.outline import StudyOutline
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.studies import STUDIES
+from nested_agents.studies.trials.arrangement import check_conditions
+from research import QUICK, RESULTS, claims
+from research.claims import (
     OWN,
     PAPERS,
     Finding,
@@ -33,16 +43,6 @@ from nested_agents.research.claims import (
     print_claims,
     within,
 )
-from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies.catalogue.study import load_study
-from nested_agents.studies.cli.main import main
-from nested_agents.studies.results import published
-from nested_agents.studies.results.results import Results
-from nested_agents.studies.results.statistics import Estimate
-from nested_agents.studies.spec.outline import StudyOutline
-from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.spec.studies import STUDIES
-from nested_agents.studies.trials.arrangement import check_conditions
 
 POINTS = Path(__file__).resolve().parents[2] / "examples" / "worlds" / "pushing_points.py"
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "claims.md"
@@ -188,7 +188,7 @@ def test_few_seeds_decide_nothing() -> None:
 def spec_of(study: str, folder: Path | None = None) -> Spec:
     """The spec of a study as it comes with it, or as it stands in a folder."""
     name = study.replace("-", "_")
-    return Spec.load(folder / f"{name}.toml" if folder else commands.spec_of_study(study))
+    return Spec.load(folder / f"{name}.toml" if folder else claims.spec_of_study(study))
 
 
 def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
@@ -235,12 +235,12 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
 
 
 def test_results_of_another_version_are_told(tmp_path: Path, capsys, monkeypatch) -> None:
-    old = ROWS / "chain-order.json"
+    old = RESULTS / "chain-order.json"
     monkeypatch.setattr(published, "RESULTS_VERSION", 99)
     assert main(["table", str(old)]) == 0
     assert "chain-order.json: results of version 4, this is version 99" in capsys.readouterr().err
     shutil.copy(old, tmp_path)
-    monkeypatch.setattr(commands, "ROWS", tmp_path)
+    monkeypatch.setattr(claims, "RESULTS", tmp_path)
     assert main(["claims", "--format", "markdown"]) == 0
     assert "chain-order: results of version 4, this is version 99" in capsys.readouterr().err
 
@@ -250,19 +250,8 @@ def test_options_that_run_need_a_directory(capsys) -> None:
     assert "--quick: needs --out" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", ["claims", "benchmark"])
-def test_an_installed_package_says_where_the_results_are(
-    command, tmp_path, capsys, monkeypatch
-) -> None:
-    monkeypatch.setattr("nested_agents.studies.cli.main.RESULTS", tmp_path / "results")
-    assert main([command]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    assert f"{command}: is a command on published results, which are in the repository, in " in err
-
-
 def test_the_committed_results_make_the_page(capsys) -> None:
-    files = list(ROWS.glob("*.json"))
+    files = list(RESULTS.glob("*.json"))
     assert {path.stem for path in files} == {
         *claims.studies_of(),
         "fit",
@@ -377,7 +366,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
     table = capsys.readouterr().out.strip()
     page = PAGE.read_text(encoding="utf-8")
     assert table in page, (
-        "docs/claims.md: put in the table of nested-agents claims --format markdown"
+        "docs/claims.md: put in the table of python -m research.claims --format markdown"
     )
 
 
@@ -439,8 +428,8 @@ def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch)
         episodes = 10 if study == "wheel-failure" else 1
         text = TINY.format(study=study, episodes=episodes, rest=rest)
         (tmp_path / "quick" / f"{study.replace('-', '_')}.toml").write_text(text)
-    monkeypatch.setattr(commands, "QUICK", tmp_path / "quick")
-    monkeypatch.setattr(commands, "ROWS", tmp_path / "published")
+    monkeypatch.setattr(claims, "QUICK", tmp_path / "quick")
+    monkeypatch.setattr(claims, "RESULTS", tmp_path / "published")
     arguments = ["claims", "--quick", "--out", str(tmp_path / "out"), "--jobs", "1"]
     arguments += ["--format", "markdown"]
     assert main(arguments) == 0

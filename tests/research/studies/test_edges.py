@@ -5,15 +5,15 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, SEEDS, Arrays, shapes
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import edges as module
-from nested_agents.research.studies.edges import TRAINED, analyse, check, draw, measure
 from nested_agents.studies.catalogue.hierarchies import DECIDING
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
+from research.studies import edges as module
+from research.studies.edges import TRAINED, analyse, check, draw, measure
 
 SILENT = {"topology": {"told": "none"}}
 ALONE = {"topology": {"told": "none", "considers": "none"}}

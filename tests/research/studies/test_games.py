@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import games as module
-from nested_agents.research.studies.games import AFTER_ONE, analyse, check, draw, measure
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
+from research.studies import games as module
+from research.studies.games import AFTER_ONE, analyse, check, draw, measure
 
 SPEC = SPECS / "games.toml"
 SEEDS = 40

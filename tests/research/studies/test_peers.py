@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import peers as module
-from nested_agents.research.studies.peers import analyse, check, draw, measure, stops
 from nested_agents.studies.catalogue.study import draw_figures, load_study
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
+from research.studies import peers as module
+from research.studies.peers import analyse, check, draw, measure, stops
 
 PATHS = sorted(path for path in SPECS.glob("*.toml") if 'study = "peers"' in path.read_text())
 SEEDS = 10

@@ -3,13 +3,13 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, shapes
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies.shapes import analyse, check, draw, measure
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
+from research.studies.shapes import analyse, check, draw, measure
 
 CHANCES = {"circle": 0.95, "hexagon": 0.9, "L": 0.3}
 

@@ -4,9 +4,6 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, SEEDS, Arrays
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import signals as module
-from nested_agents.research.studies.signals import analyse, check, draw, measure
 from nested_agents.scenarios.signals.scenario import MEASURES
 from nested_agents.scenarios.signals.theory import cascade, majority
 from nested_agents.studies.catalogue.study import draw_figures
@@ -14,6 +11,9 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
+from research.studies import signals as module
+from research.studies.signals import analyse, check, draw, measure
 
 PATHS = sorted(SPECS.glob("signals*.toml"))
 

@@ -5,8 +5,8 @@ import pytest
 from made_up_results import Arrays
 
 from nested_agents.studies.catalogue.hierarchies import analyse
-from nested_agents.studies.catalogue.hierarchies.pooled import Effect, effects, lines_of
 from nested_agents.studies.results.statistics import Estimate
+from research.studies.edges import Effect, effects, lines_of
 
 SEEDS = 10
 
