@@ -225,7 +225,7 @@ def scale() -> Figure:
         figures.draw_line(axes, [n for *_, n in points], estimates, i, len(SUCCESS))
     figures.scale_axis(axes, (2, 4, 8, 16, 32, 64))
     axes.set(xlabel="robots", ylabel="evaluation success", ylim=(-0.03, 1.03))
-    figures.name_lines(figure, [label for label, _ in SUCCESS], "bars: 95 % intervals")
+    figures.name_lines(figure, [label for label, _ in SUCCESS], "bars: 95% intervals")
     return figure
 
 

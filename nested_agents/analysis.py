@@ -4,6 +4,7 @@ A study's `analyse` and programs that read kept or published results are written
 `nested_agents.figures` draws what they return.
 """
 
+from .core.interface.measures import RETURN, SUCCESS
 from .studies.catalogue.ablation import compared_with_first as compare_with_first
 from .studies.catalogue.experience import AFTER, CPU, evaluated_after
 from .studies.catalogue.hierarchies import analysis_of as compare_hierarchies
@@ -25,7 +26,6 @@ from .studies.results.analysis import (
     differences,
     estimate_of,
     evaluated,
-    format_p,
     judged,
     paired_difference,
     phases_of,
@@ -33,7 +33,7 @@ from .studies.results.analysis import (
     select_shared,
 )
 from .studies.results.contrasts import Group, contrasts
-from .studies.results.notation import bracketed, signed, two_decimals, two_figures, wrapped
+from .studies.results.notation import format_estimate, format_number, format_p, wrapped
 from .studies.results.power import deviation_of, power_lines
 from .studies.results.results import NOTHING, Results, Sizes
 from .studies.results.statistics import (
@@ -60,6 +60,8 @@ __all__ = [
     "LEVEL",
     "NOTHING",
     "NOT_NEGATIVE",
+    "RETURN",
+    "SUCCESS",
     "Analysis",
     "Array",
     "BySeed",
@@ -76,7 +78,6 @@ __all__ = [
     "adjust",
     "analyse_as",
     "bootstrap",
-    "bracketed",
     "compare_hierarchies",
     "compare_with_first",
     "contrasts",
@@ -90,6 +91,8 @@ __all__ = [
     "evaluated",
     "evaluated_after",
     "exactly",
+    "format_estimate",
+    "format_number",
     "format_p",
     "friedman",
     "holm",
@@ -105,10 +108,7 @@ __all__ = [
     "rate",
     "ratio",
     "select_shared",
-    "signed",
     "stack_estimates",
     "system_of",
-    "two_decimals",
-    "two_figures",
     "wrapped",
 ]

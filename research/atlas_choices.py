@@ -2,7 +2,7 @@
 
 A case is a task, a learner and what fails. Hierarchies are ranked by the quality of the task at
 the largest size at which all were run. The rule chooses the one of the greatest prediction. Its
-choice is decided if the 90 % interval of what it is better by lies above zero, beside each other
+choice is decided if the 90% interval of what it is better by lies above zero, beside each other
 hierarchy: that is a law of its own, fitted to differences of the same seeds. Only cases count in
 which one hierarchy is significantly better than each other: paired by seed, adjusted by Holm.
 """
@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from nested_agents import rate
-from nested_agents.analysis import LEVEL, bracketed, format_p, laws, paired_tests
+from nested_agents.analysis import LEVEL, format_estimate, format_p, laws, paired_tests
 
 from .atlas_predictions import largest_small
 from .atlas_rows import MEASURES, NO_FAULT, quality, sample_of
@@ -24,7 +24,7 @@ from .atlas_rows import MEASURES, NO_FAULT, quality, sample_of
 CASE = ["task", "learner", "fault"]
 """Columns of which every combination is a case."""
 TAIL = 0.05
-"""Beyond either end of an interval of 90 %."""
+"""Beyond either end of an interval of 90%."""
 
 
 class HierarchyChoice(NamedTuple):
@@ -106,7 +106,7 @@ def _choice(
 
 
 def _is_above(samples: Mapping[str, laws.Sample], one: str, other: str, size: int) -> bool:
-    """Return whether one hierarchy is better than another, by the 90 % interval of its lead."""
+    """Return whether one hierarchy is better than another, by the 90% interval of its lead."""
     lead = laws.choose(laws.apart(samples[one], samples[other]))
     return lead.distribution(size).quantile(TAIL) > 0.0
 
@@ -127,5 +127,5 @@ def shares_right(chosen: Sequence[HierarchyChoice]) -> list[str]:
     lines = [f"{head}: {counts}"]
     for name, outcomes in shares.items():
         share = rate(np.array(outcomes)[:, None])
-        lines.append(f"{name}: {sum(outcomes)} of {len(clear)}, {bracketed(share)}")
+        lines.append(f"{name}: {sum(outcomes)} of {len(clear)}, {format_estimate(share)}")
     return lines

@@ -10,7 +10,7 @@ import pandas as pd
 from scipy import stats
 
 from nested_agents import bootstrap
-from nested_agents.analysis import LEVEL, Estimate, bracketed, format_p, holm, signed, two_figures
+from nested_agents.analysis import LEVEL, Estimate, format_estimate, format_number, format_p, holm
 
 from .atlas_rows import MEASURES, NO_FAULT, TeamKind, quality
 
@@ -28,13 +28,13 @@ class FaultCost(NamedTuple):
     fault: str
     measure: str
     difference: Estimate
-    """Of quality, from no fault, with its 95 % interval over seeds."""
+    """Of quality, from no fault, with its 95% interval over seeds."""
     p: float
     """Adjusted by Holm over a task's comparisons."""
 
     def __str__(self) -> str:
         head = ", ".join([*self[:3], f"{self.size} agents", self.fault])
-        shown = bracketed(self.difference, signed)
+        shown = format_estimate(self.difference, signed=True)
         return f"{head}: {MEASURES[self.measure]} {shown}, p {format_p(self.p)}"
 
 
@@ -90,8 +90,8 @@ def thresholds(costs: Sequence[FaultCost]) -> list[str]:
         own.sort()
         costly = [share for share, p in own if p < LEVEL]
         free = [share for share, _ in own if not costly or share < costly[0]]
-        ends = f"not up to {two_figures(free[-1])}" if free else ""
-        begins = f"from {two_figures(costly[0])} on" if costly else ""
+        ends = f"not up to {format_number(free[-1])}" if free else ""
+        begins = f"from {format_number(costly[0])} on" if costly else ""
         text = ", ".join(part for part in (begins, ends) if part)
         head = ", ".join([task, hierarchy, learner, f"{size} agents", DOSES[kind]])
         lines.append(f"{head}: costs {text}")

@@ -47,12 +47,12 @@ def draw_success(rows: pd.DataFrame) -> Figure:
         figures.as_rates(axes)
         axes.set_title(f"{task}: {MEASURES[measure]}", loc="left")
         axes.legend(handles=handles, fontsize=6, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.supxlabel("number of agents; evaluation with 95 % intervals", fontsize=8)
+    figure.supxlabel("number of agents; evaluation with 95% intervals", fontsize=8)
     return figure
 
 
 def draw_exponents(rows: pd.DataFrame) -> Figure:
-    """Return how time, memory and messages of a decision grow: exponents, 95 % intervals."""
+    """Return how time, memory and messages of a decision grow: exponents, 95% intervals."""
     names = ("decision_median", "team_bytes", "messages", "steps")
     by_measure = {name: exponents(rows, name) for name in names}
     teams = list(dict.fromkeys(team for own in by_measure.values() for team in own))
@@ -92,7 +92,7 @@ def draw_checks(checked: Sequence[Check]) -> Figure:
         axes.set_xticks(places[::every], shown, fontsize=6, rotation=90)
         axes.set_title(MEASURES[name], loc="left")
     figure.supylabel("predicted / measured", fontsize=8)
-    text = f"number of agents; red: outside the 90 % interval; beyond {MOST:g} times: at the edge"
+    text = f"number of agents; red: outside the 90% interval; beyond {MOST:g} times: at the edge"
     figure.supxlabel(text, fontsize=8)
     return figure
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from nested_agents import bootstrap
-from nested_agents.analysis import Estimate, bracketed, laws, two_figures
+from nested_agents.analysis import Estimate, format_estimate, format_number, laws
 
 from .atlas_rows import COSTS, MEASURES, TeamKind, sample_of
 
@@ -34,7 +34,7 @@ class Check(NamedTuple):
     law: str
     """Which law it is."""
     predicted: Estimate
-    """The mean of as many seeds, with its 90 % interval."""
+    """The mean of as many seeds, with its 90% interval."""
     measured: float
 
     @property
@@ -87,8 +87,8 @@ def coverage(checked: Sequence[Check]) -> list[str]:
         factor = np.median([np.sqrt(c.predicted.high / c.predicted.low) for c in own])
         text = f"{name}: {inside} of {len(own)} inside, {len(shares)} laws"
         if len(shares) > 1:
-            text += f", share {bracketed(bootstrap(shares, bounds=(0.0, 1.0)))}"
-        lines.append(f"{text}; median factor {two_figures(float(factor))}")
+            text += f", share {format_estimate(bootstrap(shares, bounds=(0.0, 1.0)))}"
+        lines.append(f"{text}; median factor {format_number(float(factor))}")
     return lines
 
 

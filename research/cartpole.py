@@ -41,7 +41,7 @@ def main() -> None:
 
 
 def moved(states: np.ndarray, action: np.ndarray | int) -> np.ndarray:
-    """Return the states ``(m, 4)`` .02 s later, pushed by 10 N to the left (0) or right (1)."""
+    """Return the states ``(m, 4)`` 0.02 s later, pushed by 10 N to the left (0) or right (1)."""
     _, speed, angle, turn = states.T
     cos, sin, force = np.cos(angle), np.sin(angle), np.where(action, 10.0, -10.0)
     pushed = (force + 0.05 * turn**2 * sin) / 1.1

@@ -31,10 +31,9 @@ from nested_agents.analysis import (
     LEVEL,
     NOTHING,
     Results,
-    bracketed,
+    format_estimate,
+    format_number,
     format_p,
-    two_decimals,
-    two_figures,
 )
 from nested_agents.terminal import closest, print_text, print_wrapped, run_to_status
 
@@ -54,7 +53,7 @@ class Criterion:
     Examples
     --------
     >>> at_least(0.8).text, within(0.15).text
-    ('at least 0.8', 'within 0.15 of 0, no p < .05')
+    ('at least 0.8', 'within 0.15 of 0, no p < 0.05')
     """
 
     text: str
@@ -67,10 +66,9 @@ class Criterion:
         "A claim holds if the whole interval meets the criterion, does not if none of it does, "
         "and is not decided in between or by under 5 seeds."
     )
-    notation: ClassVar = staticmethod(two_decimals)
 
     def decide(self, measured: Measured) -> Verdict:
-        """Compare the whole interval with the bounds, and p with .05."""
+        """Compare the whole interval with the bounds, and p with 0.05."""
         e = measured.estimate
         if (
             e.high < self.low
@@ -83,30 +81,29 @@ class Criterion:
 
 @dataclass(frozen=True)
 class Benefit:
-    """A difference helps or harms if p < .05, and is none if it lies within a margin.
+    """A difference helps or harms if p < 0.05, and is none if it lies within a margin.
 
     Examples
     --------
     >>> Benefit(0.1).text
-    'p < .05, or equal within .10'
+    'p < 0.05, or equal within 0.10'
     """
 
     margin: float
     """Within which a difference is none that matters, named before the runs."""
     legend: ClassVar = (
-        "It helps or harms by p < .05, adjusted over all comparisons of a study (Holm), is equal "
+        "It helps or harms by p < 0.05, adjusted over all comparisons of a study (Holm), is equal "
         "if the whole interval lies within the margin, which its spec named before the runs, and "
         "is not decided otherwise."
     )
-    notation: ClassVar = staticmethod(two_figures)
 
     @property
     def text(self) -> str:
         """The criterion in words."""
-        return f"p < .05, or equal within {two_figures(self.margin)}"
+        return f"p < 0.05, or equal within {format_number(self.margin)}"
 
     def decide(self, measured: Measured) -> Verdict:
-        """Compare p with .05, and the whole interval with the margin."""
+        """Compare p with 0.05, and the whole interval with the margin."""
         value, low, high = map(float, measured.estimate)
         if measured.p is not None and measured.p < LEVEL:
             return "helps" if value > 0.0 else "harms"
@@ -125,7 +122,7 @@ def at_most(threshold: float) -> Criterion:
 
 def within(margin: float) -> Criterion:
     """Return the criterion that a value is zero but for a margin."""
-    return Criterion(f"within {margin:g} of 0, no p < .05", -margin, margin)
+    return Criterion(f"within {margin:g} of 0, no p < 0.05", -margin, margin)
 
 
 @dataclass(frozen=True)
@@ -201,10 +198,9 @@ class Finding:
         if self.measured is None:
             return "no results"
         value = float(self.measured.estimate.value)
-        text = f"{value:.2g}, computed"
+        text = f"{format_number(value)}, computed"
         if self.measured.seeds:
-            estimate = bracketed(self.measured.estimate, self.claim.criterion.notation)
-            text = f"{estimate}, {self.measured.seeds} seeds"
+            text = f"{format_estimate(self.measured.estimate)}, {self.measured.seeds} seeds"
         if self.measured.p is not None:
             text += f", p {format_p(self.measured.p)}"
         return text + (f", {self.measured.note}" if self.measured.note else "")
@@ -250,7 +246,7 @@ def print_claims(findings: Sequence[Finding], form: Format) -> None:
         )
     Console().print(table)
     print_text("")
-    print_wrapped(f"With 95 % intervals. {findings[0].claim.criterion.legend}", indent=0)
+    print_wrapped(f"With 95% intervals. {findings[0].claim.criterion.legend}", indent=0)
 
 
 def markdown(findings: Sequence[Finding]) -> str:

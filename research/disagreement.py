@@ -18,14 +18,16 @@ from matplotlib.figure import Figure
 import nested_agents as na
 from nested_agents import bootstrap, figures, rate
 from nested_agents.analysis import (
+    NOT_NEGATIVE,
+    RETURN,
     Array,
     Difference,
     Estimate,
     Results,
-    bracketed,
     differences,
+    format_estimate,
+    format_number,
     format_p,
-    two_figures,
 )
 from nested_agents.terminal import print_text
 
@@ -75,7 +77,7 @@ def disagreement(results: Results, robots: int) -> Disagreement:
             phase = f"{EVALUATION}{side}, {name}"
             success[side].append(rate(results.values(condition, "success", phase)))
             steps = results.means(condition, phase, "steps").to_numpy()
-            decisions[side].append(bootstrap(steps))
+            decisions[side].append(bootstrap(steps, bounds=NOT_NEGATIVE))
             agreement[side].append(float(results.values(condition, "agreement", phase).mean()))
             means[side].append(results.means(condition, phase).to_numpy())
     pairs = [
@@ -102,7 +104,7 @@ def disagreement(results: Results, robots: int) -> Disagreement:
         decisions,
         agreement,
         differences({"": pairs})[""],
-        differences({"": logs}, of_rates=False)[""],
+        differences({"": logs}, RETURN)[""],
         _threshold(less, list(errors.values())),
     )
 
@@ -125,9 +127,10 @@ def _threshold(less: Array, errors: Sequence[float]) -> Estimate:
 def _brief(threshold: Estimate, greatest: float) -> str:
     """Return a threshold and its interval, ends that were not reached as more than the greatest."""
     value, low, high = (
-        f"> {greatest:.2g}" if end >= greatest else f"{end:.2g}" for end in map(float, threshold)
+        f"> {format_number(greatest)}" if end >= greatest else format_number(end)
+        for end in map(float, threshold)
     )
-    return f"{value} [{low}, {high}]".replace("0.", ".")
+    return f"{value} [{low}, {high}]"
 
 
 def rows() -> list[Disagreement]:
@@ -145,14 +148,16 @@ def lines(every: list[Disagreement]) -> list[str]:
     ]
     for own in every:
         for k, name in enumerate(own.errors):
-            told, silent = (bracketed(own.success[side][k]) for side in SIDES)
+            told, silent = (format_estimate(own.success[side][k]) for side in SIDES)
             d = own.compared[k]
-            difference = f"{bracketed(d.estimate)}, p {format_p(d.p)}"
-            right = " and ".join(f"{own.agreement[side][k]:.2f}"[1:] for side in SIDES)
-            spent = " and ".join(two_figures(float(own.decisions[side][k].value)) for side in SIDES)
+            difference = f"{format_estimate(d.estimate)}, p {format_p(d.p)}"
+            right = " and ".join(format_number(own.agreement[side][k]) for side in SIDES)
+            spent = " and ".join(
+                format_number(float(own.decisions[side][k].value)) for side in SIDES
+            )
             longer = Estimate(*map(np.exp, own.longer[k].estimate))
-            times = f"{bracketed(longer)}, p {format_p(own.longer[k].p)}"
-            shown = name.removeprefix(SHOWN)
+            times = f"{format_estimate(longer)}, p {format_p(own.longer[k].p)}"
+            shown = format_number(own.errors[name])
             table.append(
                 f"| {own.robots} | {shown} | {told} | {silent} | {difference} | {right} | {spent} "
                 f"| {times} |"
@@ -183,7 +188,7 @@ def draw(every: list[Disagreement]) -> Figure:
         axes.set_title(f"{own.robots} robots", loc="left")
         axes.set_xlabel("error of each agent's weights [SD]")
         figures.as_rates(axes)
-    figures.name_lines(figure, list(SIDES), "success; bars: 95 %; dotted: the threshold")
+    figures.name_lines(figure, list(SIDES), "success; bars: 95%; dotted: the threshold")
     return figure
 
 

@@ -9,7 +9,7 @@ with the chain, in each setting and over all boxes. Measures and margins were na
 from collections.abc import Iterator, Mapping
 
 from nested_agents import load
-from nested_agents.analysis import EVALUATED, HierarchyCase, Results, bracketed, two_decimals
+from nested_agents.analysis import EVALUATED, HierarchyCase, Results, format_estimate
 from nested_agents.terminal import print_text
 
 from . import RESULTS
@@ -50,7 +50,7 @@ def lines() -> list[str]:
     ]
     beside = ["| beside the chain | success | | decisions to the goal | |", "|---|---|---|---|---|"]
     for setting, results, cases in settings():
-        values = {case.hierarchy: bracketed(case.values[EVALUATED]) for case in cases}
+        values = {case.hierarchy: format_estimate(case.values[EVALUATED]) for case in cases}
         n_seeds = len(results.seeds(cases[0].condition))
         cells = " | ".join(values[name] for name in (TRAINED, *HOW))
         table.append(f"| {setting} | {n_seeds} | {cells} |")
@@ -69,8 +69,8 @@ def _compared(setting: str, of: Mapping[str, tuple[Effect, Effect]]) -> Iterator
     for name in HOW:
         success, decisions = of[name]
         yield (
-            f"| {setting}: {name} | {bracketed(success.estimate)} | {success.verdict} "
-            f"| {bracketed(decisions.estimate, two_decimals)} times | {decisions.verdict} |"
+            f"| {setting}: {name} | {format_estimate(success.estimate)} | {success.verdict} "
+            f"| {format_estimate(decisions.estimate)} times | {decisions.verdict} |"
         )
 
 

@@ -16,15 +16,16 @@ import numpy as np
 import pandas as pd
 
 from nested_agents import SUCCESS, bootstrap, load, rate
+from nested_agents.analysis import RETURN as RETURN_MEASURE
 from nested_agents.analysis import (
     Difference,
     Estimate,
     Results,
-    bracketed,
     differences,
     evaluated_after,
+    format_estimate,
+    format_number,
     format_p,
-    two_figures,
 )
 from nested_agents.terminal import print_text
 
@@ -124,7 +125,9 @@ def lines(name: str) -> Iterator[str]:
         cells = []
         for n in task.shown:
             means = own[own["decisions"] == n].iloc[:, -1].to_numpy()
-            cells.append(bracketed(_estimate(means, own.columns[-1], task)) if len(means) else "")
+            cells.append(
+                format_estimate(_estimate(means, own.columns[-1], task)) if len(means) else ""
+            )
         yield f"| {condition} | {' | '.join(cells)} |"
 
 
@@ -178,7 +181,9 @@ def edge(name: str, rows: pd.DataFrame) -> EdgeWorth:
     last = of_networks[of_networks["decisions"] == task.shown[-1]]
     ends = last.pivot_table(index="seed", columns="condition", values=measure)
     pairs = [(c, measure, ends[task.edges], ends[c]) for c in ends if c != task.edges]
-    compared = differences({name: pairs}, of_rates=measure == SUCCESS.name)[name]
+    compared = differences({name: pairs}, SUCCESS if measure == SUCCESS.name else RETURN_MEASURE)[
+        name
+    ]
     (worth,) = [d for d in compared if d.condition == task.without]
     means = ends.mean()
     span = SPAN * float(means.max() - means[RANDOM])
@@ -199,9 +204,9 @@ def edge_lines() -> Iterator[str]:
             worth.name,
             str(worth.compared.seeds),
             f"{TASKS[worth.name].shown[-1]:,}",
-            bracketed(worth.compared.estimate),
-            format_p(worth.compared.p).removeprefix("= ").replace("0.", "."),
-            two_figures(worth.margin),
+            format_estimate(worth.compared.estimate),
+            format_p(worth.compared.p).removeprefix("= "),
+            format_number(worth.margin),
             worth.finding.verdict,
         )
         yield f"| {' | '.join(cells)} |"
@@ -252,7 +257,7 @@ def foresight(name: str, fuzzy: str = FUZZY) -> RulesWorth:
 
 def foresight_lines() -> Iterator[str]:
     """Yield a table of what fuzzy rules save, a line for every task and kind of predictor."""
-    until = f"decisions of networks with edges, until success is {two_figures(HALF)}"
+    until = f"decisions of networks with edges, until success is {format_number(HALF)}"
     yield f"| rows | condition | {until} |"
     yield "|---|---|---|"
     for name in committed():
@@ -261,7 +266,7 @@ def foresight_lines() -> Iterator[str]:
         for fuzzy in sorted(c for c in conditions if c.startswith((FUZZY, without_predictor))):
             times, missed = foresight(name, fuzzy)
             never = f", {missed} seeds never" if missed else ""
-            yield f"| {name} | {fuzzy} | {bracketed(times)} times{never} |"
+            yield f"| {name} | {fuzzy} | {format_estimate(times)} times{never} |"
 
 
 def main(places: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""How often 95 % intervals cover the truth, by skewness: ``python -m research.intervals``.
+"""How often 95% intervals cover the truth, by skewness: ``python -m research.intervals``.
 
 The intervals of tables, Student's, those of BCa (Efron 1987; SciPy's), and Student's after a cubic
 transformation that takes the skewness out (Hall 1992), of values whose mean is known.

@@ -1,7 +1,7 @@
 """What the claims of papers are decided by: a measure for each.
 
 A measure is a function of a study's results and of the arguments that ``claims.toml`` names. It
-returns an estimate with its 95 % interval over seeds. It returns None, or raises KeyError, where
+returns an estimate with its 95% interval over seeds. It returns None, or raises KeyError, where
 the results have not what it takes.
 """
 
@@ -15,6 +15,7 @@ from nested_agents import bootstrap, rate
 from nested_agents.analysis import (
     EVALUATED,
     NOT_NEGATIVE,
+    SUCCESS,
     Array,
     BySeed,
     Estimate,
@@ -110,7 +111,7 @@ def contact_gained(results: Results) -> Measured | None:
         contact = results.values(condition, CONTACT)
         more = contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1)
         gained.append(pd.Series(more, results.seeds(condition)))
-    return _paired(gained[0], gained[1], lambda own, base: bootstrap(own - base))
+    return _paired(gained[0], gained[1], lambda own, base: bootstrap(own - base, bounds=(-2, 2)))
 
 
 def cost_error(results: Results) -> Measured:
@@ -169,7 +170,7 @@ def gained_by_edges(results: Results, edges: str, less: str) -> Measured | None:
     success_of = select_shared([results.means(c, "evaluation") for pair in pairs for c in pair])
     own = np.mean(success_of[::2], axis=0)
     other = np.mean(success_of[1::2], axis=0)
-    return Measured(paired_difference(own, other, of_rates=True), len(own)) if len(own) else None
+    return Measured(paired_difference(own, other, SUCCESS), len(own)) if len(own) else None
 
 
 def order_matters(results: Results) -> Measured | None:
@@ -266,7 +267,10 @@ FAULTS = ("4 wheels, seized", "4 wheels, reversed")
 def recovered(results: Results, adapts: str) -> Measured | None:
     """Measure success at the end relative to before the failure, worst fault."""
     courses = (c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts)
-    return _worst(Measured(ratio(c.end, c.before), len(c.success), note=c.fault) for c in courses)
+    return _worst(
+        Measured(ratio(c.measured.end, c.measured.before), len(c.measured.success), note=c.fault)
+        for c in courses
+    )
 
 
 def worst_shape(results: Results, condition: str = "") -> Measured | None:

@@ -211,7 +211,7 @@ def evaluate(
 
 
 def table_of(entries: Iterable[Entry], measure: str) -> list[Summary]:
-    """Return a line for each entry, a column for each number of robots; 95 % intervals.
+    """Return a line for each entry, a column for each number of robots; 95% intervals.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents import BoxPushingSettings, rate
-from nested_agents.analysis import bracketed
+from nested_agents.analysis import format_estimate
 from nested_agents.boxes import BoxSettings
 
 from .scripted.controller import decisions_to_goal
@@ -41,7 +41,7 @@ def solved(settings: BoxPushingSettings, seeds: int) -> str:
     success = rate([[steps is not None] for steps in taken])
     decisions = [steps for steps in taken if steps is not None]
     typical = f", {median(decisions):.0f}" if decisions else ""
-    return f"{bracketed(success)}{typical}"
+    return f"{format_estimate(success)}{typical}"
 
 
 def main() -> None:

@@ -25,7 +25,7 @@ from rich.table import Table
 
 import nested_agents as na
 from nested_agents import BoxPushingSettings, rate
-from nested_agents.analysis import bracketed
+from nested_agents.analysis import format_estimate, format_number
 from nested_agents.boxes import STARTS, wrap
 from nested_agents.study import EVALUATION_WORLDS, world_seed
 from research import RESULTS
@@ -114,7 +114,8 @@ def scripted(robots: int, seeds: int, episodes: int) -> tuple[list[str], str]:
     typical = ""
     if solved:
         typical = f", {median(solved):.0f} decisions in the median, {max(solved)} at most"
-    words = f"{robots} robots, scripted: {bracketed(success)}{typical}; {seconds:.1f} s an episode"
+    words = f"{robots} robots, scripted: {format_estimate(success)}{typical}"
+    words += f"; {format_number(seconds)} s an episode"
     return counts(robots, range(seeds), successes.reshape(seeds, episodes)), words
 
 

@@ -4,10 +4,10 @@ The task ``simple_spread`` of the multi-agent particle environments, in the phys
 observations of ``mpe2/simple_spread_v3`` with its defaults; the zeros that it sends as messages are
 left out. States of an agent are its velocity and place, then where landmarks and others are, seen
 from it, in metres and metres a second (the original has no units). With the period T = 0.1 s,
-velocity v decays to .75 v, a force of 5 N or of contact moves 1 kg, and::
+velocity v decays to 0.75 v, a force of 5 N or of contact moves 1 kg, and::
 
     x' = x + v T
-    v' = .75 v + F T
+    v' = 0.75 v + F T
 
 All functions take any axes before those of agents, so that many worlds are stepped in one call.
 """

@@ -15,7 +15,7 @@ TURN = (-1.8, 1.8)  # [rad]; all ranges are rounded from random episodes
 
 
 def swimmer(*, joints: int = 4, predictor: str = "copy", horizon: int = 3):
-    """Return the scenario; a decision is held for .12 s, and a success is a speed of .1 m/s."""
+    """Return the scenario; a decision is held for 0.12 s, and a success is a speed of 0.1 m/s."""
     own = range(1, joints + 1)
     variables = {
         "joint": (*own,),

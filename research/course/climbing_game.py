@@ -95,7 +95,7 @@ for ax, game in zip(axes, ("climbing", "penalty:-100"), strict=True):
         ax.text(1.03, row, f"{share.value:.2f}", va="center")
     ax.set(xlim=(0, 1), title=game, xlabel="probability of the optimum")
 axes[0].set_yticks(range(len(teams)), [one["name"] for one in reversed(teams)])
-figure.suptitle("After 5,000 plays: 95 % intervals over seeds")
+figure.suptitle("After 5,000 plays: 95% intervals over seeds")
 figure.savefig("out/course/climbing-game.png", dpi=80)
 
 # %%

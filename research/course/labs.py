@@ -163,9 +163,9 @@ OWN_HIERARCHY = Lab(
             hint="each agent tries its own four actions",
         ),
         "seeds": Numeric(
-            "With how many seeds can one comparison reach p < .05 at all? The test flips the signs"
+            "With how many seeds can one comparison reach p < 0.05 at all? The test flips the signs"
             " of n differences, so p is a multiple of 2 ** (1 - n).", 6,
-            hint="find the least n with 2 ** (1 - n) < .05",
+            hint="find the least n with 2 ** (1 - n) < 0.05",
         ),
         "absent": Choice(
             "A comparison of six seeds ends with 'no significant difference'. What does it say?",

@@ -65,7 +65,7 @@ for label, name, colour, marker in marks:
     ax.plot(costs[name], success.value, marker, color=colour, markersize=20, label=name)
 ax.set(xscale="log", ylim=(-0.02, 1.02), xlim=(10, 1000))
 ax.set_xticks([10, 100, 1000], ["10", "100", "1,000"])
-ax.set(xlabel="joint actions of a decision", ylabel="evaluation success, 95 % interval")
+ax.set(xlabel="joint actions of a decision", ylabel="evaluation success, 95% interval")
 ax.legend(loc="center")
 figure.savefig("out/course/own-hierarchy.png", dpi=80)
 
@@ -79,7 +79,7 @@ figure.savefig("out/course/own-hierarchy.png", dpi=80)
 answers = {
     "chain": None,  # how many joint actions does a decision of the chain of four try?
     "independent": None,  # and if nobody sees anybody?
-    "seeds": None,  # with how many seeds can one comparison reach p < .05 at all?
+    "seeds": None,  # with how many seeds can one comparison reach p < 0.05 at all?
     "absent": None,  # "no significant difference": a: equal, b: may remain, c: the study was faulty
     "edges": None,  # your hierarchy of eight wheels
 }

@@ -13,7 +13,7 @@ import jinja2
 
 import nested_agents as na
 from nested_agents import Summary
-from nested_agents.analysis import two_figures
+from nested_agents.analysis import format_number
 from nested_agents.terminal import Cell
 from research import claims, load, push_n
 from research.studies.chain_order import order_tests
@@ -28,7 +28,7 @@ def rows(name: str) -> na.StudyResults:
 
 
 def cell(name: str, condition: str, column: str) -> str:
-    """Return an estimate with its 95 % interval, as the table of its study has it."""
+    """Return an estimate with its 95% interval, as the table of its study has it."""
     return _of_table(name, condition, column).text()
 
 
@@ -69,7 +69,7 @@ def orders() -> dict[str, str]:
     """Return what is tested of all orders of a chain: their number, seeds, and p by measure."""
     tests = order_tests(rows("chain-order").results)
     return {"orders": str(tests[0].orders), "seeds": str(tests[0].seeds)} | {
-        f"p{k}": two_figures(test.p) for k, test in enumerate(tests)
+        f"p{k}": format_number(test.p) for k, test in enumerate(tests)
     }
 
 

@@ -25,11 +25,12 @@ from nested_agents.analysis import (
     Results,
     compare_with_first,
     contrasts,
+    format_number,
+    format_p,
     friedman,
     holm,
     phases_of,
     select_shared,
-    two_figures,
 )
 
 PUBLISHED = ("success",)
@@ -39,7 +40,7 @@ MARGIN = 0.1
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("training")
     if any({"name", "topology"} <= results.columns.get(c, {}).keys() for c in conditions):
         by_order = contrasts(results, results.main.name, by="topology")
@@ -62,7 +63,7 @@ def equivalence(group: Group) -> str:
     else:
         verdict = "equal" if max(-low, high) <= MARGIN else "not decided"
     orders = len(group.differences) + 1
-    ends = f"[{two_figures(low)}, {two_figures(high)}]"
+    ends = f"[{format_number(low)}, {format_number(high)}]"
     return f"{group.setting}, {orders} orders, within {MARGIN:g}: {verdict} {ends}"
 
 
@@ -85,8 +86,9 @@ class OrderTest(NamedTuple):
         """What the test found, in words."""
         differ = "differ" if self.p < LEVEL else "do not differ significantly"
         return (
-            f"{self.title}: {self.orders} orders {differ} (Friedman {self.test.statistic:.1f}, "
-            f"p = {self.test.p:.2g}, adjusted {self.p:.2g}; W = {self.test.concordance:.3f}; "
+            f"{self.title}: {self.orders} orders {differ} (Friedman "
+            f"{format_number(self.test.statistic)}, p {format_p(self.test.p)}, adjusted "
+            f"{format_p(self.p).removeprefix('= ')}; W = {format_number(self.test.concordance)}; "
             f"{self.seeds} seeds)"
         )
 

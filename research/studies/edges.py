@@ -14,7 +14,7 @@ Over all settings, each seed counts by its mean over settings, so that a small d
 the same everywhere is found. Success saturates near 1, and decisions to the goal do not: both count
 alike. Hierarchies are *equal* if the whole interval lies within a margin, `MARGIN` of success and
 `SLOWER` of decisions, which were named before the comparisons that rest on them (two one-sided
-tests at .025, Schuirmann 1987).
+tests at 0.025, Schuirmann 1987).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,15 +36,13 @@ from nested_agents.analysis import (
     Results,
     Sizes,
     bootstrap,
-    bracketed,
     distinct,
+    format_estimate,
+    format_number,
     format_p,
     label_but,
     paired_tests,
     select_shared,
-    signed,
-    two_decimals,
-    two_figures,
     wrapped,
 )
 from nested_agents.analysis import compare_hierarchies as analysis_of
@@ -92,7 +90,7 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     sizes = Sizes.of(results, results.of_phase("evaluation"))
     cases = []
     for condition, robots in sizes.counts.items():
@@ -135,7 +133,7 @@ def _draw_parted(analysis: Analysis) -> Figures:
         fields = np.array([[by_name[setting, name] for name in row] for row in PARTED], dtype=float)
         axes.imshow(fields[..., 0], "Blues", vmin=0, vmax=1)
         for row, column in np.ndindex(2, 2):
-            value, low, high = map(two_figures, fields[row, column])
+            value, low, high = map(format_number, fields[row, column])
             colour = "white" if fields[row, column, 0] > 0.5 else "black"
             write = partial(axes.text, column, ha="center", color=colour)
             write(row, value, va="bottom", fontsize=15)
@@ -145,7 +143,7 @@ def _draw_parted(analysis: Analysis) -> Figures:
         axes.set_yticks((0, 1), ("not told", "told"))
         axes.tick_params(length=0, labelsize=7.5)
         axes.spines[:].set_visible(False)
-    figure.suptitle("evaluation success of the same weights, 95 % intervals", fontsize=9)
+    figure.suptitle("evaluation success of the same weights, 95% intervals", fontsize=9)
     return {"edges": figure}
 
 
@@ -183,7 +181,7 @@ class Effect(NamedTuple):
     def shown(self) -> str:
         """Estimate, interval, p and verdict, as text."""
         what = "decisions x" if self.is_ratio else "success "
-        shown = bracketed(self.estimate, two_decimals if self.is_ratio else signed)
+        shown = format_estimate(self.estimate, signed=not self.is_ratio)
         return f"{what}{shown}, p {format_p(self.p)}: {self.verdict}"
 
 
@@ -243,7 +241,7 @@ def lines_of(compared: Mapping[str, tuple[Effect, Effect]], reference: str) -> I
         return
     head = (
         f"All settings together, seed by seed, beside {reference}; equal: the interval lies within "
-        f"{two_figures(MARGIN)} of success, {SLOWER:.0%} of decisions to the goal:"
+        f"{format_number(MARGIN)} of success, {SLOWER:.0%} of decisions to the goal:"
     )
     yield from wrapped(head)
     for hierarchy, both in compared.items():

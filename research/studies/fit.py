@@ -49,7 +49,7 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     sizes = Sizes.of(results, results.of_phase("evaluation"))
     cases = []
     if not sizes.keys:  # games of several sizes differ in other columns
@@ -84,7 +84,7 @@ def draw(analysis: Analysis) -> Figures:
         f.as_rates(axes, "x")
         axes.grid(axis="x", alpha=0.25)
     f.name_rows(panels[0, 0], edges)
-    figure.supxlabel(f"{EVALUATED}, bars: 95 % intervals", fontsize=9)
+    figure.supxlabel(f"{EVALUATED}, bars: 95% intervals", fontsize=9)
     return {"fit": figure}
 
 

@@ -13,7 +13,7 @@ from string import ascii_uppercase
 from textwrap import wrap
 
 from nested_agents import Analysis, Session, Study, Summary, rate
-from nested_agents.analysis import Case, Figures, Results, distinct, system_of, two_figures
+from nested_agents.analysis import Case, Figures, Results, distinct, format_number, system_of
 from nested_agents.study import Trial, TrialResult
 from nested_agents.study import check_evaluated as check
 
@@ -40,7 +40,7 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate; 95 % Wilson intervals, seeds as the unit of sampling."""
+    """Estimate; 95% Wilson intervals, seeds as the unit of sampling."""
     cases = []
     table = []
     for condition in results.of_phase("evaluation"):
@@ -79,17 +79,17 @@ def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
     yield from ("", *wrap(legend, WIDTH))
     for plays in distinct(plays for case in cases for plays in case.values):
         yield f"\nProbability of the optimal joint action after {plays:,} plays"
-        yield " " * widest + "".join(f"{letter:>4}" for letter in letters.values())
+        yield " " * widest + "".join(f"{letter:>5}" for letter in letters.values())
         for setting in settings:
             line = f"{', '.join(setting):{widest}}"
             for system in systems:
                 estimate = by_place.get((setting, system), {}).get(plays)
-                line += f"{two_figures(float(estimate.value)) if estimate else '-':>4}"
+                line += f"{format_number(float(estimate.value)) if estimate else '-':>5}"
             yield line
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: probabilities of the optimum with their 95 % intervals.
+    """Return the figure: probabilities of the optimum with their 95% intervals.
 
     A panel for each game (the first thing that settings differ in), the systems one below the
     other, a colour and a marker for the rest of the setting; what is filled has been measured after
@@ -128,7 +128,7 @@ def draw(analysis: Analysis) -> Figures:
         f.handle(", ".join((*rest, f"{count:,} plays")), **look)
         for (rest, count), look in looks.items()
     ]
-    f.add_legend(figure, handles, "bars: 95 % intervals", ncols=2)
+    f.add_legend(figure, handles, "bars: 95% intervals", ncols=2)
     return {"games": figure}
 
 

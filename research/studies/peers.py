@@ -74,7 +74,7 @@ class LearningCourse(NamedTuple):
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("evaluation")
     main = results.main
     title = f"evaluation {main.heading}"
@@ -105,7 +105,7 @@ def analyse(results: Results) -> Analysis:
         return Analysis(())
     means = [results.means(condition, "evaluation", main.name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
-    compared, lines = judged({title: pairs[1:]}, conditions[0], of_rates=main.is_rate)
+    compared, lines = judged({title: pairs[1:]}, conditions[0], main)
     notes = (f"{main.heading}, N: when evaluated after N episodes of training.", *lines)
     return Analysis(tuple(table), notes, courses, compared)
 
@@ -113,7 +113,7 @@ def analyse(results: Results) -> Analysis:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: evaluations against experience, a panel for each condition.
 
-    The condition's line has a colour, and a band for its 95 % intervals; those of the others are
+    The condition's line has a colour, and a band for its 95% intervals; those of the others are
     grey.
     """
     from matplotlib.ticker import LogLocator

@@ -79,7 +79,7 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate; 95% intervals, seeds as the unit of sampling."""
     table = []
     cases = []
     for condition in results.of_phase("evaluation"):
@@ -114,7 +114,7 @@ def name_world(swept: Mapping[str, object]) -> str:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: the systems one below the other, a colour for each world.
 
-    Bars are 95 % intervals.
+    Bars are 95% intervals.
     """
     from matplotlib.ticker import SymmetricalLogLocator  # matplotlib takes its time
 

@@ -15,10 +15,10 @@ from nested_agents.analysis import (
     Figures,
     Results,
     adjust,
-    bracketed,
+    format_estimate,
+    format_p,
     power_lines,
     ratio,
-    two_decimals,
 )
 from nested_agents.study import check_evaluations
 
@@ -32,7 +32,7 @@ def check(spec: Spec) -> None:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling.
 
     Ratios are the cases: by condition, p of no difference, adjusted over its boxes.
     """
@@ -54,8 +54,8 @@ def analyse(results: Results) -> Analysis:
         if compared:
             notes.append(f"\n{condition}, ratio to the box of training:")
             for d in compared:
-                shown = bracketed(d.estimate, two_decimals)
-                notes.append(f"  {d.condition}: {shown}, p = {d.p:.2g} (adjusted)")
+                shown = format_estimate(d.estimate)
+                notes.append(f"  {d.condition}: {shown}, p {format_p(d.p)} (adjusted)")
             notes += power_lines([d.sample for d in compared], "evaluation success")
     return Analysis(tuple(table), tuple(notes), ratios)
 

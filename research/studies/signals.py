@@ -80,7 +80,7 @@ class SignalsCase(NamedTuple):
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate, and compare with theory; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate, and compare with theory; 95% intervals, seeds as the unit of sampling."""
     sizes = Sizes.of(results, results.of_phase("evaluation"))
     cases = []
     for condition, agents in sizes.counts.items():
@@ -134,7 +134,7 @@ def draw(analysis: Analysis) -> Figures:
         f.scale_axis(axes, sorted({case.agents for case in cases}))
         axes.set_title(title, loc="left")
         axes.set_xlabel(cases[0].sizes.word)
-    f.name_lines(figure, systems, "means over seeds, bars: 95 % intervals; grey: theory")
+    f.name_lines(figure, systems, "means over seeds, bars: 95% intervals; grey: theory")
     return {"signals": figure}
 
 

@@ -36,7 +36,8 @@ def accept(spec: Spec) -> None:
 class Study:
     """Base class of studies.
 
-    A subclass defines `analyse`; everything else has a default.
+    A subclass defines ``analyse(results)``, which returns the `Analysis` of finished trials;
+    everything else has a default.
 
     Examples
     --------
@@ -61,10 +62,6 @@ class Study:
     def measure(self, trial: Trial) -> TrialResult:
         """Run one trial; called by name in worker processes."""
         return measure(trial)
-
-    def analyse(self, results: Results) -> Analysis:
-        """Return estimates, notes and comparisons of finished trials."""
-        raise NotImplementedError(f"{type(self).__name__} defines no analyse")
 
     def draw(self, analysis: Analysis) -> Figures:
         """Return the figures of an analysis by name."""
@@ -102,14 +99,13 @@ def load_study(name: str) -> LoadedStudy:
     """
     with refused(f"study = {name!r}: "):
         entry = STUDIES.find(name)
+    missing = [part for part in PARTS if not callable(offered(entry, part))]
+    if missing:
+        raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
     source = entry() if isinstance(entry, type) else entry
     names = OPTIONS | {part: part for part in PARTS}
     known = {own: offered(source, part, MISSING) for part, own in names.items()}
-    parts: dict[str, Any] = {own: part for own, part in known.items() if part is not MISSING}
-    missing = [part for part in PARTS if not callable(parts.get(part))]
-    if missing:
-        raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
-    return LoadedStudy(**parts)
+    return LoadedStudy(**{own: part for own, part in known.items() if part is not MISSING})
 
 
 def notes_of(analysis: Any) -> tuple[str, ...]:

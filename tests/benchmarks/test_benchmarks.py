@@ -106,7 +106,7 @@ def test_what_can_be_solved_at_a_size_is_told(run: Run) -> None:
 
 def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
     said = run("research.steering", "--scripted", "3", "--seeds", "1", "--episodes", "2")
-    assert said.startswith("3 robots, scripted: 1.0 [.34, 1.0], ")
+    assert said.startswith("3 robots, scripted: 1.00 [0.34, 1.00], ")
     lines = [line for line in said.splitlines() if "3, scripted" not in line]
     rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in lines]
     page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")

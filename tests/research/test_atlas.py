@@ -53,7 +53,7 @@ def test_what_losing_messages_costs_is_paired_by_seed() -> None:
     lines = faults.fault_costs(pd.concat([rows_of(), lost]))
     assert len(lines) == 2
     assert all(float(one.difference.value) == pytest.approx(-0.22) for one in lines)
-    assert str(lines[0]).startswith("line_up, chain, batch-td, 64 agents, lost 0.3: success -.22 [")
+    assert str(lines[0]).startswith("line_up, chain, batch-td, 64 agents, lost .3: success -0.22 [")
 
 
 def test_rows_of_two_studies_are_not_taken_for_one() -> None:
@@ -70,7 +70,7 @@ def test_thresholds_are_between_shares_that_were_run() -> None:
     first, *_ = faults.thresholds(faults.fault_costs(pd.concat(frames)))
     head, _, text = first.partition(": ")
     assert head == "line_up, chain, batch-td, 64 agents, messages lost"
-    assert text == "costs from .50 on, not up to .20"
+    assert text == "costs from 0.50 on, not up to 0.20"
 
 
 def test_committed_rows_are_made_again_from_published_ones() -> None:
@@ -121,7 +121,14 @@ def test_the_command_prints_what_the_page_says(capsys: pytest.CaptureFixture[str
 
 
 def test_the_page_has_the_law_of_decisions_to_success(capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["fit", str(atlas.RESULTS / "scaling.json"), "--criterion", ".8", "--predict", "32"]
+    arguments = [
+        "fit",
+        str(atlas.RESULTS / "scaling.json"),
+        "--criterion",
+        "0.8",
+        "--predict",
+        "32",
+    ]
     assert main(arguments) == 0
     page = Path(__file__).resolve().parents[2] / "docs" / "atlas.md"
     shown = capsys.readouterr().out.splitlines()

@@ -23,6 +23,6 @@ def test_the_threshold_is_where_the_line_crosses_zero() -> None:
     line = np.tile(np.array(errors)[:, None] - 0.25, (1, 6))
     e = disagreement._threshold(line, errors)
     assert [float(end) for end in e] == pytest.approx([0.25] * 3)
-    assert disagreement._brief(e, 0.4) == ".25 [.25, .25]"
+    assert disagreement._brief(e, 0.4) == "0.25 [0.25, 0.25]"
     never = disagreement._threshold(-line, errors)
-    assert disagreement._brief(never, 0.4) == "> .4 [> .4, > .4]"
+    assert disagreement._brief(never, 0.4) == "> 0.40 [> 0.40, > 0.40]"

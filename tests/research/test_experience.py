@@ -10,7 +10,7 @@ import pytest
 from programs import main
 
 import nested_agents as na
-from nested_agents.studies.results.notation import bracketed
+from nested_agents.studies.results.notation import format_estimate
 from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.spec.spec import Spec
 from research import RESULTS, experience
@@ -36,16 +36,16 @@ def test_the_page_has_what_edges_and_foresight_are_worth() -> None:
 @pytest.mark.parametrize(
     ("name", "decisions", "text"),
     [
-        ("arm", 100_000, ".07 [.01, .17]"),
-        ("box", 100_000, ".20 [-.03, .39]"),
-        ("box", 30_000, "-.10 [-.40, .10]"),
+        ("arm", 100_000, "0.08 [0.01, 0.17]"),
+        ("box", 100_000, "0.20 [-0.03, 0.39]"),
+        ("box", 30_000, "-0.10 [-0.40, 0.10]"),
     ],
 )
 def test_differences_on_the_way_are_those_of_the_rows(name, decisions, text) -> None:
     rows = experience.read(name)
     wide = rows.pivot(index=["decisions", "seed"], columns="condition", values="success")
     ahead = wide[CHAIN] - wide["hierarchy-ppo, no edges"]
-    assert bracketed(na.bootstrap(ahead.loc[decisions].to_numpy())) == text
+    assert format_estimate(na.bootstrap(ahead.loc[decisions].to_numpy())) == text
     assert text in PEERS
 
 
@@ -94,8 +94,8 @@ def test_claims_of_networks_are_the_lines_of_the_page(capsys, monkeypatch) -> No
     assert len(printed) == len(experience.TASKS)
     for name, line in zip(experience.TASKS, printed, strict=True):
         study, _, criterion, result, verdict = line.strip("| ").split(" | ")[-5:]
-        estimate, seeds, p = re.fullmatch(r"(.*]), (\d+) seeds, p (?:= 0?)?(.*)", result).groups()
-        margin = criterion.removeprefix("p < .05, or equal within ")
+        estimate, seeds, p = re.fullmatch(r"(.*]), (\d+) seeds, p (?:= )?(.*)", result).groups()
+        margin = criterion.removeprefix("p < 0.05, or equal within ")
         last = f"{experience.TASKS[name].shown[-1]:,}"
         row = (name, seeds, last, estimate, p, margin, verdict.strip("*"))
         assert study == f"{name}-experience"

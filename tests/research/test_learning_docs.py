@@ -9,7 +9,7 @@ from programs import main
 from published_tables import print_table
 
 import nested_agents as na
-from nested_agents.studies.results.notation import bracketed, two_figures
+from nested_agents.studies.results.notation import format_estimate, format_number
 from nested_agents.studies.results.statistics import bootstrap
 from research import RESULTS
 
@@ -56,7 +56,7 @@ def test_the_planner(capsys: pytest.CaptureFixture[str]) -> None:
 
 SIZES = (2, 4, 8, 16)
 IN_A_ROW = 5
-"""Training episodes over which a success rate of .8 is looked for."""
+"""Training episodes over which a success rate of 0.8 is looked for."""
 
 
 def test_decisions_to_a_success_rate() -> None:
@@ -76,8 +76,8 @@ def test_decisions_to_a_success_rate() -> None:
     page = " ".join(PAGE.read_text(encoding="utf-8").split())
     for counted in (to_first, to_last):
         slopes = np.polyfit(np.log(SIZES), np.log(counted), 1)[0]
-        assert f"n^{bracketed(bootstrap(slopes))}" in page
-    means = [f"{float(two_figures(float(d.mean()))):,.0f}" for d in to_first]
+        assert f"n^{format_estimate(bootstrap(slopes))}" in page
+    means = [f"{float(format_number(float(d.mean()))):,.0f}" for d in to_first]
     assert f"16 robots: {', '.join(means[:-1])} and {means[-1]} in the mean over 20 seeds" in page
 
 
@@ -97,4 +97,4 @@ def test_failures_of_large_teams(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def _rounded(rate: str) -> str:
-    return f"{float(rate):.2f}".removeprefix("0") if 0 < float(rate) < 1 else rate.split(".")[0]
+    return format_number(float(rate))

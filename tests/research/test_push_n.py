@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
@@ -157,10 +157,3 @@ def test_a_learner_of_another_library_is_entered(
     assert main(["push_n", "check", str(path)]) == 0
     assert "PPO of examples, 2 robots x 5 seeds" in capsys.readouterr().out
     assert push_n.load_entry(path).teams[0].decisions == (64,) * 5
-
-
-def test_the_command_offers_what_entries_may_be() -> None:
-    options = {option.name: option for option in commands.benchmark.commands["run"].params}
-    assert tuple(map(int, options["robots"].type.choices)) == push_n.SIZES
-    allowed = get_args(push_n.Entry.model_fields["given"].annotation)
-    assert tuple(options["given"].type.choices) == allowed

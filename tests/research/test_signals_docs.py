@@ -6,7 +6,7 @@ import pytest
 from published_tables import print_table
 
 from nested_agents.scenarios.signals.theory import cascade, majority
-from nested_agents.studies.results.notation import two_figures
+from nested_agents.studies.results.notation import format_number
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "signals.md").read_text(encoding="utf-8")
 
@@ -23,5 +23,5 @@ def test_the_table_of_results(capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_table_of_theory(agents: int) -> None:
     told = cascade(agents, 0.7)
     cells = [0.7, majority(agents, 0.7), float(told.right[-1]), told.vote]
-    shown = " | ".join([".70" if cell == 0.7 else two_figures(cell) for cell in cells])
+    shown = " | ".join(map(format_number, cells))
     assert f"| {agents:,} | {shown} |" in PAGE

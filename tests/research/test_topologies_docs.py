@@ -10,7 +10,7 @@ from published_tables import print_table
 
 import nested_agents as na
 from nested_agents.studies.results.contrasts import contrasts
-from nested_agents.studies.results.notation import bracketed, two_decimals, two_figures
+from nested_agents.studies.results.notation import format_estimate, format_number, format_p
 from nested_agents.studies.results.results import Results
 from nested_agents.studies.results.statistics import Estimate, bootstrap, paired_permutation
 from nested_agents.studies.store.database import EVALUATION
@@ -73,24 +73,24 @@ def pooled(results: Results, whose: tuple[str, ...], other: str) -> tuple[np.nda
 
 
 def shown(of_seeds: np.ndarray) -> str:
-    return bracketed(bootstrap(of_seeds))
+    return format_estimate(bootstrap(of_seeds))
 
 
 def times(logarithms: np.ndarray) -> str:
-    return bracketed(Estimate(*map(np.exp, bootstrap(logarithms))), two_decimals)
+    return format_estimate(Estimate(*map(np.exp, bootstrap(logarithms))))
 
 
 def p_of(of_seeds: np.ndarray) -> str:
     p = paired_permutation(of_seeds, np.zeros_like(of_seeds))
-    return "< .001" if p < 0.001 else f"{p:.1g}".removeprefix("0") if p < 0.1 else f"{p:.2f}"[1:]
+    return format_p(p).removeprefix("= ")
 
 
 def test_what_is_equal_to_the_chain() -> None:
     results = na.load(RESULTS / "edges.json").results
     page = PAGE.read_text(encoding="utf-8")
     for other, (success, decisions) in effects(results, analyse(results).cases, TRAINED).items():
-        gained = bracketed(success.estimate)
-        longer = f"{bracketed(decisions.estimate, two_decimals)} times"
+        gained = format_estimate(success.estimate)
+        longer = f"{format_estimate(decisions.estimate)} times"
         line = f"| {other} | {gained} | {success.verdict} | {longer} | {decisions.verdict} |"
         assert line in page, f"docs/edges.md: put in\n{line}"
 
@@ -159,7 +159,7 @@ def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
             learner, orders, verdict, ends = re.findall(
                 r"(.+), (\d+) orders, within 0.1: (.+) (\[.+\])", equivalence(group)
             )[0]
-            rates = f"{two_figures(min(rates))} to {two_figures(max(rates))}"
+            rates = f"{format_number(min(rates))} to {format_number(max(rates))}"
             cells = task, learner, orders, str(group.table[0].seeds), rates, ends, verdict
             line = f"| {' | '.join(cells)} |"
             assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
@@ -174,7 +174,7 @@ def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
         order = re.findall(r"agent(\d)", own.condition) or "12345678"
         order = order[::-1] if own.condition.endswith("reversed") else order
         heard = sum(abs(int(a) - int(b)) == 1 for a, b in pairwise(order))
-        rates = [bracketed(line.estimates["evaluation success"]) for line in (own, other)]
+        rates = [format_estimate(line.estimates["evaluation success"]) for line in (own, other)]
         line = f"| {' '.join(order)} | {heard} | {' | '.join(rates)} |"
         assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
 

@@ -17,7 +17,7 @@ def test_a_push_by_hand():
 def test_contact_pushes_apart_and_costs():
     places = np.array([[0.0, 0.0], [0.2, 0.0]])
     _, velocities = advance(places, np.zeros((2, 2)), np.array([0, 0]))
-    # .1 m of penetration, 100 N/m, .1 s
+    # 0.1 m of penetration, 100 N/m, 0.1 s
     assert velocities == pytest.approx(np.array([[-1.0, 0.0], [1.0, 0.0]]))
     rewards, covered, touching = judge(places, np.array([[0.0, 0.0], [0.2, 1.0]]))
     assert rewards.tolist() == [-1.0, -1.0]

@@ -68,7 +68,7 @@ def test_advantages_by_hand():
     values = np.array([1.0, 1.0, 2.0])[:, None, None]
     last = np.array([False, True, False])[:, None]
     got = estimate(rewards, values, np.array([[8.0]]), last, settings).ravel()
-    # 4 + .5 8 - 2; an end: 2 - 1; 1 + .5 1 - 1 + .25 1
+    # 4 + 0.5 8 - 2; an end: 2 - 1; 1 + 0.5 1 - 1 + 0.25 1
     assert got.tolist() == [0.75, 1.0, 6.0]
 
 

@@ -107,8 +107,8 @@ def test_the_specs_hold_distinct_orders_of_at_least_twenty_seeds(path: Path, ord
 @pytest.mark.parametrize(
     ("chances", "verdict"),
     [
-        ((1.0, 1.0), "equal [-.06, .06]"),
-        ((0.6, 0.2), "the order matters [-.45, "),
+        ((1.0, 1.0), "equal [-0.06, 0.06]"),
+        ((0.6, 0.2), "the order matters [-0.45, "),
         ((0.5, 0.55), "not decided ["),
     ],
 )
@@ -129,6 +129,6 @@ def test_orders_are_compared_within_overrides(chances: tuple[float, float], verd
         "fuzzy, chain",
         "fuzzy, chain:reversed",
     ]
-    assert analysis.notes[0] == "fuzzy, 3 orders, within 0.1: equal [-.06, .06]"
+    assert analysis.notes[0] == "fuzzy, 3 orders, within 0.1: equal [-0.06, 0.06]"
     assert analysis.notes[1].startswith(f"ppo, 3 orders, within 0.1: {verdict}")
     assert {name: len(own) for name, own in analysis.differences.items()} == {"fuzzy": 2, "ppo": 2}

@@ -43,7 +43,7 @@ def test_systems_stand_side_by_side(tmp_path: Path) -> None:
     assert 0.9 < nested.low < 1.0
     notes = "\n".join(analysis.notes)
     assert "A JAL; B nested" in notes
-    assert "climbing     0 1.0\n" in notes
+    assert "climbing      0    1\n" in notes
     assert max(map(len, notes.splitlines())) <= 80
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["games.png", "games.svg"]

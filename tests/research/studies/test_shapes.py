@@ -24,7 +24,7 @@ def test_ratios_to_the_box_of_training() -> None:
     assert ratios[0].estimate.low > 0.9
     assert [line.condition for line in analysis.table] == ["trained on", *CHANCES]
     assert "contact" in analysis.table[1].estimates
-    assert any(note.startswith("  L: .") for note in analysis.notes)
+    assert any(note.startswith("  L: 0.") for note in analysis.notes)
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
