@@ -7,6 +7,7 @@ from .core.coordination.graphs import Elimination, MaxPlus, Scope
 from .core.interface.experience import Experience
 from .core.interface.prediction import EmbodiedPrediction
 from .core.learners import LEARNERS
+from .scenarios.matrix_games.plays import whole_episode
 from .scenarios.signals.bayesian import Bayesian
 from .scenarios.signals.scenario import SignalsSettings
 from .scenarios.signals.theory import cascade, expected, majority
@@ -28,4 +29,5 @@ __all__ = [
     "cascade",
     "expected",
     "majority",
+    "whole_episode",
 ]

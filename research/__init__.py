@@ -20,6 +20,12 @@ QUICK = FOLDER / "quick"
 """Small versions of the studies that the paper's claims rest on."""
 
 
+def study_of(name: str) -> str:
+    """Return the reference to a study of this folder that a spec anywhere may use."""
+    attribute = "".join(part.title() for part in name.split("-"))
+    return f"{FOLDER}/studies/{name.replace('-', '_')}.py:{attribute}Study"
+
+
 def load(name: str) -> na.StudyResults:
     """Return published results by name, analyzed by their study.
 

@@ -26,7 +26,7 @@ from nested_agents import Spec
 
 from . import FOLDER
 
-GAMES = f"{FOLDER}/studies/games.py:Games"
+GAMES = f"{FOLDER}/studies/games.py:GamesStudy"
 
 PENDULUM = {
     "kind": "gymnasium", "id": "Pendulum-v1", "hold": 2, "horizon": 2, "predictor": "copy",

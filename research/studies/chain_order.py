@@ -136,7 +136,7 @@ def draw(analysis: Analysis) -> Figures:
     return draw_forest("chain-order", analysis.differences, "difference from the first order")
 
 
-class ChainOrder(Study):
+class ChainOrderStudy(Study):
     """Compares orders of the agents of a chain."""
 
     PUBLISHED = PUBLISHED

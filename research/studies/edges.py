@@ -249,7 +249,7 @@ def lines_of(compared: Mapping[str, tuple[Effect, Effect]], reference: str) -> I
         yield from wrapped(f"{hierarchy} ({settings}): {both[0].shown}; {both[1].shown}", "  ")
 
 
-class Edges(Study):
+class EdgesStudy(Study):
     """Compares relations of a hierarchy under the same weights."""
 
     PUBLISHED = PUBLISHED

@@ -88,7 +88,7 @@ def draw(analysis: Analysis) -> Figures:
     return {"fit": figure}
 
 
-class Fit(Study):
+class FitStudy(Study):
     """Compares edges of a game."""
 
     PUBLISHED = PUBLISHED

@@ -140,7 +140,7 @@ def draw(analysis: Analysis) -> Figures:
     return {"peers": figure}
 
 
-class Peers(Study):
+class PeersStudy(Study):
     """Compares learners after the same experience."""
 
     check = staticmethod(check)

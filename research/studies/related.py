@@ -150,7 +150,7 @@ def draw(analysis: Analysis) -> Figures:
     return {"related": figure}
 
 
-class Related(Study):
+class RelatedStudy(Study):
     """Compares ways to coordinate agents, and their costs."""
 
     NUMBERS = NUMBERS

@@ -81,7 +81,7 @@ def draw(analysis: Analysis) -> Figures:
     return draw_forest("shapes", dict(analysis.cases), unit, null=1.0)
 
 
-class Shapes(Study):
+class ShapesStudy(Study):
     """Compares boxes of other shapes than the one of training."""
 
     check = staticmethod(check)

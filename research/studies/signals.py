@@ -3,7 +3,7 @@
 Conditions are learners and Bayesian agents, told or not, by number of agents. Measured are how
 often an agent is right, how often the last one is, and how often the team's vote is; beside each
 stands what theory says of Bayesian agents in the same hierarchy, where it can be computed
-(`nested_agents.scenarios.signals.theory`).
+(`nested_agents.parts.expected`).
 """
 
 from typing import NamedTuple
@@ -138,7 +138,7 @@ def draw(analysis: Analysis) -> Figures:
     return {"signals": figure}
 
 
-class Signals(Study):
+class SignalsStudy(Study):
     """Compares told agents with theory."""
 
     PUBLISHED = PUBLISHED

@@ -4,14 +4,14 @@ from ...core.plugins.registry import Registry
 
 NAMES = ("learning-curve", "ablation", "wheel-failure", "scaling", "hierarchies", "experience")
 MOVED = {
-    "chain-order": "chain_order.py:ChainOrder",
-    "shapes": "shapes.py:Shapes",
-    "edges": "edges.py:Edges",
-    "fit": "fit.py:Fit",
-    "signals": "signals.py:Signals",
-    "games": "games.py:Games",
-    "related": "related.py:Related",
-    "peers": "peers.py:Peers",
+    "chain-order": "chain_order.py:ChainOrderStudy",
+    "shapes": "shapes.py:ShapesStudy",
+    "edges": "edges.py:EdgesStudy",
+    "fit": "fit.py:FitStudy",
+    "signals": "signals.py:SignalsStudy",
+    "games": "games.py:GamesStudy",
+    "related": "related.py:RelatedStudy",
+    "peers": "peers.py:PeersStudy",
 }
 """Studies of the repository that are not installed: file and class, in its folder
 ``research/studies``."""

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from programs import main
-from research.commands import CATALOGUE
 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
 from research import RESULTS, SPECS
+from research.claims import CATALOG
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "related.md").read_text(encoding="utf-8")
@@ -27,7 +27,7 @@ def test_commands_name_specs_that_can_be_built(path: str) -> None:
 
 def test_specs_that_are_named_exist() -> None:
     named = set(re.findall(r"[\w/-]+\.toml", TEXT))
-    folders = (ROOT, SPECS, CATALOGUE)
+    folders = (ROOT, SPECS, CATALOG)
     assert [p for p in named if not any((folder / p).exists() for folder in folders)] == []
 
 

@@ -21,9 +21,10 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
+from research import study_of
 
 TABLE: dict[str, Any] = {
-    "study": "peers", "seeds": [10_000], "episodes": 3, "steps": 20, "evaluation": 2,
+    "study": study_of("peers"), "seeds": [10_000], "episodes": 3, "steps": 20, "evaluation": 2,
     "scenario": {"kind": "line-up", "carts": 2},
 }  # fmt: skip
 SHORT = {
@@ -173,7 +174,7 @@ def test_dqn_needs_one_agent() -> None:
 
 def test_what_needs_rule_bases_says_so() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
-    (trial,) = trials_of(spec_of("ppo", study="related"))
+    (trial,) = trials_of(spec_of("ppo", study=study_of("related")))
     from research.studies.related import measure
 
     with pytest.raises(ValueError, match="needs FuzzyAgents, the team is of CentralPPO") as raised:

@@ -23,6 +23,7 @@ from nested_agents.studies.trials.arrangement import arrange, check_conditions
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.topologies.config import parse
+from research import study_of
 
 SHORT = {"kind": "hierarchy-ppo", "rollout": 16, "batch_size": 8, "epochs": 2}
 CARTS = 4
@@ -32,7 +33,8 @@ TREE = [("a", "b"), ("a", "c"), ("b", "d")]
 def spec_of(topology: Any = "chain", **learner: Any) -> Spec:
     return Spec.of(
         {
-            "study": "peers", "seeds": [10_000], "episodes": 3, "steps": 20, "evaluation": 2,
+            "study": study_of("peers"), "seeds": [10_000],
+            "episodes": 3, "steps": 20, "evaluation": 2,
             "scenario": {"kind": "line-up", "carts": CARTS}, "topology": topology,
             "learner": {**SHORT, **learner},
         }
@@ -397,7 +399,8 @@ def test_a_learner_of_ones_own_is_given_the_hierarchy_if_it_asks(
 def test_a_chain_finds_the_optimum_of_games_where_independent_agents_do_not(game: str) -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     table = {
-        "study": "games", "seeds": [0, 1, 2], "episodes": 5, "steps": 1000, "evaluation": 1,
+        "study": study_of("games"), "seeds": [0, 1, 2],
+        "episodes": 5, "steps": 1000, "evaluation": 1,
         "scenario": {"kind": "matrix-game", "game": game, "observed": "own"},
         "learner": {"kind": "hierarchy-ppo", "discount": 0.0},
         "sweep": {"topology": ["chain", "independent"]},

@@ -13,6 +13,7 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import arrange, check_conditions
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
+from research import study_of
 
 pytest.importorskip("stable_baselines3", reason="extra [peers]")
 
@@ -36,7 +37,7 @@ MIXED = [
 
 def spec_of(name: str, **changes: Any) -> Spec:
     table: dict[str, Any] = {
-        "study": "peers",
+        "study": study_of("peers"),
         "seeds": [10_000],
         "episodes": 6,
         "steps": 11,

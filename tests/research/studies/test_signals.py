@@ -11,7 +11,7 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
-from research import SPECS
+from research import SPECS, study_of
 from research.studies import signals as module
 from research.studies.signals import analyse, check, draw, measure
 
@@ -25,7 +25,7 @@ def test_every_spec_can_be_run(path: Path) -> None:
 
 def test_another_world_is_refused() -> None:
     with pytest.raises(SpecError, match="'box-pushing': signals needs 'signals'"):
-        check(Spec(study="signals", evaluation=1))
+        check(Spec(study=study_of("signals"), evaluation=1))
 
 
 def test_a_trial_has_its_theory() -> None:
