@@ -1,4 +1,4 @@
-"""Parts of agents: learned models, coordination graphs, costs and private signals."""
+"""Parts of agents: learned models, coordination graphs and costs."""
 
 from .core.adaptation.calibration import CalibrationSettings
 from .core.adaptation.self_model import SelfModelSettings
@@ -8,14 +8,10 @@ from .core.interface.experience import Experience
 from .core.interface.prediction import EmbodiedPrediction
 from .core.learners import LEARNERS
 from .scenarios.matrix_games.plays import whole_episode
-from .scenarios.signals.bayesian import Bayesian
-from .scenarios.signals.scenario import SignalsSettings
-from .scenarios.signals.theory import cascade, expected, majority
 
 __all__ = [
     "LEARNERS",
     "PAPER_ACTIONS",
-    "Bayesian",
     "CalibrationSettings",
     "Elimination",
     "EmbodiedPrediction",
@@ -24,10 +20,6 @@ __all__ = [
     "Problem",
     "Scope",
     "SelfModelSettings",
-    "SignalsSettings",
     "below_counts",
-    "cascade",
-    "expected",
-    "majority",
     "whole_episode",
 ]

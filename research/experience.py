@@ -29,7 +29,7 @@ from nested_agents.analysis import (
 )
 from nested_agents.terminal import print_text
 
-from . import FOLDER, RESULTS, SPECS, FloatArray
+from . import RESULTS, SPECS, FloatArray
 from .claims import Benefit, Claim, Finding
 from .measures import Measured
 
@@ -141,8 +141,6 @@ def _estimate(means: FloatArray, measure: str, task: PublishedCourse) -> Estimat
 
 def spec_of(name: str) -> Path:
     """Return where the spec of a task's networks is."""
-    if name == "spread":
-        return FOLDER.parent / "studies" / "catalogue" / "experience" / "experience.toml"
     return SPECS / f"{name}-experience.toml"
 
 

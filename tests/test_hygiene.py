@@ -38,7 +38,7 @@ def test_the_container_is_not_root() -> None:
 
 TOP = {
     ".ci", ".github", "benchmarks", "core", "docs", "examples", "nested_agents",
-    "research", "scenarios", "studies", "tests", "topologies",
+    "plugins", "research", "scenarios", "studies", "tests", "topologies",
     ".containerignore", ".gitignore", ".pre-commit-config.yaml", ".readthedocs.yaml",
     "CHANGELOG.md", "CITATION.cff", "CODE_OF_CONDUCT.md", "CONTRIBUTING.md", "Containerfile",
     "DECISIONS.md", "LICENSE", "README.md", "box2d.lock", "conftest.py", "dev", "pyproject.toml",

@@ -3,16 +3,18 @@
 Conditions are learners and Bayesian agents, told or not, by number of agents. Measured are how
 often an agent is right, how often the last one is, and how often the team's vote is; beside each
 stands what theory says of Bayesian agents in the same hierarchy, where it can be computed
-(`nested_agents.parts.expected`).
+(`nested_agents_signals.theory`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from nested_agents_signals.bayesian import Bayesian
+from nested_agents_signals.scenario import SignalsSettings
+from nested_agents_signals.theory import expected
 
 from nested_agents import Analysis, Session, Spec, SpecError, Study, Summary, bootstrap
 from nested_agents.analysis import Estimate, Figures, Results, Sizes, distinct, exactly, label_but
-from nested_agents.parts import Bayesian, SignalsSettings, expected
 from nested_agents.study import Trial, TrialResult, check_evaluated
 
 SHARES = {"right": "share right", "last": "last right", "vote": "vote right"}

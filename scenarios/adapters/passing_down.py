@@ -73,6 +73,9 @@ class PassingDownEnv(parallel_to_aec_wrapper):
     ('robot1.right', [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     """
 
+    terminations: Any
+    truncations: Any
+
     def __init__(
         self,
         env: ParallelEnv[str, Any, Any],

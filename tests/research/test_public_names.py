@@ -30,7 +30,7 @@ DEPENDENCIES = {
     "shapely",
     "tomli_w",
 }
-OTHERS = {"jinja2", "pytest"}
+OTHERS = {"jinja2", "nested_agents_signals", "pytest"}
 OWN = {"research", "grade", "labs", "questions"}
 """Modules of the folder itself."""
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
+from nested_agents_signals.theory import cascade, majority
 from published_tables import print_table
 
-from nested_agents.scenarios.signals.theory import cascade, majority
 from nested_agents.studies.results.notation import format_number
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "signals.md").read_text(encoding="utf-8")

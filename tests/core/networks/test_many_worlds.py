@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from nested_agents_spread import SpreadSettings
 
 from nested_agents.core.agents.loop import policy_seed
 from nested_agents.core.agents.many_environments import ManyEnvironmentsLoop
@@ -16,7 +17,6 @@ from nested_agents.core.networks.settings import (
     IPPOSettings,
     MAPPOSettings,
 )
-from nested_agents.scenarios.spread import SpreadSettings
 
 SMALL = {"environments": 4, "rollout": 10, "batch_size": 30, "epochs": 2, "hidden": (8,)}
 AGENTS = ("agent1", "agent2", "agent3")

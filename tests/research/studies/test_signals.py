@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_up_results import NOTHING, SEEDS, Arrays
+from nested_agents_signals.scenario import MEASURES
+from nested_agents_signals.theory import cascade, majority
 
-from nested_agents.scenarios.signals.scenario import MEASURES
-from nested_agents.scenarios.signals.theory import cascade, majority
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save

@@ -1,17 +1,14 @@
 """Swimmers of any number of joints."""
 
-from pathlib import Path
-
 import gymnasium
 import numpy as np
 import pytest
 
-from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios import SCENARIOS
 
 pytest.importorskip("mujoco", reason="extra mujoco")
 
-SWIMMER = "nested_agents.scenarios.swimmers:NestedAgents/Swimmer-v0"
+SWIMMER = "nested_agents_swimmers:NestedAgents/Swimmer-v0"
 
 
 def test_the_swimmer_of_two_joints_is_that_of_gymnasium() -> None:
@@ -40,8 +37,7 @@ def test_further_joints_have_torques_and_are_observed(joints: int) -> None:
 
 
 def test_joints_of_the_example_see_those_next_to_them() -> None:
-    with Sources(Path(__file__).resolve().parents[2] / "examples" / "worlds").active():
-        world = SCENARIOS.parsed("swimmer.py:swimmer", joints=3).build()
+    world = SCENARIOS.parsed("swimmer", joints=3).build()
     assert world.agents == ("body1.1", "body2.1", "body3.1")
     env = world._simulator.env.unwrapped  # the pose is set by hand
     turned = np.array([0.1, 0.2, 0.3])

@@ -1,12 +1,12 @@
-"""Signals: a step is a play, in which all agents must name a state of which each has a signal.
+"""Signals: in every step, all agents name a state of which each has a private signal.
 
-Before every play one of two states is drawn, with equal probability. Every agent gets a private
-signal, which is the state with probability `accuracy`, independently of others. Each names a state.
-The team's vote is what most have named; where as many name either, a coin decides. An agent is paid
-1 if it is right, or all are paid 1 if the vote is.
+Before every step one of two states is drawn with equal probability. Every agent receives a private
+signal, which equals the state with probability `accuracy`, independently of the other signals. Each
+agent names a state. The vote of the team is the majority; a coin decides ties. An agent receives a
+reward of 1 if it is right, or all agents receive 1 if the vote is right.
 
-Nothing but what agents are told of the others' decisions can tell them more than their own signal:
-here information is private, and a message is worth something. `theory` has the numbers.
+Messages about the decisions of others are the only information beside an agent's own signal, so
+communication has a value, which `theory` computes.
 """
 
 from __future__ import annotations
@@ -15,59 +15,61 @@ from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from ...core.interface.environments import Environments, Transitions
-from ...core.interface.measures import SUCCESS, Measure
-from ...core.interface.scenario import Scenario, Transition
-from ...core.interface.spaces import ActionSet, StateSpace, choice
-from ...core.numerics import BoolArray, FloatArray, IntArray
-from ...core.plugins.settings import ScenarioSettings
+import nested_agents as na
+
+BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 STATES = ("a", "b")
-"""What the state may be; actions name it, and signals are of it."""
+"""Possible states, which are also the signals and the actions."""
 
 
-def _share(name: str, title: str, better: Literal["higher", "lower"] | None = "higher") -> Measure:
-    return Measure(name, title, gathering="mean", better=better, least=0.0, greatest=1.0)
+def _share(
+    name: str, title: str, better: Literal["higher", "lower"] | None = "higher"
+) -> na.Measure:
+    return na.Measure(name, title, gathering="mean", better=better, least=0.0, greatest=1.0)
 
 
 MEASURES = (
-    Measure(SUCCESS.name, SUCCESS.title, source="vote", better="higher", is_rate=True),
+    na.Measure(na.SUCCESS.name, na.SUCCESS.title, source="vote", better="higher", is_rate=True),
     _share("right", "share right"),
     _share("vote", "vote right"),
     _share("last", "last agent right"),
     _share("followed", "against own signal", better=None),
 )
-"""What is measured of plays: success is that the vote was right in the last one of an episode."""
+"""Measures of an episode; it is a success if the vote of the last step is right."""
 
 
-class SignalsSettings(ScenarioSettings):
-    """Agents that must name a state, of which each has a noisy signal of its own."""
+class SignalsSettings(na.ScenarioSettings):
+    """Settings of the scenario `signals`."""
 
     kind: Literal["signals"] = "signals"
     factory: ClassVar[str] = f"{__name__}:Signals"
     players: Annotated[int, Field(ge=2, le=10_000)] = 8
     """Number of agents."""
     accuracy: Annotated[float, Field(gt=0.5, le=1.0)] = 0.7
-    """Probability with which a signal is the state."""
+    """Probability that a signal equals the state."""
     pays: Literal["own", "vote"] = "own"
-    """Whether an agent is paid for what it names itself, or all for the vote of the team."""
+    """Source of the reward: the own decision of an agent, or the vote of the team."""
 
 
 class Plays(NamedTuple):
-    """Plays of several worlds, or of one: leading axes ``...`` are those of worlds."""
+    """Random numbers of a step; leading axes ``...`` are those of environments."""
 
     states: BoolArray
-    """``(...)`` whether the state is b."""
+    """Whether the state is b ``(...)``."""
     coins: BoolArray
-    """``(...)`` what a tied vote says."""
+    """Outcome of a tied vote ``(...)``."""
     signals: BoolArray
-    """``(..., n)`` whether an agent's signal is b."""
+    """Whether the signal of an agent is b ``(..., n)``."""
 
     @classmethod
     def of(cls, draws: FloatArray, accuracy: float) -> Plays:
-        """Return the plays that numbers ``(..., n + 2)`` between 0 and 1 stand for.
+        """Return the play given by uniform random numbers ``(..., n + 2)`` in [0, 1).
 
         Examples
         --------
@@ -80,11 +82,11 @@ class Plays(NamedTuple):
         return cls(states, draws[..., 1] < 0.5, correct == states[..., None])
 
     def right(self, named: IntArray) -> BoolArray:
-        """Return which agents ``(..., n)`` name the state."""
+        """Return whether each agent names the state ``(..., n)``."""
         return named.astype(bool) == self.states[..., None]
 
     def vote(self, named: IntArray) -> BoolArray:
-        """Return whether the vote ``(...)`` of what agents ``(..., n)`` name is right."""
+        """Return whether the vote is right ``(...)``, given the named states ``(..., n)``."""
         twice = 2 * named.sum(axis=-1)
         n = named.shape[-1]
         voted = np.where(twice == n, self.coins, twice > n)
@@ -92,23 +94,23 @@ class Plays(NamedTuple):
 
     @property
     def seen(self) -> FloatArray:
-        """The states ``(..., n, 1)`` of agents: each its own signal."""
+        """State of every agent, its own signal ``(..., n, 1)``."""
         return self.signals[..., None].astype(float)
 
 
-class Signals(Scenario):
-    """Agents that must name a state, which is not predicted.
+class Signals(na.Scenario):
+    """Agents name a state of which each has a private signal; there is no predictor.
 
     Parameters
     ----------
     settings
-        See `SignalsSettings`.
+        Number of agents, accuracy and reward.
 
     Examples
     --------
-    >>> world = SignalsSettings(players=3, accuracy=1.0).build()
-    >>> signals = world.reset(0)
-    >>> world.step(signals[:, 0].astype(int)).reward.tolist()
+    >>> scenario = SignalsSettings(players=3, accuracy=1.0).build()
+    >>> signals = scenario.reset(0)
+    >>> scenario.step(signals[:, 0].astype(int)).reward.tolist()
     [1.0, 1.0, 1.0]
     """
 
@@ -118,17 +120,17 @@ class Signals(Scenario):
         self.settings = settings
         self.agents = tuple(f"agent{i + 1}" for i in range(settings.players))
         self.roles = ("player",) * settings.players
-        self.action_set = ActionSet(STATES, (0.0, 0.0), (0.0, 0.0), neutral=0)
-        self.state_space = StateSpace("signals", (choice("signal", STATES),), n_own=1)
+        self.action_set = na.ActionSet(STATES, (0.0, 0.0), (0.0, 0.0), neutral=0)
+        self.state_space = na.StateSpace("signals", (na.choice("signal", STATES),), n_own=1)
         Signals.reset(self, 0)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
-        """Begin with the first play."""
+        """Draw the first state and its signals."""
         self._rng = np.random.default_rng(seed)
         return self._advance()
 
-    def step(self, joint_action: IntArray) -> Transition:
-        """Play once."""
+    def step(self, joint_action: IntArray) -> na.Transition:
+        """Compare the named states with the state, and draw the next one."""
         play = self._play
         right = play.right(joint_action)
         vote = float(play.vote(joint_action))
@@ -139,10 +141,10 @@ class Signals(Scenario):
             "followed": float((joint_action.astype(bool) != play.signals).mean()),
         }
         reward = right.astype(float) if self.settings.pays == "own" else vote
-        return Transition(self._advance(), reward, False, False, info)
+        return na.Transition(self._advance(), reward, False, False, info)
 
     def environments(self, count: int) -> SignalEnvironments:
-        """Return many such worlds, played in one call."""
+        """Return many environments, stepped in one call."""
         return SignalEnvironments(self, count)
 
     def _advance(self) -> FloatArray:
@@ -151,22 +153,22 @@ class Signals(Scenario):
         return self._play.seen
 
 
-class SignalEnvironments(Environments):
-    """Many worlds of signals, played in one call; each has the bits that it has by itself.
+class SignalEnvironments(na.Environments):
+    """Many environments of signals; each gives the same bits as a single one.
 
     Parameters
     ----------
     scenario
-        What all of them are.
+        Scenario of all environments.
     count
-        How many there are.
+        Number of environments.
 
     Examples
     --------
-    >>> worlds = SignalEnvironments(SignalsSettings(players=3, pays="vote").build(), 2)
-    >>> worlds.reset([np.random.SeedSequence(seed) for seed in (0, 1)]).shape
+    >>> environments = SignalEnvironments(SignalsSettings(players=3, pays="vote").build(), 2)
+    >>> environments.reset([np.random.SeedSequence(seed) for seed in (0, 1)]).shape
     (2, 3, 1)
-    >>> worlds.step(np.zeros((2, 3), dtype=int)).rewards.shape
+    >>> environments.step(np.zeros((2, 3), dtype=int)).rewards.shape
     (2, 3)
     """
 
@@ -179,19 +181,19 @@ class SignalEnvironments(Environments):
     def begin(
         self, places: Sequence[int], seeds: Sequence[np.random.SeedSequence], first_episode: int
     ) -> FloatArray:
-        """Begin with the first play in some worlds."""
+        """Start an episode in some environments."""
         for place, seed in zip(places, seeds, strict=True):
             self._generators[place] = np.random.default_rng(seed)
         return self._advance(places)[np.asarray(places)]
 
-    def step(self, joint_actions: IntArray) -> Transitions:
-        """Play once in every world."""
+    def step(self, joint_actions: IntArray) -> na.Transitions:
+        """Step all environments by joint actions ``(E, n)``."""
         plays = self.plays
         right = plays.right(joint_actions).astype(float)
         vote = plays.vote(joint_actions).astype(float)
         is_own = self.scenario.settings.pays == "own"
         never = np.zeros(self.count, dtype=bool)
-        return Transitions(
+        return na.Transitions(
             states=self._advance(range(self.count)),
             rewards=right if is_own else np.broadcast_to(vote[:, None], right.shape),
             terminated=never,
@@ -202,5 +204,5 @@ class SignalEnvironments(Environments):
         for place in places:
             self._draws[place] = self._generators[place].random(self._draws.shape[1])
         self.plays = Plays.of(self._draws, self.scenario.settings.accuracy)
-        """What is played next."""
+        """Next step of every environment."""
         return self.plays.seen

@@ -1,4 +1,4 @@
-"""What Bayesian agents make of private signals, computed exactly.
+"""Exact probabilities that Bayesian agents with private signals are right.
 
 Two states are equally probable; signals are right with probability q > 1/2, independently. An agent
 that is told nothing names its signal, and of n such agents most are right with the probability of
@@ -27,16 +27,19 @@ from math import log
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
 
-from ...core.hierarchy.hierarchy import Hierarchy
-from ...core.numerics import FloatArray, stats
+import nested_agents as na
+
+FloatArray = NDArray[np.float64]
 
 Indifferent = Literal["signal", "coin"]
-"""What an agent names for whom both states are equally probable."""
+"""Decision of an agent for which both states are equally probable."""
 EQUAL = 1e-9
-"""Log odds that are equal but for rounding."""
-MOST_ENUMERATED = 16
-"""Agents of whom all signals are tried."""
+"""Difference of log odds that counts as rounding error."""
+MAX_ENUMERATED = 16
+"""Maximum number of agents whose signals are enumerated."""
 
 
 def majority(agents: int, accuracy: float) -> float:
@@ -77,9 +80,10 @@ def naming(public: FloatArray, accuracy: float, indifferent: Indifferent) -> Flo
 
 
 def evidence(public: FloatArray, accuracy: float, indifferent: Indifferent) -> FloatArray:
-    """Return the log odds ``(..., 2)`` that is learned from an agent's naming a, or b.
+    """Return the log odds ``(..., 2)`` that follow from an agent naming a, or b.
 
-    Whoever would name the same by either signal tells nothing. Arguments are those of `naming`.
+    An agent that names the same state for either signal gives no evidence. The arguments are those
+    of `naming`.
 
     Examples
     --------
@@ -95,16 +99,16 @@ def evidence(public: FloatArray, accuracy: float, indifferent: Indifferent) -> F
 
 
 class Expected(NamedTuple):
-    """How often agents, and their vote, are right."""
+    """Probabilities that agents, and their vote, are right."""
 
     right: FloatArray
-    """``(n,)`` by agent."""
+    """Probability that each agent is right ``(n,)``."""
     vote: float
-    """Of the vote of all, a coin deciding ties."""
+    """Probability that the vote is right; a coin decides ties."""
 
 
 def cascade(agents: int, accuracy: float, indifferent: Indifferent = "signal") -> Expected:
-    """Return how often Bayesian agents of a chain are right, all of whom are told by all above.
+    """Return how often the Bayesian agents of a chain are right, if each hears all agents above it.
 
     What was named before matters by its log odds alone, of which there are five values at most. How
     often the vote is right follows from how many have been right, value by value.
@@ -148,14 +152,14 @@ def cascade(agents: int, accuracy: float, indifferent: Indifferent = "signal") -
     return Expected(right, _of_vote(counted))
 
 
-def unweighed(hierarchy: Hierarchy) -> tuple[int, int] | None:
-    """Return an agent and one that tells it something, but has been told what it has not.
+def unweighed(hierarchy: na.Hierarchy) -> tuple[int, int] | None:
+    """Return an agent and one of its senders that heard more than the agent hears, or None.
 
-    None: every agent knows by what all those decided who tell it something.
+    Without such a pair, every agent knows the log odds by which its senders decided.
 
     Examples
     --------
-    >>> unweighed(Hierarchy("abc", [("a", "b"), ("b", "c")], told="parents"))
+    >>> unweighed(na.Hierarchy("abc", [("a", "b"), ("b", "c")], told="parents"))
     (2, 1)
     """
     for agent in hierarchy.order:
@@ -167,16 +171,16 @@ def unweighed(hierarchy: Hierarchy) -> tuple[int, int] | None:
 
 
 def expected(
-    hierarchy: Hierarchy, accuracy: float, indifferent: Indifferent = "signal"
+    hierarchy: na.Hierarchy, accuracy: float, indifferent: Indifferent = "signal"
 ) -> Expected | None:
-    """Return how often Bayesian agents of a hierarchy are right, as far as it can be computed.
+    """Return how often the Bayesian agents of a hierarchy are right, or None if it is unknown.
 
-    Nobody is told; or those above each agent are a chain that is told, as in a chain, a tree and a
-    star; or they are few. The vote is not a number where it is not known. None: nothing is known.
+    It is known without communication, if the agents above each agent form a chain (as in a chain,
+    a tree or a star), or for few agents. The vote is NaN where it is unknown.
 
     Examples
     --------
-    >>> tree = Hierarchy("abc", [("a", "b"), ("a", "c")])
+    >>> tree = na.Hierarchy("abc", [("a", "b"), ("a", "c")])
     >>> expected(tree, 0.7).right.round(3).tolist(), round(expected(tree, 0.7).vote, 3)
     ([0.7, 0.7, 0.7], 0.784)
     """
@@ -186,7 +190,7 @@ def expected(
         sorted(places[sender] for sender in hierarchy.above(agent)) == list(range(places[agent]))
         for agent in range(n)
     )
-    is_enumerated = n <= MOST_ENUMERATED and indifferent == "signal"
+    is_enumerated = n <= MAX_ENUMERATED and indifferent == "signal"
     if not lines or unweighed(hierarchy):
         return enumerated(hierarchy, accuracy) if is_enumerated else None
     chain = cascade(max(places) + 1, accuracy, indifferent)
@@ -199,18 +203,18 @@ def expected(
 
 
 def _of_vote(counted: FloatArray) -> float:
-    """Return how often most of n agents are right, by how often 0, ..., n of them are."""
+    """Return how often a majority is right, given how often 0, ..., n agents are right."""
     n = len(counted) - 1
     tied = counted[n // 2] if n % 2 == 0 else 0.0
     return float(counted[n // 2 + 1 :].sum() + 0.5 * tied)
 
 
-def enumerated(hierarchy: Hierarchy, accuracy: float) -> Expected:
-    """Return how often Bayesian agents of any hierarchy are right, by trying all signals.
+def enumerated(hierarchy: na.Hierarchy, accuracy: float) -> Expected:
+    """Return how often the Bayesian agents of any hierarchy are right, by enumerating all signals.
 
-    Whoever is indifferent names its own signal. An agent knows the hierarchy, its own signal and
-    what it is told, and nothing else: two cases in which these are the same it cannot tell apart,
-    and names the state that is more probable in both together.
+    An indifferent agent names its own signal. An agent knows the hierarchy, its own signal and its
+    messages. It names the state that is more probable over all cases with these signals and
+    messages.
 
     Parameters
     ----------
@@ -222,17 +226,17 @@ def enumerated(hierarchy: Hierarchy, accuracy: float) -> Expected:
     Raises
     ------
     ValueError
-        If there are more than `MOST_ENUMERATED` agents.
+        If there are more than `MAX_ENUMERATED` agents.
 
     Examples
     --------
-    >>> star = Hierarchy("abc", [("a", "b"), ("a", "c")])
+    >>> star = na.Hierarchy("abc", [("a", "b"), ("a", "c")])
     >>> enumerated(star, 0.7).right.round(3).tolist()
     [0.7, 0.7, 0.7]
     """
     n = len(hierarchy)
-    if n > MOST_ENUMERATED:
-        raise ValueError(f"enumerated: {n} agents, allowed: {MOST_ENUMERATED} or fewer")
+    if n > MAX_ENUMERATED:
+        raise ValueError(f"enumerated: {n} agents, allowed: {MAX_ENUMERATED} or fewer")
     signals = np.arange(2**n)[:, None] >> np.arange(n) & 1
     ones = signals.sum(axis=1)
     if_b = accuracy**ones * (1.0 - accuracy) ** (n - ones)

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from nested_agents import Hierarchy
-from nested_agents.scenarios.signals.theory import (
+from nested_agents_signals.theory import (
     cascade,
     enumerated,
     evidence,
     expected,
     majority,
 )
+
+from nested_agents import Hierarchy
 
 ACCURACIES = st.floats(0.51, 0.97)
 

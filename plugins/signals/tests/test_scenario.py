@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from nested_agents_signals.scenario import Plays, SignalEnvironments, SignalsSettings
 
 from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios.checking.checker import check_scenario
-from nested_agents.scenarios.signals.scenario import Plays, SignalEnvironments, SignalsSettings
 
 SEEDS = [np.random.SeedSequence(seed) for seed in range(5)]
 

@@ -61,7 +61,7 @@ def test_a_return_is_a_success_if_it_is_said_to_be():
     world.reset(0)
     assert world.step(np.zeros(4, int)).info["succeeded"]
     (warning,) = SCENARIOS.parsed("vmas", task="navigation").warnings()
-    assert "nothing is said to be one, returns are compared" in warning
+    assert "not set, so studies compare returns" in warning
 
 
 @pytest.mark.usefixtures("_vmas")
@@ -71,7 +71,7 @@ def test_a_return_is_a_success_if_it_is_said_to_be():
         ({"task": "balanse"}, "scenario.task = 'balanse': did you mean 'balance'"),
         ({"task": "balance", "options": {"continuous_actions": True}}, "VMAS's discrete actions"),
         ({"task": "balance", "options": {"n_agents": "many"}}, "cannot be made, TypeError"),
-        ({"task": "simple_adversary"}, "its agents differ, allowed: all alike"),
+        ({"task": "simple_adversary"}, "agents must have equal spaces"),
     ],
 )
 def test_bad_input_is_one_line(keys, message):
@@ -82,7 +82,7 @@ def test_bad_input_is_one_line(keys, message):
 
 def test_without_the_extra_it_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "vmas", None)
-    with pytest.raises(ValueError, match=r"needs the extra vmas, pip install"):
+    with pytest.raises(ValueError, match=r"VMAS is not installed; pip install"):
         build("balance")
 
 

@@ -1,7 +1,7 @@
-"""Swimmers of any number of joints: Gymnasium's of two with more segments, all else alike.
+"""MuJoCo swimmers with any number of joints, one agent per joint.
 
-``NestedAgents/Swimmer-v0``, which ``gymnasium.make`` knows once this is imported, takes the option
-`joints` and those of ``Swimmer-v5``. Needs the extra mujoco.
+``NestedAgents/Swimmer-v0`` is Gymnasium's ``Swimmer-v5`` with more segments; it takes the option
+`joints` and the options of ``Swimmer-v5``. `swimmer` is the scenario of the same name.
 """
 
 from tempfile import NamedTemporaryFile
@@ -9,6 +9,8 @@ from typing import Any
 
 import gymnasium
 from gymnasium.envs.mujoco.swimmer_v5 import SwimmerEnv
+
+import nested_agents as na
 
 SEGMENT = '<geom fromto="{begin} 0 0 {end} 0 0" size="0.1" type="capsule"/>'
 HINGE = (
@@ -41,10 +43,14 @@ SWIMMER = """
   <actuator>{motors}</actuator>
 </mujoco>
 """
+ANGLE_RAD = (-1.8, 1.8)
+"""Range of a joint's angle in random episodes, rounded [rad]."""
+SUCCESS_RETURN = 18.0
+"""Minimum return of a successful episode: a mean speed of 0.1 m/s."""
 
 
 def format_model(joints: int) -> str:
-    """Return the swimmer of so many joints in MuJoCo's format."""
+    """Return the swimmer with a number of joints in MuJoCo's format."""
     numbers = range(1, joints + 1)
     hinges = [HINGE.format(number=k + 1, at=0.5 if k == 1 else -1, joint=k) for k in numbers]
     motors = "".join(f'<motor joint="joint{k}"/>' for k in numbers)
@@ -53,7 +59,7 @@ def format_model(joints: int) -> str:
 
 
 class Swimmer(SwimmerEnv):
-    """A swimmer of so many joints, on the keywords of Gymnasium's."""
+    """A swimmer with a number of joints; other keywords are those of Gymnasium's swimmer."""
 
     def __init__(self, joints: int = 2, **options: Any) -> None:
         with NamedTemporaryFile("w", suffix=".xml") as file:
@@ -63,3 +69,42 @@ class Swimmer(SwimmerEnv):
 
 
 gymnasium.register("NestedAgents/Swimmer-v0", entry_point=Swimmer)
+
+
+def swimmer(*, joints: int = 4, predictor: str = "copy", horizon: int = 3) -> na.Scenario:
+    """Return a swimmer whose joints are agents; a decision is held for 0.12 s.
+
+    A joint sees its own angle and speed and the angles of its neighbors; a joint at an end has one
+    neighbor, which stands twice.
+
+    Parameters
+    ----------
+    joints
+        Number of joints, at least 2.
+    predictor
+        Prediction of next states, see `nested_agents.GymnasiumSettings`.
+    horizon
+        Decisions that a copied simulator looks ahead.
+    """
+    own = range(1, joints + 1)
+    variables = {
+        "joint": (*own,),
+        "before": (2, *own[:-1]),
+        "after": (*own[1:], joints - 1),
+        "speed": tuple(joints + 3 + k for k in own),
+        "angle": 0,
+        "vx": joints + 1,
+    }
+    ranges = {"speed": (-8.0, 8.0), "angle": (-2.0, 2.0), "vx": (-3.0, 3.0)}
+    return na.GymnasiumSettings(
+        id="nested_agents_swimmers:NestedAgents/Swimmer-v0",
+        options={"joints": joints},
+        groups=tuple((k - 1,) for k in own),  # one body per joint, so that all share one role
+        actions=3,
+        hold=3,
+        predictor=predictor,
+        horizon=horizon,
+        success={"return": SUCCESS_RETURN},
+        variables=variables,
+        ranges=ranges | dict.fromkeys(("joint", "before", "after"), ANGLE_RAD),
+    ).build()

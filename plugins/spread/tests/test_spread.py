@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-
-from nested_agents.scenarios.spread import KEPT, PERIOD, SpreadSettings, advance, judge
+from nested_agents_spread import DAMPING, PERIOD_S, SpreadSettings, advance, score
 
 
 def test_a_push_by_hand():
     places = np.array([[0.0, 0.0], [5.0, 5.0]])
     velocities = np.array([[1.0, 0.0], [0.0, 0.0]])
     moved, faster = advance(places, velocities, np.array([2, 3]))
-    assert moved.tolist() == [[PERIOD, 0.0], [5.0, 5.0]]
-    assert faster == pytest.approx(np.array([[KEPT + 0.5, 0.0], [0.0, -0.5]]))
+    assert moved.tolist() == [[PERIOD_S, 0.0], [5.0, 5.0]]
+    assert faster == pytest.approx(np.array([[DAMPING + 0.5, 0.0], [0.0, -0.5]]))
 
 
 def test_contact_pushes_apart_and_costs():
@@ -19,7 +18,7 @@ def test_contact_pushes_apart_and_costs():
     _, velocities = advance(places, np.zeros((2, 2)), np.array([0, 0]))
     # 0.1 m of penetration, 100 N/m, 0.1 s
     assert velocities == pytest.approx(np.array([[-1.0, 0.0], [1.0, 0.0]]))
-    rewards, covered, touching = judge(places, np.array([[0.0, 0.0], [0.2, 1.0]]))
+    rewards, covered, touching = score(places, np.array([[0.0, 0.0], [0.2, 1.0]]))
     assert rewards.tolist() == [-1.0, -1.0]
     assert covered == 0.5
     assert touching.tolist() == [1, 1]
@@ -48,7 +47,7 @@ def test_it_is_simple_spread():
         world.reset(0)
         for agent in inside.agents if episode % 2 else ():
             agent.state.p_pos = 0.2 * agent.state.p_pos
-        world.places = np.array([agent.state.p_pos for agent in inside.agents])
+        world.positions = np.array([agent.state.p_pos for agent in inside.agents])
         world.landmarks = np.array([landmark.state.p_pos for landmark in inside.landmarks])
         for _ in range(25):
             joint = rng.integers(0, 5, 3)

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from nested_agents_signals.scenario import SignalEnvironments, SignalsSettings
+from nested_agents_signals.theory import cascade, enumerated, majority
 
 from nested_agents import Team, build_hierarchy, parse_topology, policy_seed
 from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.interface.experience import Observation
 from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios.line_up import LineUpSettings
-from nested_agents.scenarios.signals.scenario import SignalEnvironments, SignalsSettings
-from nested_agents.scenarios.signals.theory import cascade, enumerated, majority
 
-KIND = "nested_agents.scenarios.signals.bayesian:Bayesian"
+KIND = "bayesian"
 WORLDS = 4000
 
 
@@ -71,10 +71,10 @@ def test_one_world_is_as_many():
 
 
 def test_what_they_cannot_weigh_is_refused():
-    with pytest.raises(ValueError, match=r"acts in scenario\.kind = 'signals' only"):
+    with pytest.raises(ValueError, match=r"needs scenario\.kind = 'signals'"):
         team(LineUpSettings(carts=3).build())
     world = SignalsSettings(players=3).build()
-    with pytest.raises(ValueError, match="agent3 is told what agent2 names, and not all"):
+    with pytest.raises(ValueError, match="agent3 hears agent2, but not all"):
         team(world, {"kind": "chain", "told": "parents"})
-    with pytest.raises(ValueError, match=r"leave topology\.failures out"):
+    with pytest.raises(ValueError, match=r"remove topology\.failures"):
         team(world, failures=(LostMessages(agents=("*",)),))
