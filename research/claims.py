@@ -303,14 +303,14 @@ def spec_of_study(study: str) -> Path:
 def committed(paper: str) -> dict[str, Results]:
     """Return the committed results of the studies of a paper's claims, by study."""
     paths = {study: RESULTS / f"{study}.json" for study in studies_of(paper)}
-    found = {}
+    results = {}
     for study, path in paths.items():
         if path.exists():
             loaded = na.load(path)
-            found[study] = loaded.results
+            results[study] = loaded.results
             for remark in loaded.remarks:
                 print(remark, file=sys.stderr)
-    return found
+    return results
 
 
 def run_studies(out: Path, paper: str, *, quick: bool, jobs: int | None) -> dict[str, Results]:

@@ -30,7 +30,7 @@ DEPENDENCIES = {
     "shapely",
     "tomli_w",
 }
-OTHERS = {"jinja2", "nested_agents_signals", "pytest"}
+OTHERS = {"jinja2", "nested_agents_signals", "pytest", "stable_baselines3"}
 OWN = {"research", "grade", "labs", "questions"}
 """Modules of the folder itself."""
 

@@ -152,8 +152,8 @@ def test_a_learner_of_another_library_is_entered(
 ) -> None:
     pytest.importorskip("stable_baselines3")
     path = tmp_path / "ppo.json"
-    script = ROOT / "examples" / "benchmark_ppo.py"
-    subprocess.run([sys.executable, script, path, "64"], check=True, timeout=280)
+    command = [sys.executable, "-m", "research.push_n_ppo", path, "64"]
+    subprocess.run(command, cwd=ROOT, check=True, timeout=280)
     assert main(["push_n", "check", str(path)]) == 0
     assert "PPO of examples, 2 robots x 5 seeds" in capsys.readouterr().out
     assert push_n.load_entry(path).teams[0].decisions == (64,) * 5

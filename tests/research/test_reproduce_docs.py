@@ -32,6 +32,8 @@ def row(request: pytest.FixtureRequest) -> tuple[Path, published.Published, str,
 
 def test_the_spec_gives_the_table(row: tuple[Path, published.Published, str, str, str]) -> None:
     _, rows, spec, trials, minutes = row
+    if "swimmer" in spec:
+        pytest.importorskip("mujoco", reason="extra [mujoco]")
     source = Spec.load(ROOT / spec)
     assert source.study == rows.outline.study
     table = source.table()
@@ -56,4 +58,5 @@ def test_every_committed_file_is_of_this_version_and_has_a_table(
     assert main(["table", str(path), "--format", "markdown"]) == 0
     out, err = capsys.readouterr()
     assert out.count("\n") > 2
-    assert err == ""
+    told = [line for line in err.splitlines() if not line.endswith("is trusted from now on")]
+    assert told == []

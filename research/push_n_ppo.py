@@ -1,10 +1,7 @@
-"""
-Enter a learner of another library in push-n
-============================================
+"""Entry of PPO by stable-baselines3 in push-n: ``python -m research.push_n_ppo FILE DECISIONS``.
 
-Stable-baselines3's PPO learns in the Gymnasium environment, is evaluated in the worlds of the
-benchmark, and its entry is written. Needs ``pip install stable-baselines3``. Then ``python
-benchmark_ppo.py ppo.json 20000``, and ``python -m research.push_n table ppo.json``.
+It learns in the Gymnasium environment and is evaluated in the worlds of the benchmark. Needs ``pip
+install stable-baselines3``. ``python -m research.push_n table FILE`` compares the entry.
 """
 
 import sys
@@ -12,7 +9,7 @@ from pathlib import Path
 
 from stable_baselines3 import PPO
 
-from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
+from nested_agents.boxes import BoxPushingEnv
 from research.push_n import LEAST_SEEDS, STEPS, Entry, TeamScores, evaluate
 
 PATH, DECISIONS, ROBOTS = Path(sys.argv[1]), int(sys.argv[2]), 2
