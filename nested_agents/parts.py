@@ -7,7 +7,6 @@ from .core.coordination.graphs import Elimination, MaxPlus, Scope
 from .core.interface.experience import Experience
 from .core.interface.prediction import EmbodiedPrediction
 from .core.learners import LEARNERS
-from .scenarios.matrix_games.plays import whole_episode
 
 __all__ = [
     "LEARNERS",
@@ -21,5 +20,4 @@ __all__ = [
     "Scope",
     "SelfModelSettings",
     "below_counts",
-    "whole_episode",
 ]

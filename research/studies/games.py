@@ -14,7 +14,6 @@ from textwrap import wrap
 
 from nested_agents import Analysis, Session, Study, Summary, rate
 from nested_agents.analysis import Case, Figures, Results, distinct, format_number, system_of
-from nested_agents.parts import whole_episode
 from nested_agents.study import Trial, TrialResult
 from nested_agents.study import check_evaluated as check
 
@@ -32,7 +31,7 @@ COLUMNS = 3
 
 def measure(trial: Trial) -> TrialResult:
     """Train, and evaluate after the first and the last episode; imported by name in workers."""
-    session = Session(trial, whole_episode)
+    session = Session(trial)
     session.train(1)
     with session.team.drawing_apart():
         session.evaluate(phase=AFTER_ONE)

@@ -53,7 +53,9 @@ def test_what_losing_messages_costs_is_paired_by_seed() -> None:
     lines = faults.fault_costs(pd.concat([rows_of(), lost]))
     assert len(lines) == 2
     assert all(float(one.difference.value) == pytest.approx(-0.22) for one in lines)
-    assert str(lines[0]).startswith("line_up, chain, batch-td, 64 agents, lost 0.3: success -0.22 [")
+    assert str(lines[0]).startswith(
+        "line_up, chain, batch-td, 64 agents, lost 0.3: success -0.22 ["
+    )
 
 
 def test_rows_of_two_studies_are_not_taken_for_one() -> None:
