@@ -257,7 +257,7 @@ def exceptions(tried: Iterable[Combination]) -> Iterator[str]:
     cases: dict[tuple[str, str, str, str], list[str]] = {}
     for axis, case, learner, (verdict, sentence) in tried:
         if verdict != "yes":
-own = f"learner.kind = {learner!r}"
+            own = f"learner.kind = {learner!r}"
             reason = sentence.removeprefix(f"{own}: ").replace(own, "learner.kind = ...")
             cases.setdefault((axis, verdict, reason, learner), []).append(case)
     learners: dict[tuple[str, str, str, str], list[str]] = {}
