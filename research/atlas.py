@@ -35,7 +35,7 @@ def print_predictions(frame: pd.DataFrame) -> None:
     for title, (own, most) in groups.items():
         if own.empty:
             continue
-        print_text("", f"{title}: teams larger than {most} in 90 % intervals")
+        print_text("", f"{title}: teams larger than {most} in 90% intervals")
         print_lines(coverage(checks(own, most)))
 
 
