@@ -6,7 +6,7 @@ A study's `analyse` and programs that read kept or published results are written
 
 from .core.interface.measures import RETURN, SUCCESS
 from .studies.catalogue.ablation import compared_with_first as compare_with_first
-from .studies.catalogue.experience import AFTER, CPU, evaluated_after
+from .studies.catalogue.experience import AFTER, evaluated_after
 from .studies.catalogue.hierarchies import analysis_of as compare_hierarchies
 from .studies.catalogue.hierarchies import estimates as estimates_of_hierarchy
 from .studies.catalogue.hierarchies.cases import HierarchyCase
@@ -35,7 +35,7 @@ from .studies.results.analysis import (
 from .studies.results.contrasts import Group, contrasts
 from .studies.results.notation import format_estimate, format_number, format_p, wrapped
 from .studies.results.power import deviation_of, power_lines
-from .studies.results.results import NOTHING, Results, Sizes
+from .studies.results.results import CPU, NOTHING, Results, Sizes
 from .studies.results.statistics import (
     LEVEL,
     NOT_NEGATIVE,
