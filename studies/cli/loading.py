@@ -124,6 +124,7 @@ def untrusted(source: Path) -> dict[str, str]:
 def _untrusted(source: Path, files: Mapping[str, str], tables: object) -> dict[str, str]:
     """Return untrusted files, and untrusted modules that tables and files of hierarchies name."""
     texts = {f"{n}, which came with {source},": t for n, t in files.items() if n.endswith(".py")}
+
     contents: list[object] = []
     with Sources(None, files).active():
         for name in filter(is_file, files):
