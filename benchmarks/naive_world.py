@@ -14,10 +14,10 @@ import Box2D
 import numpy as np
 
 from nested_agents.core.numerics import FloatArray
+from nested_agents.scenarios.box_pushing.world.boxes import UNIT
 from nested_agents.scenarios.box_pushing.world.world import (
     POSITION_ITERATIONS,
     SUBSTEPS,
-    UNIT,
     VELOCITY_ITERATIONS,
     World,
     WorldState,

@@ -21,12 +21,12 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from ..core.interface.environments import Transitions
 from ..core.interface.measures import SUCCESS, Measure
 from ..core.interface.prediction import Blocks, Prediction, Tables
 from ..core.interface.scenario import Scenario, Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
-from ..core.interface.stacked import StackedWorlds
-from ..core.interface.worlds import Transitions
+from ..core.interface.stacked import StackedEnvironments
 from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 
@@ -128,9 +128,9 @@ class LineUp(Scenario):
         """Return this scenario: its predictions are exact."""
         return self
 
-    def worlds(self, count: int) -> LineUpWorlds:
-        """Return many such worlds, stepped in one call."""
-        return LineUpWorlds(self, count)
+    def environments(self, count: int) -> LineUpEnvironments:
+        """Return many environments, stepped in one call."""
+        return LineUpEnvironments(self, count)
 
     def _commanded(self, joint_actions: IntArray) -> FloatArray:
         return commanded(self._commands, joint_actions, self.action_set)
@@ -139,20 +139,20 @@ class LineUp(Scenario):
         return observe(self._places)
 
 
-class LineUpWorlds(StackedWorlds[LineUp]):
-    """Many worlds of carts."""
+class LineUpEnvironments(StackedEnvironments[LineUp]):
+    """Many environments of carts."""
 
-    def stack(self, world: LineUp, count: int) -> None:
-        """Make room."""
-        self._places: FloatArray = np.zeros((count, len(world.agents)))
+    def allocate(self, scenario: LineUp, count: int) -> None:
+        """Allocate the state of all environments."""
+        self._places: FloatArray = np.zeros((count, len(scenario.agents)))
         self._speeds: FloatArray = np.zeros_like(self._places)
         self._commands: FloatArray = np.zeros_like(self._places)
 
-    def take(self, place: int, world: LineUp) -> None:
-        """Put the carts in their places, at rest."""
-        self._places[place] = world._places
-        self._speeds[place] = 0.0
-        self._commands[place] = 0.0
+    def store(self, index: int, scenario: LineUp) -> None:
+        """Copy the carts, at rest, into an environment."""
+        self._places[index] = scenario._places
+        self._speeds[index] = 0.0
+        self._commands[index] = 0.0
 
     def step(self, joint_actions: IntArray) -> Transitions:
         """Carry out joint actions ``(W, n)`` for one period."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nested_agents as na
-from nested_agents.results import ROWS
+from nested_agents.research import ROWS
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions

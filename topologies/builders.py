@@ -314,15 +314,16 @@ def from_edges(
     Raises
     ------
     ValueError
-        If an edge occurs twice, or an agent is in no edge and not in `alone`. It is named.
+        If an edge occurs twice, or an agent is neither in an edge nor in `alone`, or in both.
 
     Examples
     --------
     >>> list(from_edges(["a", "b", "c"], edges=(("a", "b"),), alone=("c",)).edges)
     [('a', 'b')]
     """
-    graph = with_edges(independent(alone), edges)
-    check_names(list(graph), agents, "edges and alone")
+    graph = with_edges(independent([]), edges)
+    check_names([*graph, *alone], agents, "edges and alone")
+    graph.add_nodes_from(alone)
     return graph
 
 

@@ -15,11 +15,11 @@ from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.messages import Messages
 from ..hierarchy.turns import Slot, Turn, slots_of
 from ..interface.agents import Agents, Counts, Memory, Placement, under
+from ..interface.environments import Transitions
 from ..interface.experience import Decision, Experience, Observation
 from ..interface.measures import Measure
 from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
-from ..interface.worlds import Transitions
 from ..numerics import AnyArray, BoolArray, IntArray
 from ..plugins.settings import Settings
 from ..plugins.words import expect
@@ -209,9 +209,9 @@ class Team:
 
     def _walk(self, seen: Observation, inputs: tuple[object, ...]) -> IntArray:
         """Let the agents decide, turn by turn; each is told what those above it have decided."""
-        worlds = seen.present.shape[:-2]
-        joint = np.full((*worlds, len(self.hierarchy)), self.action_set.neutral)
-        decided = joint.T  # a view with the agents first, however many worlds there are
+        batch_shape = seen.present.shape[:-2]
+        joint = np.full((*batch_shape, len(self.hierarchy)), self.action_set.neutral)
+        decided = joint.T  # a view with the agents first, however many environments there are
         fail = bool(self.messages.failures)
         gone = self.messages.gone
         some_left = fail and bool(gone.any())
@@ -269,10 +269,10 @@ class Team:
         for part, inputs in zip(self.parts, experience.decision.inputs, strict=True):
             part.learn(experience, inputs)
 
-    def learn_in_worlds(self, decision: Decision, steps: Transitions, last: BoolArray) -> None:
-        """Learn from what a decision led to in many worlds, of which some episodes end."""
+    def learn_batch(self, decision: Decision, steps: Transitions, last: BoolArray) -> None:
+        """Learn from one step of many environments; `last` says which episodes end."""
         for part, inputs in zip(self.parts, decision.inputs, strict=True):
-            part.learn_in_worlds(decision.joint_action, inputs, steps, last)
+            part.learn_batch(decision.joint_action, inputs, steps, last)
 
     def continue_from(self, former: Team) -> None:
         """Begin where the team of another scenario or hierarchy ended, between two episodes.

@@ -19,10 +19,10 @@ import numpy as np
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.turns import Turn
 from ..numerics import AnyArray, BoolArray, IntArray
+from .environments import Transitions
 from .experience import Experience, Observation
 from .measures import Measure
 from .scenario import Scenario
-from .worlds import Transitions
 
 I = TypeVar("I")  # noqa: E741 - the inputs of a kind of agents
 Memory = dict[str, AnyArray]
@@ -83,8 +83,8 @@ class Agents(ABC, Generic[I]):
     at_once: ClassVar[bool] = False
     """Whether members who have been told all that they will be decide in one call; if not, one
     after the other."""
-    many_worlds: ClassVar[bool] = False
-    """Whether they decide in many worlds at once, ``(W, n, d)``."""
+    is_vectorized: ClassVar[bool] = False
+    """Whether they can act and learn in many environments at once, ``(E, n, d)``."""
     is_sampled: bool = False
     """Whether their policy is one of probabilities, so that sampled actions are evaluated, too."""
     rng: np.random.Generator
@@ -161,23 +161,21 @@ class Agents(ABC, Generic[I]):
     def learn(self, experience: Experience, inputs: I) -> None:
         """Learn from what a decision led to; of the `last` one of an episode, all of it."""
 
-    def learn_in_worlds(
-        self, joint: IntArray, inputs: I, steps: Transitions, last: BoolArray
-    ) -> None:
-        """Learn from what a decision led to in many worlds at once, if they can.
+    def learn_batch(self, joint: IntArray, inputs: I, steps: Transitions, last: BoolArray) -> None:
+        """Learn from one step of many environments; only vectorized agents can.
 
         Parameters
         ----------
         joint
-            ``(W, n)`` what was decided.
+            ``(E, n)`` joint actions.
         inputs
-            What it was decided by.
+            Inputs of the decision.
         steps
-            What it led to.
+            Result of the step.
         last
-            ``(W,)`` whether an episode ends with it.
+            ``(E,)`` whether an episode ends with this step.
         """
-        raise NotImplementedError(f"{type(self).__name__} learns in one world")
+        raise NotImplementedError(f"{type(self).__name__} learns in one environment")
 
     @abstractmethod
     def memory(self) -> Memory:

@@ -1,7 +1,8 @@
 """What those who act are told, decide and experience: values that are handed on.
 
-Arrays of one world are ``(n, d)`` and ``(n,)``. Where several worlds are stepped at once, their
-axis stands first: ``(W, n, d)`` and ``(W, n)``, see `nested_agents.core.interface.worlds`.
+Arrays of one environment are ``(n, d)`` and ``(n,)``. Where several environments are stepped
+together, their axis stands first: ``(E, n, d)`` and ``(E, n)``, see
+`nested_agents.core.interface.environments`.
 """
 
 from __future__ import annotations

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..numerics import BoolArray, FloatArray, IntArray
+from .environments import Environments
 from .measures import Measure
 from .prediction import EmbodiedPrediction, Prediction
 from .spaces import ActionSet, StateSpace
-from .worlds import Worlds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -194,8 +194,8 @@ class Scenario(ABC):
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out a joint action ``(n,)`` for one decision period."""
 
-    def worlds(self, count: int) -> Worlds | None:
-        """Return many worlds of the same settings, stepped in one call; None: it has no such."""
+    def environments(self, count: int) -> Environments | None:
+        """Return many environments of equal settings, stepped in one call; None: not supported."""
         return None
 
     @property

@@ -1,4 +1,4 @@
-"""Worlds of scenarios: stacked and stepped in one call, or looped over."""
+"""Implementations of `Environments`: stacked and stepped in one call, or looped over."""
 
 from __future__ import annotations
 
@@ -9,64 +9,65 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from ..numerics import FloatArray, IntArray
+from .environments import Environments, Transitions
 from .scenario import Scenario
-from .worlds import Transitions, Worlds
 
 S = TypeVar("S", bound=Scenario)
 
 
-class StackedWorlds(Worlds, Generic[S]):
-    """Worlds whose states are stacked, and stepped in one call.
+class StackedEnvironments(Environments, Generic[S]):
+    """Environments whose states are stacked and stepped in one call.
 
-    An episode is begun by the scenario itself, world by world: the same seed is the same world.
+    One scenario starts the episodes of all environments, one after the other, so that equal seeds
+    give equal episodes however many environments there are.
 
     Parameters
     ----------
     scenario
-        What all of them are; it is modified.
+        Scenario of all environments; it is modified.
     count
-        How many.
+        Number of environments.
     """
 
     def __init__(self, scenario: S, count: int) -> None:
         self.scenario = scenario
         self.count = count
-        self.stack(scenario, count)
+        self.allocate(scenario, count)
 
     @abstractmethod
-    def stack(self, world: S, count: int) -> None:
-        """Make room for what `count` worlds are in."""
+    def allocate(self, scenario: S, count: int) -> None:
+        """Allocate the state of `count` environments."""
 
     @abstractmethod
-    def take(self, place: int, world: S) -> None:
-        """Put what a world has begun with in its place."""
+    def store(self, index: int, scenario: S) -> None:
+        """Copy the initial state of a scenario into the environment with this index."""
 
     def begin(
-        self, places: Sequence[int], seeds: Sequence[np.random.SeedSequence], first_episode: int
+        self, indices: Sequence[int], seeds: Sequence[np.random.SeedSequence], first_episode: int
     ) -> FloatArray:
-        """Start an episode in some worlds."""
+        """Start an episode in some environments."""
         states = []
-        for k, (place, seed) in enumerate(zip(places, seeds, strict=True)):
+        for k, (index, seed) in enumerate(zip(indices, seeds, strict=True)):
             states.append(self.scenario.reset(seed, first_episode + k))
-            self.take(place, self.scenario)
+            self.store(index, self.scenario)
         return np.stack(states)
 
 
-class LoopedWorlds(Worlds):
-    """Worlds that are stepped one after the other.
+class LoopedEnvironments(Environments):
+    """Environments that are stepped one after the other.
 
     Parameters
     ----------
     instances
-        Scenarios of the same settings, one for each world.
+        Scenarios of equal settings, one for each environment.
 
     Examples
     --------
     >>> from nested_agents.scenarios.line_up import LineUpSettings
-    >>> worlds = LoopedWorlds([LineUpSettings(carts=2).build() for _ in range(3)])
-    >>> worlds.begin(range(3), np.random.SeedSequence(0).spawn(3), 0).shape
+    >>> environments = LoopedEnvironments([LineUpSettings(carts=2).build() for _ in range(3)])
+    >>> environments.begin(range(3), np.random.SeedSequence(0).spawn(3), 0).shape
     (3, 2, 2)
-    >>> worlds.step(np.zeros((3, 2), dtype=int)).rewards.shape
+    >>> environments.step(np.zeros((3, 2), dtype=int)).rewards.shape
     (3, 2)
     """
 
@@ -75,20 +76,20 @@ class LoopedWorlds(Worlds):
         self.count = len(instances)
 
     def begin(
-        self, places: Sequence[int], seeds: Sequence[np.random.SeedSequence], first_episode: int
+        self, indices: Sequence[int], seeds: Sequence[np.random.SeedSequence], first_episode: int
     ) -> FloatArray:
-        """Start an episode in some worlds."""
-        begun = enumerate(zip(places, seeds, strict=True), first_episode)
-        return np.stack([self.instances[place].reset(seed, k) for k, (place, seed) in begun])
+        """Start an episode in some environments."""
+        episodes = enumerate(zip(indices, seeds, strict=True), first_episode)
+        return np.stack([self.instances[index].reset(seed, k) for k, (index, seed) in episodes])
 
     def step(self, joint_actions: IntArray) -> Transitions:
-        """Carry out joint actions, world by world."""
-        worlds = zip(self.instances, joint_actions, strict=True)
-        each = [world.step(joint) for world, joint in worlds]
+        """Carry out joint actions, one environment after the other."""
+        pairs = zip(self.instances, joint_actions, strict=True)
+        transitions = [instance.step(joint_action) for instance, joint_action in pairs]
         n = joint_actions.shape[1]
         return Transitions(
-            states=np.stack([transition.states for transition in each]),
-            rewards=np.stack([np.broadcast_to(transition.reward, n) for transition in each]),
-            terminated=np.array([transition.terminated for transition in each]),
-            truncated=np.array([transition.truncated for transition in each]),
+            states=np.stack([transition.states for transition in transitions]),
+            rewards=np.stack([np.broadcast_to(t.reward, n) for t in transitions]),
+            terminated=np.array([transition.terminated for transition in transitions]),
+            truncated=np.array([transition.truncated for transition in transitions]),
         )

@@ -161,8 +161,8 @@ class TeamSettings(PartSettings):
         return [MembersOf(np.arange(len(hierarchy)), self)]
 
     @property
-    def at_once(self) -> int:
-        """In how many worlds it learns at once."""
+    def n_environments(self) -> int:
+        """Number of environments in which it learns at once."""
         return 1
 
     @property

@@ -6,7 +6,7 @@ Networks begin orthogonal, and values may be normalised by the moments of return
 (2022) advise. The clipped loss of a minibatch of m transitions with advantages a, made to have mean
 0 and deviation 1, ratios r of probabilities, entropies H, values v and returns g is::
 
-    -mean(min(r a, clip(r, 1 - c, 1 + c) a)) - e mean(H) + .5 mean((v - g)^2)
+    -mean(min(r a, clip(r, 1 - c, 1 + c) a)) - e mean(H) + 0.5 mean((v - g)^2)
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 
 from ..hierarchy.turns import Turn
 from ..interface.agents import Memory, Placement, under
+from ..interface.environments import Transitions
 from ..interface.experience import Observation
-from ..interface.worlds import Transitions
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from .acting import InputNames, Policies, PolicyInputs, SharedPolicy
 from .perceptron import Adam, Perceptron, RunningMoments
@@ -354,14 +354,14 @@ class ManyWorldsPPO(Policies):
         If messages may fail, or some agents are neighbours; one line.
     """
 
-    many_worlds = True
+    is_vectorized = True
     policies: Mapping[str, NetworkPolicy]
 
     def __init__(self, settings: MultiAgentPPOSettings, placement: Placement) -> None:
         if placement.messages_fail:
             raise ValueError(
-                f"learner.worlds = {settings.worlds}: messages may fail in one world only, use "
-                "learner.worlds = 1 or no topology.failures"
+                f"learner.environments = {settings.environments}: messages may "
+                "fail in one environment only, use learner.environments = 1 or no topology.failures"
             )
         self._own_settings = settings
         super().__init__(settings, placement)
@@ -405,7 +405,7 @@ class ManyWorldsPPO(Policies):
             chosen[:, places] = (logits + inputs.noise[:, agents]).argmax(axis=2)
         return chosen.reshape(*inputs.present.shape[:-2], -1)
 
-    def learn_in_worlds(
+    def learn_batch(
         self, joint: IntArray, inputs: PolicyInputs, steps: Transitions, last: BoolArray
     ) -> None:
         """Keep the decision, and update the policies whose rollouts are full."""

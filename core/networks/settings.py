@@ -91,7 +91,7 @@ class MultiAgentPPOSettings(PolicyGradientSettings):
     """What the settings of PPO with a policy for every agent share."""
 
     kind_of_agents = f"{CORE}.networks.policies:HierarchyPPO"
-    _without_extra = "; learner.worlds = 16 in study = 'experience' does without"
+    _without_extra = "; learner.environments = 16 in study = 'experience' does without"
     weights: Annotated[Literal["all", "role", "own"], unwritten("all")] = "all"
     """Whether all agents share the weights of one policy and one critic, those of a role do, or
     every agent has its own."""
@@ -101,9 +101,9 @@ class MultiAgentPPOSettings(PolicyGradientSettings):
     """Whether critics see all states beside the agent's own, or that alone."""
     value_of: Annotated[Literal["own", "team"], unwritten("own")] = "own"
     """Whether an agent's reward is its own, or the mean of all agents'."""
-    worlds: Annotated[int, Field(ge=1, le=4096), unwritten(1)] = 1
-    """Worlds that are stepped at once: from 2 on the networks are in NumPy and need no extra, and
-    `rollout` counts decisions of every world. The keys below are theirs."""
+    environments: Annotated[int, Field(ge=1, le=4096), unwritten(1)] = 1
+    """Environments that are stepped at once: from 2 on the networks are in NumPy and need no
+    extra, and `rollout` counts decisions of every world. The keys below are theirs."""
     normalised: Annotated[Literal["rewards", "values"], unwritten("rewards")] = "rewards"
     """What is divided by the deviation of returns so far: rewards, or what critics learn."""
     learning_rate_decisions: Annotated[Count | None, unwritten(None)] = None
@@ -112,22 +112,22 @@ class MultiAgentPPOSettings(PolicyGradientSettings):
     """The same of `entropy`."""
 
     @property
-    def at_once(self) -> int:
+    def n_environments(self) -> int:
         """In how many worlds it learns at once."""
-        return self.worlds
+        return self.environments
 
     @model_validator(mode="after")
     def _of_many_worlds(self) -> Self:
         keys = ("normalised", "learning_rate_decisions", "entropy_decisions")
         changed = self.model_dump(include=set(keys))
-        if self.worlds == 1 and changed:
+        if self.environments == 1 and changed:
             name, value = next(iter(changed.items()))
-            raise ValueError(f"{name} = {value!r}: needs worlds, 2 or more")
+            raise ValueError(f"{name} = {value!r}: needs environments, 2 or more")
         return self
 
     def agents(self, placement: Placement) -> Agents[Any]:
         """Return the agents that act in a scenario, in many worlds by NumPy alone."""
-        if self.worlds == 1:
+        if self.environments == 1:
             return super().agents(placement)
         return resolve_name(f"{CORE}.networks.many_worlds:ManyWorldsPPO")(self, placement)
 

@@ -28,6 +28,7 @@ from ...core.hierarchy.failures import MessageFailure
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.hierarchy.messages import Messages
 from ...core.numerics import FloatArray, IntArray
+from .simulators import flags_by_agent
 
 
 class PassingDownEnv(parallel_to_aec_wrapper):
@@ -71,6 +72,9 @@ class PassingDownEnv(parallel_to_aec_wrapper):
     >>> env.agent_selection, env.observe("robot1.right")[-8:].tolist()
     ('robot1.right', [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     """
+
+    terminations: Any
+    truncations: Any
 
     def __init__(
         self,
@@ -134,6 +138,8 @@ class PassingDownEnv(parallel_to_aec_wrapper):
         if self._messages.failures:  # PettingZoo calls this when the world has gone on
             self._messages.advance(self._joint())
         self._begin_step()
+        self.terminations = flags_by_agent(self.terminations, self.agents)
+        self.truncations = flags_by_agent(self.truncations, self.agents)
         return super()._deads_step_first()
 
     def observe(self, agent: str) -> FloatArray:

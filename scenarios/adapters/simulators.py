@@ -3,7 +3,7 @@
 A player acts and observes: the one of Gymnasium, an agent of PettingZoo. Its identity may be of any
 type that a table can have as a key. Who has left an episode before its end observes what it last
 observed, and is paid nothing. An episode ends when each of those who act has terminated or has been
-truncated.
+truncated, or the key `ALL` of terminations or truncations says so.
 
 What an environment returns is checked here once, step by step, so that nothing is read where it is
 not: who must observe does, a reward is one finite number, an ending is true or false.
@@ -35,6 +35,10 @@ TABLES = ("observations", "rewards", "terminations", "truncations", "infos")
 """What a step of a parallel environment returns, in order, each by player."""
 MASKS = ("action_mask", "action_masks", "avail_actions", "available_actions", "legal_moves")
 """Keys under which environments say which actions are legal."""
+
+
+ALL = "__all__"
+"""Key of terminations and truncations that stands for all agents, a convention of RLlib."""
 
 
 @dataclass(frozen=True)
@@ -195,6 +199,10 @@ class ParallelSimulator(Simulator):
         observed = tables["observations"]
         self._check_known(observed)
         _refuse_masks(tables["infos"])
+        for name in ("terminations", "truncations"):
+            tables[name] = flags_by_agent(tables[name], set(self.players) - self._ended)
+        for name in ("rewards", "terminations", "truncations"):
+            self._check_known(tables[name], f" in {name}")
         asked = [player for player in acting if player not in self._ended]
         self._check_told(asked, tables, ("rewards", "terminations", "truncations"))
         self._terminated |= self._flagged("terminated", tables["terminations"])
@@ -214,10 +222,10 @@ class ParallelSimulator(Simulator):
         is_cut = is_over and not has_terminated
         return Played(self._observed, paid, has_terminated, is_cut, self._step)
 
-    def _check_known(self, players: Iterable[Player]) -> None:
+    def _check_known(self, players: Iterable[Player], where: str = "") -> None:
         for player in players:
             if player not in self.observation_spaces:
-                raise ValueError(f"{player!r} {at(self._step)} is none of possible_agents")
+                raise ValueError(f"{player!r}{where} {at(self._step)} is none of possible_agents")
 
     def _check_told(
         self,
@@ -242,6 +250,29 @@ class ParallelSimulator(Simulator):
 
     def _of(self, what: str, player: Player) -> str:
         return f"{of_player(what, player)} {at(self._step)}"
+
+
+def flags_by_agent(flags: Mapping[Player, object], agents: Iterable[Player]) -> dict[Player, Any]:
+    """Return terminations or truncations by agent, without the key `ALL`.
+
+    Parameters
+    ----------
+    flags
+        By agent. `ALL` may stand beside them, or alone: if it is true, it overrides the flags of
+        all `agents`; if it is false, the agents without a flag go on.
+    agents
+        Those who have not ended before.
+
+    Examples
+    --------
+    >>> flags_by_agent({"a": False, "__all__": True}, ["a", "b"])
+    {'a': True, 'b': True}
+    """
+    own = dict(flags)
+    if ALL not in own or ALL in (agents := list(agents)):
+        return own
+    everyone = dict.fromkeys(agents, own.pop(ALL))
+    return own | everyone if _flag(flags[ALL], ALL) else everyone | own
 
 
 class TurnsAtOnce(aec_to_parallel_wrapper[Any, Any, Any]):

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...core.interface.environments import Transitions
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
-from ...core.interface.stacked import StackedWorlds
-from ...core.interface.worlds import Transitions
+from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
@@ -199,13 +199,13 @@ class BoxPushing(Scenario, Embodiment):
         truncated = not terminated and away > self.farthest
         return Transition(states, received, terminated, truncated, measured, twists)
 
-    def worlds(self, count: int) -> BoxWorlds | None:
+    def environments(self, count: int) -> BoxEnvironments | None:
         """Return many such worlds in one call; None where something fails, is noisy or a user's."""
         settings = self.settings
         is_noisy = settings.failures or settings.infrared.noise or self._playground is not None
         if is_noisy or not self.space.is_built_in or step_address() is None:
             return None
-        return BoxWorlds(self, count)
+        return BoxEnvironments(self, count)
 
     def embodiment(self) -> Embodiment:
         """Return itself: its robots are open to self-models."""
@@ -345,7 +345,7 @@ class BoxPushing(Scenario, Embodiment):
         return states.reshape(*speeds.shape, -1)
 
 
-class BoxWorlds(StackedWorlds[BoxPushing]):
+class BoxEnvironments(StackedEnvironments[BoxPushing]):
     """Many worlds of as many robots, without failures and without noise of sensors.
 
     Their physics is one compiled call. What each has is, bit by bit, what it has by itself.
@@ -354,27 +354,27 @@ class BoxWorlds(StackedWorlds[BoxPushing]):
     that in which the scenario has begun the episode.
     """
 
-    def stack(self, world: BoxPushing, count: int) -> None:
-        """Make room."""
-        one = world.world
+    def allocate(self, scenario: BoxPushing, count: int) -> None:
+        """Allocate the state of all environments."""
+        one = scenario.world
         n_robots = len(one.robots)
         self._worlds = [World(one.robots, one.box, infrared=one.sensor) for _ in range(count)]
         self._addresses: IntArray = np.zeros((count, n_robots + 2), dtype=np.int64)
         self._last: FloatArray = np.zeros((count, n_robots, 3))
         self._wrenches: FloatArray = np.zeros((count, n_robots, 3))
-        self._speeds: FloatArray = np.zeros((count, len(world.agents)))
+        self._speeds: FloatArray = np.zeros((count, len(scenario.agents)))
         self._boxes: FloatArray = np.zeros((count, 3))
 
-    def take(self, place: int, world: BoxPushing) -> None:
-        """Keep the world that has begun in a place; the scenario has the former one of it."""
-        begun = world.world
-        world.world = self._worlds[place]
-        self._worlds[place] = begun
-        self._addresses[place] = begun.addresses
-        self._last[place] = 0.0
-        self._wrenches[place] = 0.0
-        self._speeds[place] = 0.0
-        self._boxes[place] = begun.box_pose
+    def store(self, index: int, scenario: BoxPushing) -> None:
+        """Swap the world of the scenario, whose episode starts, with that of an environment."""
+        begun = scenario.world
+        scenario.world = self._worlds[index]
+        self._worlds[index] = begun
+        self._addresses[index] = begun.addresses
+        self._last[index] = 0.0
+        self._wrenches[index] = 0.0
+        self._speeds[index] = 0.0
+        self._boxes[index] = begun.box_pose
 
     def step(self, joint_actions: IntArray) -> Transitions:
         """Command the wheels of all worlds for one decision period, observe and reward."""

@@ -16,12 +16,12 @@ from time import perf_counter
 import numpy as np
 
 from ...core.evaluators.best_response import RespondingPrediction, Responses, Search
+from ...core.interface.environments import Transitions
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import EmbodiedPrediction, first_alike
 from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
-from ...core.interface.stacked import StackedWorlds
-from ...core.interface.worlds import Transitions
+from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.words import expect
 from ...core.rules.rule_base import RuleBase
@@ -136,10 +136,10 @@ class KinematicChain(Scenario, Embodiment):
         measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
         return Transition(states, received, terminated, truncated, measured, twists)
 
-    def worlds(self, count: int) -> ChainWorlds | None:
+    def environments(self, count: int) -> ChainEnvironments | None:
         """Return many such arms, stepped in one call; None: some fail, or have other variables."""
         is_plain = self._states.is_compiled and not self.settings.failures
-        return ChainWorlds(self, count) if is_plain else None
+        return ChainEnvironments(self, count) if is_plain else None
 
     def embodiment(self) -> Embodiment:
         """Return itself: its joints are open to self-models."""
@@ -219,25 +219,25 @@ class KinematicChain(Scenario, Embodiment):
         return self._states.of_joints(view, 0, len(self.agents))[:, 0]
 
 
-class ChainWorlds(StackedWorlds[KinematicChain]):
+class ChainEnvironments(StackedEnvironments[KinematicChain]):
     """Many arms of as many joints, none of which fails."""
 
-    def stack(self, world: KinematicChain, count: int) -> None:
-        """Make room."""
-        n = len(world.agents)
+    def allocate(self, scenario: KinematicChain, count: int) -> None:
+        """Allocate the state of all environments."""
+        n = len(scenario.agents)
         self._angles: FloatArray = np.zeros((count, n))
         self._speeds: FloatArray = np.zeros((count, n))
         self._goals: FloatArray = np.zeros((count, 2))
         self._before: FloatArray = np.zeros(count)
         self._done = np.zeros(count, dtype=np.int64)
 
-    def take(self, place: int, world: KinematicChain) -> None:
-        """Put an arm and its goal in their place."""
-        self._angles[place] = world._angles
-        self._speeds[place] = 0.0
-        self._goals[place] = world._goal
-        self._before[place] = world._distance()
-        self._done[place] = 0
+    def store(self, index: int, scenario: KinematicChain) -> None:
+        """Copy an arm and its goal into an environment."""
+        self._angles[index] = scenario._angles
+        self._speeds[index] = 0.0
+        self._goals[index] = scenario._goal
+        self._before[index] = scenario._distance()
+        self._done[index] = 0
 
     def step(self, joint_actions: IntArray) -> Transitions:
         """Turn all joints of all arms for one decision period."""

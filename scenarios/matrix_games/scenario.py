@@ -34,12 +34,12 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
+from ...core.interface.environments import Transitions
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
-from ...core.interface.stacked import StackedWorlds
-from ...core.interface.worlds import Transitions
+from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.words import closest
@@ -234,9 +234,9 @@ class MatrixGame(Scenario, Prediction):
         """Return this game: its predictions are exact."""
         return self
 
-    def worlds(self, count: int) -> MatrixGameWorlds:
-        """Return many such worlds, played in one call."""
-        return MatrixGameWorlds(self, count)
+    def environments(self, count: int) -> MatrixGameEnvironments:
+        """Return many environments, stepped in one call."""
+        return MatrixGameEnvironments(self, count)
 
     def states_after(self, joint_actions: IntArray) -> FloatArray:
         """Return the states ``(..., n, d)`` of all agents after joint actions ``(..., n)``."""
@@ -251,19 +251,19 @@ class MatrixGame(Scenario, Prediction):
         return np.concatenate([played[..., None], above], axis=-1)
 
 
-class MatrixGameWorlds(StackedWorlds[MatrixGame]):
-    """Many worlds of one game."""
+class MatrixGameEnvironments(StackedEnvironments[MatrixGame]):
+    """Many environments of one game."""
 
-    def stack(self, world: MatrixGame, count: int) -> None:
-        """Make room."""
-        self._generators = [world.rng] * count
+    def allocate(self, scenario: MatrixGame, count: int) -> None:
+        """Allocate the state of all environments."""
+        self._generators = [scenario.rng] * count
 
-    def take(self, place: int, world: MatrixGame) -> None:
-        """Keep what draws the payoffs of a world."""
-        self._generators[place] = world.rng
+    def store(self, index: int, scenario: MatrixGame) -> None:
+        """Keep the generator that draws the payoffs of an environment."""
+        self._generators[index] = scenario.rng
 
     def step(self, joint_actions: IntArray) -> Transitions:
-        """Play once in every world."""
+        """Play once in every environment."""
         drawn = np.zeros(self.count, dtype=np.int64)
         if self.scenario.is_stochastic:
             drawn[:] = [generator.integers(0, 2) for generator in self._generators]

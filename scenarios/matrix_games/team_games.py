@@ -25,11 +25,11 @@ import numpy as np
 from pydantic import Field
 
 from ...core.coordination.graphs import Elimination, Shape, build_shape
+from ...core.interface.environments import Transitions
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ...core.interface.stacked import StackedWorlds
-from ...core.interface.worlds import Transitions
+from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings
 from .scenario import OF_OPTIMA
@@ -247,29 +247,29 @@ class TeamGame(Scenario):
         self.game.advance(self._rng)
         return Transition(self._states(), payoff, False, False, info)
 
-    def worlds(self, count: int) -> TeamGameWorlds:
-        """Return many such worlds, played in one call."""
-        return TeamGameWorlds(self, count)
+    def environments(self, count: int) -> TeamGameEnvironments:
+        """Return many environments, stepped in one call."""
+        return TeamGameEnvironments(self, count)
 
     def _states(self) -> FloatArray:
         return np.hstack([self.game.states, self._numbers])
 
 
-class TeamGameWorlds(StackedWorlds[TeamGame]):
-    """Many worlds of one game; all seeds that begin their episodes are of one trial."""
+class TeamGameEnvironments(StackedEnvironments[TeamGame]):
+    """Many environments of one game; all seeds that begin their episodes are of one trial."""
 
-    def stack(self, world: TeamGame, count: int) -> None:
-        """Make room."""
-        self._generators = [world._rng] * count
-        self._states = np.stack([world._states()] * count)
+    def allocate(self, scenario: TeamGame, count: int) -> None:
+        """Allocate the state of all environments."""
+        self._generators = [scenario._rng] * count
+        self._states = np.stack([scenario._states()] * count)
 
-    def take(self, place: int, world: TeamGame) -> None:
-        """Keep what draws the next plays of a world, and the first of them."""
-        self._generators[place] = world._rng
-        self._states[place] = world._states()
+    def store(self, index: int, scenario: TeamGame) -> None:
+        """Keep the generator of an environment and its first states."""
+        self._generators[index] = scenario._rng
+        self._states[index] = scenario._states()
 
     def step(self, joint_actions: IntArray) -> Transitions:
-        """Play once in every world."""
+        """Play once in every environment."""
         game = self.scenario.game
         payoffs = game.payoffs_of_worlds(self._states, joint_actions)
         if isinstance(game, Landmarks):

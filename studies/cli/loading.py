@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from ...core.plugins.sources import Sources, files_in
-from ...core.plugins.trust import LIBRARIES, is_trusted, module_text, modules_in
+from ...core.plugins.sources import Sources, files_in, is_file
+from ...core.plugins.trust import is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
+from ...topologies.files import read_file
 from ..presentation.progress import say
 from ..spec.outline import other_spec
 from ..store.database import DATABASE, SPEC_FILE
@@ -104,8 +105,13 @@ def untrusted(source: Path) -> dict[str, str]:
 
 
 def _untrusted(source: Path, files: Mapping[str, str], tables: object) -> dict[str, str]:
-    """Return what is not trusted of files, and of the modules that tables name."""
+    """Return untrusted files, and untrusted modules that tables and files of hierarchies name."""
     texts = {f"{n}, which came with {source},": t for n, t in files.items() if n.endswith(".py")}
-    modules = {m for m, _ in modules_in(tables) if m.partition(".")[0] not in LIBRARIES}
-    texts |= {f"{name}, which {source} names,": module_text(name) for name in modules}
+    contents: list[object] = []
+    with Sources(None, files).active():
+        for name in filter(is_file, files):
+            with suppress(ValueError):  # reported when the hierarchy is built
+                contents.append(read_file(name))
+    modules = {module for module, _ in modules_in([tables, contents])}
+    texts |= {f"{name}, which {source} names,": module_text(name) for name in sorted(modules)}
     return {title: text for title, text in texts.items() if not is_trusted(text)}

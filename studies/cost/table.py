@@ -24,7 +24,7 @@ from ...core.plugins.words import expect, expect_each, expect_within
 from ...topologies.view import align, format_count
 from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex
-from ..results.notation import bracketed
+from ..results.notation import format_estimate
 from ..results.statistics import Estimate
 from .cost import (
     ACTIONS,
@@ -251,7 +251,7 @@ def _measured_cells(row: CostRow) -> list[str]:
     step = row.measured.step
     ms = _amount(1e3 * float(step.value))
     if len(row.measured.repeats) > 1:
-        ms = bracketed(Estimate(*(1e3 * end for end in step)))
+        ms = format_estimate(Estimate(*(1e3 * end for end in step)))
     counts = joint, *astuple(row.measured.counted)
     return [*map(scientific, counts), ms, _amount(1e-6 * row.measured.memory)]
 

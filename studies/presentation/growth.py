@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import SpecError
-from ..results.laws import LOGIT, Law
+from ..results.laws import Law
 from ..results.results import Results
+from ..results.samples import LOGIT
 from ..results.scaling_law import ScalingLaw, scaling_law
 from . import figures
 
@@ -32,7 +33,7 @@ def growth_figures(results: Results) -> dict[str, Figure]:
 
 
 def draw_laws(analysis: ScalingLaw) -> Figure:
-    """Return the figure: seeds are points, lines laws, bands 90 % predictions of their mean.
+    """Return the figure: seeds are points, lines laws, bands 90% predictions of their mean.
 
     Sizes that were not run are left of the band's end beyond the dotted line.
     """
@@ -51,7 +52,7 @@ def draw_laws(analysis: ScalingLaw) -> Figure:
         else:
             figures.log_axis(axes)
         axes.axvline(sizes[-1], color="#888888", linewidth=0.8, ls=":")
-        figures.name_lines(figure, [group for group, _ in known], "bands: 90 % of new means")
+        figures.name_lines(figure, [group for group, _ in known], "bands: 90% of new means")
     axes.set_title(analysis.title, loc="left")
     axes.set_xlabel(analysis.size)
     return figure
@@ -60,7 +61,7 @@ def draw_laws(analysis: ScalingLaw) -> Figure:
 def _draw(figure: Figure, index: int, law: Law, last: float) -> None:
     (axes,) = figure.axes
     colour = figures.look(index)["color"]
-    measured = law.sample.scale.back(law.sample.values)
+    measured = law.sample.observed
     places = np.broadcast_to(law.sample.sizes, measured.shape)
     axes.scatter(places, measured, s=6, alpha=0.35, color=colour, linewidths=0)
     line = np.geomspace(law.sample.sizes[0], last, POINTS)

@@ -172,7 +172,7 @@ def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
 def _reached(results: Results) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode reached the goal, by condition, seed and number.
 
-    Of episodes in many worlds at once it is not known.
+    Of episodes in many environments at once it is not known.
     """
     training = results.episodes.query("phase == 'training'")
     success = training.set_index(["condition", "seed", "episode"])["success"]

@@ -24,13 +24,15 @@ enter the likelihood so (Tobin 1958); laws of them describe geometric means.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core.numerics import BoolArray, optimize, special
+from .curves import POWER, Curve
 from .drift import Drift, Mixture, drift
+from .samples import LOGIT, Sample, check_sizes
 from .statistics import Array, Estimate
 
 RESAMPLES = 400
@@ -41,8 +43,6 @@ MARGIN = 1.0
 """Difference of the log densities of held-out sizes that a law of more parameters needs."""
 FEWEST = 3
 """Minimum number of sizes of a law."""
-MIN_SIZE = 1.0
-"""Minimum size."""
 FLAT = 1e-9
 """Variance of seeds that counts as rounding."""
 MOST_FREEDOM = 1e6
@@ -51,313 +51,6 @@ MAX_LOG_DEVIATION = 30.0
 """Bound of the logarithm of a standard deviation in a search."""
 DRAWS = 4000
 """Draws of the rate of new seeds."""
-
-
-class Curve(NamedTuple):
-    """A family of curves in the logarithm of size."""
-
-    name: str
-    n_parameters: int
-    of: Callable[[Array, Array], Array]
-    """Values for parameters ``(k,)`` at ``x`` ``(m,)``."""
-    slopes: Callable[[Array, Array], Array]
-    """Derivatives by the parameters ``(m, k)`` at ``x``."""
-    begins: Callable[[Array, Array], list[Array]]
-    """Initial parameters of a fit to values ``(m,)`` at ``x``."""
-    exponents: Callable[[Array], dict[str, float]]
-    """Meaning of parameters ``(k,)`` by name."""
-    formula: Callable[[Array], str]
-    """The curve as a formula in n."""
-
-
-def _line(p: Array, x: Array) -> Array:
-    return p[0] + p[1] * x
-
-
-def _line_slopes(p: Array, x: Array) -> Array:
-    return np.stack([np.ones_like(x), x], axis=1)
-
-
-def _line_begins(x: Array, y: Array) -> list[Array]:
-    b, a = np.polyfit(x, y, 1).tolist()
-    return [np.array([a, b])]
-
-
-def _log_others(x: Array) -> Array:
-    """Return ``log(n - 1)``, minus infinity at n = 1."""
-    with np.errstate(divide="ignore"):
-        return np.log(np.expm1(x))
-
-
-def _quadratic(p: Array, x: Array) -> Array:
-    return p[0] + x + np.logaddexp(_log_others(x), p[1])
-
-
-def _quadratic_slopes(p: Array, x: Array) -> Array:
-    return np.stack([np.ones_like(x), special.expit(p[1] - _log_others(x))], axis=1)
-
-
-def _with_floor(p: Array, x: Array) -> Array:
-    return np.logaddexp(p[2], p[0] + p[1] * x)
-
-
-def _floor_slopes(p: Array, x: Array) -> Array:
-    share = special.expit(p[0] + p[1] * x - p[2])
-    return np.stack([share, share * x, 1.0 - share], axis=1)
-
-
-def _floor_begins(x: Array, y: Array) -> list[Array]:
-    a, b = _line_begins(x, y)[0]
-    steep = np.array([y[-1] - 2.0 * b * x[-1], 2.0 * b, y.min() - 0.1])
-    return [np.array([a, b, y.min() - 3.0]), steep]
-
-
-def _broken(p: Array, x: Array) -> Array:
-    return p[0] + p[1] * x + p[2] * np.maximum(0.0, x - p[3])
-
-
-def _broken_slopes(p: Array, x: Array) -> Array:
-    beyond = np.maximum(0.0, x - p[3])
-    return np.stack([np.ones_like(x), x, beyond, -p[2] * (x > p[3])], axis=1)
-
-
-def _broken_begins(x: Array, y: Array) -> list[Array]:
-    begins = []
-    for k in x[1:-1]:
-        terms = np.stack([np.ones_like(x), x, np.maximum(0.0, x - k)], axis=1)
-        begins.append(np.append(np.linalg.lstsq(terms, y, rcond=None)[0], k))
-    return begins
-
-
-def _power_of(a: float, b: float) -> str:
-    return f"{_digits(math.exp(a))} n^{_digits(b)}"
-
-
-def _digits(value: float) -> str:
-    """Return a number with the four digits with which a prediction can be recomputed."""
-    return f"{value:.4g}".replace("e+", "e")
-
-
-def _quadratic_formula(p: Array) -> str:
-    c = math.exp(p[1]) - 1.0
-    return f"{_digits(math.exp(p[0]))} n (n {'-' if c < 0.0 else '+'} {_digits(abs(c))})"
-
-
-def _break_formula(p: Array) -> str:
-    above = _power_of(p[0] - p[2] * p[3], p[1] + p[2])
-    return f"{_power_of(p[0], p[1])} up to n = {_digits(math.exp(p[3]))}, then {above}"
-
-
-POWER = Curve(
-    name="power law",
-    n_parameters=2,
-    of=_line,
-    slopes=_line_slopes,
-    begins=_line_begins,
-    exponents=lambda p: {"exponent": float(p[1])},
-    formula=lambda p: _power_of(*p.tolist()),
-)
-LOGISTIC = POWER._replace(name="logistic in log n")
-QUADRATIC = Curve(
-    name="linear to quadratic",
-    n_parameters=2,
-    of=_quadratic,
-    slopes=_quadratic_slopes,
-    begins=lambda x, y: [np.array([float((y - 2.0 * x).mean()), start]) for start in (0.0, 3.0)],
-    exponents=lambda p: {"c of n (n + c)": float(np.exp(p[1]) - 1.0)},
-    formula=_quadratic_formula,
-)
-FLOOR = Curve(
-    name="power law with a floor",
-    n_parameters=3,
-    of=_with_floor,
-    slopes=_floor_slopes,
-    begins=_floor_begins,
-    exponents=lambda p: {"exponent": float(p[1]), "floor": float(np.exp(p[2]))},
-    formula=lambda p: f"{_digits(math.exp(p[2]))} + {_power_of(p[0], p[1])}",
-)
-BREAK = Curve(
-    name="break point",
-    n_parameters=4,
-    of=_broken,
-    slopes=_broken_slopes,
-    begins=_broken_begins,
-    exponents=lambda p: {
-        "exponent below": float(p[1]),
-        "exponent above": float(p[1] + p[2]),
-        "break": float(np.exp(p[3])),
-    },
-    formula=_break_formula,
-)
-
-
-class Scale(NamedTuple):
-    """A scale on which means are fitted."""
-
-    quantity: str
-    """Name of the quantity whose logarithm is fitted."""
-    curves: tuple[Curve, ...]
-    """Laws, simple ones first."""
-    back: Callable[[Array], Array]
-    """Return means of fitted values."""
-    weight: Callable[[Array], Array]
-    """Return the inverse relative variance of a seed at fitted values."""
-
-
-def _certain(values: Array) -> Array:
-    return np.ones_like(values)
-
-
-def _binomial(logits: Array) -> Array:
-    """Return the inverse variance of a logit, relative to that of a rate of one half."""
-    return 4.0 * special.expit(logits) * special.expit(-logits)
-
-
-def _exp(values: Array) -> Array:
-    with np.errstate(over="ignore"):
-        return np.exp(values)
-
-
-LOG = Scale("mean", (POWER, QUADRATIC, FLOOR, BREAK), _exp, _certain)
-GEOMETRIC = LOG._replace(quantity="geometric mean")
-LOGIT = Scale("odds", (LOGISTIC, BREAK), special.expit, _binomial)
-DIFFERENCE = Scale("ratio", (LOGISTIC, BREAK), np.array, _certain)
-
-
-class Sample(NamedTuple):
-    """Measurements at several sizes with the same seeds."""
-
-    sizes: Array
-    """``(m,)`` in ascending order, 1 or more."""
-    values: Array
-    """``(n_seeds, m)`` linearized values on the scale, whose mean is fitted."""
-    observed: Array
-    """``(n_seeds, m)`` the values themselves."""
-    censored: BoolArray
-    """``(n_seeds, m)`` whether a value is only known to be larger."""
-    weights: Array
-    """``(m,)`` inverse relative variances of a seed."""
-    scale: Scale
-    min_noise: float = 0.0
-    """Minimum variance of a seed of weight 1, on the scale."""
-    bounds: tuple[float, float] = (-math.inf, math.inf)
-    """Minimum and maximum of a mean."""
-
-    def first(self, m: int) -> Sample:
-        """Return the sample of the m smallest sizes."""
-        return self._replace(
-            sizes=self.sizes[:m],
-            values=self.values[:, :m],
-            observed=self.observed[:, :m],
-            censored=self.censored[:, :m],
-            weights=self.weights[:m],
-        )
-
-    @property
-    def means(self) -> Array:
-        """Means over seeds ``(m,)`` as the table has them; geometric means of censored values."""
-        if self.scale is GEOMETRIC:
-            return _exp(self.values.mean(axis=0))
-        return np.asarray(self.observed.mean(axis=0))
-
-
-def check_sizes(sizes: Array) -> None:
-    """Refuse sizes that are not finite or below 1.
-
-    Raises
-    ------
-    ValueError
-        One line that names the first of them.
-    """
-    for size in np.atleast_1d(sizes).tolist():
-        if not MIN_SIZE <= size < math.inf:
-            raise ValueError(f"size = {size:g}, allowed: finite sizes of 1 or more")
-
-
-def of_numbers(
-    sizes: Array, values: Array, bounds: tuple[float, float] = (-math.inf, math.inf)
-) -> Sample:
-    """Return a sample of numbers ``(n_seeds, m)`` with positive means.
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite, a mean is not positive, or a size is below 1; one line.
-    """
-    means = _checked_means(sizes, values)
-    if not (means > 0.0).all():
-        size = sizes[int(np.argmin(means))]
-        raise ValueError(f"the mean at size {size:g} is {means.min():.4g}, allowed: positive means")
-    linear = np.log(means) + values / means - 1.0
-    unseen = np.zeros(values.shape, dtype=bool)
-    return Sample(sizes, linear, values, unseen, np.ones(len(sizes)), LOG, bounds=bounds)
-
-
-def of_times(sizes: Array, values: Array, censored: BoolArray) -> Sample:
-    """Return a sample of positive numbers ``(n_seeds, m)``, some of which are censored.
-
-    Raises
-    ------
-    ValueError
-        If a number is not positive and finite, all are censored, or a size is below 1; one line.
-    """
-    _checked_means(sizes, values)
-    if not (values > 0.0).all():
-        raise ValueError(f"a time is {values.min():.4g}, allowed: positive times")
-    if censored.all():
-        raise ValueError(
-            f"no run reached the criterion: all are censored, at {values.min():g} decisions or more"
-        )
-    return Sample(sizes, np.log(values), values, censored, np.ones(len(sizes)), GEOMETRIC)
-
-
-def of_rates(sizes: Array, rates: Array, episodes: Array | int) -> Sample:
-    """Return a sample of success rates ``(n_seeds, m)``, each of so many episodes.
-
-    Raises
-    ------
-    ValueError
-        If a rate is not between 0 and 1, or a size is below 1; one line.
-    """
-    means = _checked_means(sizes, rates)
-    if not ((rates >= 0.0) & (rates <= 1.0)).all():
-        raise ValueError("a rate is outside of 0 to 1")
-    counts = len(rates) * np.broadcast_to(episodes, means.shape)
-    shrunk = (means * counts + 0.5) / (counts + 1.0)  # log odds of 0 and 1 are infinite
-    slopes = 1.0 / (shrunk * (1.0 - shrunk))
-    logits = special.logit(shrunk)
-    values = logits + slopes * (rates - means)
-    unseen = np.zeros(values.shape, dtype=bool)
-    least = 4.0 / float(np.mean(episodes))
-    weights = _binomial(logits)
-    return Sample(sizes, values, rates, unseen, weights, LOGIT, least, (0.0, 1.0))
-
-
-def _checked_means(sizes: Array, values: Array) -> Array:
-    """Return the means over seeds ``(m,)``; refuse sizes and values that have no law."""
-    check_sizes(sizes)
-    if not values.size or not np.isfinite(values).all():
-        raise ValueError("a value is missing or not finite")
-    return np.asarray(values.mean(axis=0))
-
-
-def apart(own: Sample, base: Sample) -> Sample:
-    """Return the differences from the values of the same seeds at the same sizes, on the scale.
-
-    Influences that act on both alike cancel, so that their law deviates less than either. The
-    differences may be negative, and have the laws of log odds.
-    """
-    both, first, second = np.intersect1d(own.sizes, base.sizes, return_indices=True)
-    values = own.values[:, first] - base.values[:, second]
-    weights = 1.0 / (1.0 / own.weights[first] + 1.0 / base.weights[second])
-    return Sample(
-        sizes=both,
-        values=values,
-        observed=own.observed[:, first] - base.observed[:, second],
-        censored=own.censored[:, first] | base.censored[:, second],
-        weights=weights / weights[-1],
-        scale=DIFFERENCE,
-    )
 
 
 class Law(NamedTuple):
@@ -483,7 +176,7 @@ def fit(curve: Curve, sample: Sample, resamples: int = RESAMPLES) -> Law:
     begins = curve.begins(x, values.mean(axis=0))
     parameters = _fitted(curve, sample, values, sample.censored, begins)
     drawn = np.random.default_rng(0).integers(n_seeds, size=(resamples, n_seeds))
-    if curve.of is _line and not sample.censored.any():  # all at once
+    if curve.of is POWER.of and not sample.censored.any():  # all at once
         means = values[drawn].mean(axis=1).T
         resampled = np.polynomial.polynomial.polyfit(x, means, 1, w=np.sqrt(sample.weights)).T
     else:
@@ -519,7 +212,7 @@ def _fitted(
     means = values.mean(axis=0)
     roots = np.sqrt(sample.weights)
     if not censored.any():
-        if curve.of is _line:
+        if curve.of is POWER.of:
             return np.asarray(np.polynomial.polynomial.polyfit(x, means, 1, w=roots))
 
         def off(p: Array) -> Array:

@@ -14,11 +14,12 @@ from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import label_but
 from . import laws
-from .analysis import Summary, format_p
+from .analysis import Summary
 from .contrasts import title_of, values_of
-from .notation import bracketed, two_figures, wrapped
+from .notation import format_estimate, format_number, format_p, wrapped
 from .power import APART, seeds_for
 from .results import Results
+from .samples import GEOMETRIC, of_numbers, of_rates, of_times
 from .statistics import LEVEL, NOT_NEGATIVE, Array, bootstrap, holm
 
 WINDOW = 5
@@ -74,7 +75,7 @@ class ScalingLaw(NamedTuple):
                 " Predictions: the law at that size, on the scale of the study's table, with the "
                 "90% interval of the mean of as many seeds."
             )
-        if any(law and law.sample.scale is laws.GEOMETRIC for _, law, *_ in self.fits):
+        if any(law and law.sample.scale is GEOMETRIC for _, law, *_ in self.fits):
             text += " Times to a criterion are geometric means."
         return tuple(wrapped(text))
 
@@ -102,14 +103,14 @@ class ScalingLaw(NamedTuple):
         ps = holm([contrast.p for _, contrast in pairs]).tolist()
         for (group, contrast), p in zip(pairs, ps, strict=True):
             word = "differs" if p < LEVEL else "no significant difference"
-            shown = bracketed(contrast.difference)
+            shown = format_estimate(contrast.difference)
             lines += wrapped(f"{word}: {group}, {shown}, p {format_p(p)}", "  ")
         spread = max(contrast.deviation for _, contrast in pairs)
         seeds = seeds_for(APART, spread, len(pairs)) if spread > 0.0 else None
         if seeds is not None:
             lines += wrapped(
-                f"Power: exponents that differ by {two_figures(APART)} are significantly different "
-                f"with probability .80 by about {seeds} seeds at these sizes."
+                f"Power: exponents that differ by {format_number(APART)} are significantly "
+                f"different with probability 0.80 by about {seeds} seeds at these sizes."
             )
         return lines
 
@@ -135,8 +136,8 @@ def _sentence(fitted: Fitted, size: str) -> str:
     text = f"{head}{law.curve.name}, {law.formula} ({counted}{unreached})"
     for n, measured, e in law.held_out:
         inside = "inside" if e.low <= measured <= e.high else "outside"
-        text += f"; {n:g} left out: predicted {bracketed(e)}, measured {two_figures(measured)}, "
-        text += inside
+        text += f"; {n:g} left out: predicted {format_estimate(e)}, "
+        text += f"measured {format_number(measured)}, {inside}"
     if law.sample.values.var(axis=0).max() <= laws.FLAT:
         text += "; all seeds agree, so that intervals of parameters do not show how well it fits"
     return f"{text}."
@@ -192,7 +193,7 @@ def scaling_law(
         title = title_of(shown_as, own)
     else:
         samples = _decisions(results, measure, criterion)
-        title = f"decisions to {two_figures(criterion)} of {measure}"
+        title = f"decisions to {format_number(criterion)} of {measure}"
         shown_as, own = SUCCESS, ""
     counts = _episodes(results, shown_as, own) if shown_as.is_rate and criterion is None else {}
     bounds = shown_as.bounds if criterion is None else NOT_NEGATIVE
@@ -302,14 +303,14 @@ def _fit(
         if marked is not None:
             censored[:, k] = marked.loc[frame.index].to_numpy()
     if values.size and not censored.any() and np.ptp(values) == 0.0:
-        return Fitted(group, None, f"every run has {two_figures(values[0, 0])}")
+        return Fitted(group, None, f"every run has {format_number(values[0, 0])}")
     try:
         if episodes is not None:
-            sample = laws.of_rates(sizes, values, episodes)
+            sample = of_rates(sizes, values, episodes)
         elif any(marked is not None for _, marked in samples):
-            sample = laws.of_times(sizes, values, censored)
+            sample = of_times(sizes, values, censored)
         else:
-            sample = laws.of_numbers(sizes, values, bounds)
+            sample = of_numbers(sizes, values, bounds)
         return Fitted(group, laws.choose(sample), censored=int(censored.sum()))
     except ValueError as error:
         is_pair = values.shape[1] == 2 and len(values) > 1 and not censored.any()
@@ -317,4 +318,4 @@ def _fit(
             return Fitted(group, None, str(error))
         most = np.inf if episodes is None else 1.0
         less = bootstrap(values[:, 1] - values[:, 0], bounds=(-most, most))
-        return Fitted(group, None, f"{error}; the larger less the smaller: {bracketed(less)}")
+        return Fitted(group, None, f"{error}; the larger less the smaller: {format_estimate(less)}")

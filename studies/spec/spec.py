@@ -168,7 +168,7 @@ class Spec(Settings):
     """Training episodes of a trial."""
     decisions: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
     """Joint decisions of a trial's training in place of `episodes`, where the study is
-    ``experience``; those of all worlds count."""
+    ``experience``; those of all environments count."""
     steps: Length = 450
     """Most decisions in an episode."""
     evaluation: Annotated[int, Field(ge=0, le=1_000_000)] = 10
@@ -309,11 +309,12 @@ class Spec(Settings):
                 "= 'experience'"
             )
         for condition in self._conditions:
-            worlds = condition.settings.learner.at_once
-            if worlds > 1 and self.decisions is None:
+            environments = condition.settings.learner.n_environments
+            if environments > 1 and self.decisions is None:
                 raise SpecError(
-                    f"learner.worlds = {worlds}: needs a budget in decisions, study = 'experience' "
-                    f"with decisions = 1000000 (condition {condition.label!r})"
+                    f"learner.environments = {environments}: needs a budget in "
+                    f"decisions, study = 'experience' with decisions = "
+                    f"1000000 (condition {condition.label!r})"
                 )
 
     @classmethod

@@ -47,8 +47,8 @@ class Reached(NamedTuple):
     """As in `TrialResult`."""
     team: Recording
     """What the team remembers."""
-    worlds: Recording
-    """What many worlds at once remember; nothing between episodes of one."""
+    environments: Recording
+    """State of many environments; empty for a learner of one environment."""
 
 
 class Checkpoint:
@@ -83,7 +83,7 @@ class Checkpoint:
             "spent": reached.spent,
         }
         groups = {f"recordings/{k}": arrays for k, arrays in reached.recordings.items()}
-        groups |= {"team": reached.team, "worlds": reached.worlds}
+        groups |= {"team": reached.team, "environments": reached.environments}
         arrays = {
             f"{group}/{k}": array for group, own in groups.items() for k, array in own.items()
         }
@@ -115,7 +115,7 @@ class Checkpoint:
                 spent=float(table["spent"]),
                 recordings={name: under(f"recordings/{name}/", arrays) for name in recordings},
                 team=under("team/", arrays),
-                worlds=under("worlds/", arrays),
+                environments=under("environments/", arrays),
             )
         except (OSError, ValueError, KeyError, TypeError, EOFError):
             return None

@@ -20,12 +20,12 @@ from ...core.agents.loop import (
     control_loop,
     world_seed,
 )
-from ...core.agents.many_worlds import ManyWorldsLoop
+from ...core.agents.many_environments import ManyEnvironmentsLoop
 from ...core.agents.team import Team
 from ...core.interface.plain import as_scenario
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario
-from ...core.interface.stacked import LoopedWorlds
+from ...core.interface.stacked import LoopedEnvironments
 from ...core.plugins.words import expect
 from ..spec.controls import LEARN_NOTHING
 from ..store.database import EVALUATION, STAGE
@@ -140,8 +140,8 @@ class Session:
 
     def _go_on_from(self, reached: Reached) -> None:
         self.team.restore(reached.team)
-        if reached.worlds:
-            self._many.restore(reached.worlds)
+        if reached.environments:
+            self._many.load_state_dict(reached.environments)
         self._rows = list(reached.rows)
         self.spent = reached.spent
         self._decided = sum(row.steps for row in self._rows_of_training)
@@ -151,10 +151,10 @@ class Session:
         self._stages = ()
 
     def put_down(self) -> None:
-        """Write a checkpoint if it is time; between episodes, or in many worlds at once."""
+        """Write a checkpoint if it is due: between episodes, or at a step of many environments."""
         if self._checkpoint is None or not self._checkpoint.is_due:
             return
-        is_many = self.trial.settings.learner.at_once > 1
+        is_many = self.trial.settings.learner.n_environments > 1
         self._checkpoint.write(
             Reached(
                 self._rows,
@@ -163,7 +163,7 @@ class Session:
                 self.spent,
                 self._recordings,
                 self.team.arrays(),
-                self._many.memory() if is_many else {},
+                self._many.state_dict() if is_many else {},
             )
         )
 
@@ -219,18 +219,19 @@ class Session:
     def train_until(self, decisions: int) -> int:
         """Let the team learn until it has decided so often in all; return how often it has.
 
-        In many worlds at once if its learner says so: then rows are of the first world's episodes.
+        In many environments at once if its learner says so: then rows are of the first
+        environment's episodes.
         """
-        worlds = self.trial.settings.learner.at_once
+        environments = self.trial.settings.learner.n_environments
         if self.trial.settings.learner.kind in LEARN_NOTHING:
             return decisions
         begun = process_time() - self.spent
-        while worlds == 1 and self._decided < decisions:
+        while environments == 1 and self._decided < decisions:
             self.train(1, self.trained)
             self._decided = sum(row.steps for row in self._rows_of_training)
             self.spent = process_time() - begun
-        if worlds > 1:
-            self._train_in_worlds(decisions, begun)
+        if environments > 1:
+            self._train_in_many(decisions, begun)
             self._decided = self._many.decisions
         return self._decided
 
@@ -239,16 +240,18 @@ class Session:
         return [row for row in self._rows if row.phase == "training"]
 
     @cached_property
-    def _many(self) -> ManyWorldsLoop:
+    def _many(self) -> ManyEnvironmentsLoop:
         settings = self.trial.settings
-        count = settings.learner.at_once
+        count = settings.learner.n_environments
         first = arrange(settings, self.trial.seed)
-        worlds = first.scenario.worlds(count) or LoopedWorlds(
+        environments = first.scenario.environments(count) or LoopedEnvironments(
             [first.scenario, *(arrange(settings, 0).scenario for _ in range(count - 1))]
         )
-        return ManyWorldsLoop(worlds, self.scenario, self.team, self.trial.steps, self.trial.seed)
+        return ManyEnvironmentsLoop(
+            environments, self.scenario, self.team, self.trial.steps, self.trial.seed
+        )
 
-    def _train_in_worlds(self, decisions: int, begun: float) -> None:
+    def _train_in_many(self, decisions: int, begun: float) -> None:
         begin = perf_counter()
         rates = [m.name for m in self._measures if m.source == "terminated"]
         done = self.trained

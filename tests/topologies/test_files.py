@@ -105,6 +105,13 @@ def test_numbers_without_labels_are_names(tmp_path: Path) -> None:
     assert names_in(parse(str(path))) == ("n0", "n1")
 
 
+def test_an_edge_may_repeat_the_direction_of_its_graph(tmp_path: Path) -> None:
+    for value in ("true", "1"):
+        path = tmp_path / f"{value}.graphml"
+        path.write_text(graphml(EDGE.replace("/>", f' directed="{value}"/>')), encoding="utf-8")
+        assert build(str(path), ("a", "b")).edges == ((0, 1),)
+
+
 def test_an_undirected_node_link_graph_needs_an_orientation(tmp_path: Path) -> None:
     path = tmp_path / "line.json"
     path.write_text(json.dumps(nx.node_link_data(nx.path_graph(AGENTS), edges="edges")))
@@ -112,6 +119,18 @@ def test_an_undirected_node_link_graph_needs_an_orientation(tmp_path: Path) -> N
         build(str(path), AGENTS)
     listed = build({"kind": "file", "path": str(path), "oriented": "listed"}, AGENTS)
     assert listed.edges == ((0, 1), (1, 2), (2, 3))
+
+
+GRAPHML = (
+    '<graphml xmlns="http://graphml.graphdrawing.org/xmlns">'
+    '<graph id="G" edgedefault="{default}"><node id="a"/><node id="b"/>{rest}</graph></graphml>'
+)
+EDGE = '<edge source="a" target="b"/>'
+
+
+def graphml(rest: str, default: str = "directed") -> str:
+    """A graph of two nodes, a and b."""
+    return GRAPHML.format(default=default, rest=rest)
 
 
 NODES = '{"directed": true, "nodes": [{"id": "a"}, {"id": "b"}], '
@@ -127,11 +146,93 @@ REFUSED = {
     "bare.json": (NODES + '"links": [{"source": "a"}]}', "with source and target"),
     "none.json": (NODES + '"edges": null}', "edges must be a list of tables with source and"),
     "pairs.json": (NODES + '"edges": [["a", "b"]]}', "edges must be a list of tables with"),
-    "id.json": ('{"nodes": [{"id": null}], "links": []}', "None cannot be a node"),
+    "id.json": ('{"nodes": [{"id": null}], "links": []}', "None is no name of an agent"),
+    "repeated_node.json": (
+        '{"nodes": [{"id": 1}, {"id": "1"}], "links": []}',
+        "id '1' is that of 2 nodes",
+    ),
+    "repeated_edge.json": (
+        NODES + '"edges": [{"source": "a", "target": "b"}, {"source": "a", "target": "b"}]}',
+        "edge 'a' -> 'b' is given more than once",
+    ),
+    "both_ways.json": (
+        NODES.replace("true", "false")
+        + '"edges": [{"source": "a", "target": "b"}, {"source": "b", "target": "a"}]}',
+        "edge 'b' - 'a' is given more than once",
+    ),
+    "loop.json": (
+        NODES + '"edges": [{"source": "a", "target": "a"}]}',
+        "edge 'a' -> 'a' leads from an agent to itself",
+    ),
+    "stray.json": (
+        NODES + '"edges": [{"source": "a", "target": "c"}]}',
+        "edge 'a' -> 'c': known: a, b",
+    ),
+    "misspelled.json": (NODES + '"edgs": [], "edges": []}', "'edgs': did you mean 'edges'?"),
+    "two_lists.json": (NODES + '"edges": [], "links": []}', "both edges and links are given"),
+    "twice.json": (NODES + '"edges": [], "edges": []}', "key 'edges' is given 2 times"),
+    "graph_direction.json": (
+        NODES.replace("true", '"false"') + '"edges": []}',
+        "directed = 'false': must be true or false",
+    ),
+    "number_direction.json": (NODES.replace("true", "1") + '"edges": []}', "directed = 1: must be"),
+    "edge_direction.json": (
+        NODES + '"edges": [{"source": "a", "target": "b", "directed": false}]}',
+        "has directed = false, the graph has true",
+    ),
+    "multigraph.json": (NODES + '"multigraph": 0, "edges": []}', "multigraph = 0: must be true or"),
+    "nodes.toml": ('nodes = [{id = "a"}]\nedges = []\ndirected = "yes"', "directed = 'yes'"),
+    "beside.json": (
+        '{"topology": {"edges": [["a", "b"]]}, "edges": [["b", "a"]]}',
+        "key 'edges' beside topology",
+    ),
+    "alone.json": (
+        '{"edges": [["a", "b"]], "alone": ["b"]}',
+        "agent 'b' occurs more than once in edges and alone",
+    ),
+    "zero.graphml": (
+        graphml(EDGE.replace("/>", ' directed="0"/>')),
+        "edge 'a' - 'b': directed = '0' in a graph with edgedefault = 'directed'",
+    ),
+    "false.graphml": (graphml(EDGE.replace("/>", ' directed="false"/>')), "directed = 'false' in"),
+    "yes.graphml": (graphml(EDGE.replace("/>", ' directed="yes"/>')), "directed = 'yes' in"),
+    "one.graphml": (
+        graphml(EDGE.replace("/>", ' directed="1"/>'), default="undirected"),
+        "directed = '1' in a graph with edgedefault = 'undirected'",
+    ),
+    "attribute.graphml": (
+        graphml(EDGE.replace("/>", ' Directed="false"/>')),
+        "unknown attribute 'Directed'",
+    ),
+    "default.graphml": (graphml(EDGE, default="Directed"), "edgedefault = 'Directed': must be"),
+    "no_default.graphml": (
+        graphml(EDGE).replace(' edgedefault="directed"', ""),
+        "edgedefault = None: must be",
+    ),
+    "two.graphml": (
+        graphml(EDGE).replace("</graphml>", '<graph edgedefault="directed"/></graphml>'),
+        "2 elements <graph>, allowed: one",
+    ),
+    "nested.graphml": (
+        graphml('<node id="c"><graph edgedefault="directed"/></node>'),
+        "2 elements <graph>, allowed: one",
+    ),
+    "repeated_edge.graphml": (graphml(EDGE * 2), "edge 'a' -> 'b' is given more than once"),
+    "repeated_node.graphml": (graphml('<node id="b"/>'), "id 'b' is that of 2 nodes"),
+    "loop.graphml": (graphml(EDGE.replace("b", "a")), "leads from an agent to itself"),
+    "stray.graphml": (graphml(EDGE.replace('"b"', '"c"')), "edge 'a' -> 'c': known: a, b"),
+    "hyperedge.graphml": (graphml("<hyperedge/>"), "element <hyperedge> in <graph>"),
+    "arrow.graphml": (
+        yed().replace(
+            '<y:LineStyle color="#000000"',
+            '<y:Arrows source="standard" target="none"/><y:LineStyle color="#000000"',
+        ),
+        "has an arrowhead at its source",
+    ),
     "twin.json": (
         NODES.replace("{", '{"multigraph": true, ', 1)
         + '"links": [{"source": "a", "target": "b"}]}',
-        "the graph is a multigraph",
+        "multigraph = true: must be false",
     ),
 }
 

@@ -229,8 +229,8 @@ def test_graph_files(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("x.json", "{", "holds no graph: Expecting"),
-        ("x.json", "[]", "holds no graph: it must be a table"),
+        ("x.json", "{", "x.json': Expecting"),
+        ("x.json", "[]", "x.json': it must be a table"),
         (
             "x.json",
             '{"edges": [], "names": []}',
@@ -238,7 +238,7 @@ def test_graph_files(tmp_path: Path, name: str) -> None:
         ),
         ("x.json", '{"edges": [["a", "b"], ["a", "b"]]}', "edge a -> b is given more than once"),
         ("x.json", '{"edges": [["a"]]}', "edges.0.: missing"),
-        ("x.graphml", "nothing", "holds no graph: syntax error"),
+        ("x.graphml", "nothing", "x.graphml': syntax error"),
         ("x.csv", "a,b", "suffix must be .graphml, .json or .toml"),
     ],
 )

@@ -35,6 +35,8 @@ from .settings import GRAVITY, BoxSettings
 
 Vertices = Sequence[tuple[float, float]]
 
+UNIT = 10.0
+"""Box2D units per metre."""
 MAX_VERTICES = 8
 """Of a convex piece; b2_maxPolygonVertices."""
 MOST_VERTICES = 1000
@@ -45,6 +47,11 @@ LEAST_PIECE = 1.1921e-9
 """Smallest area of a convex piece [m2]: Box2D takes none below the epsilon of single precision."""
 LARGEST = 100.0
 """Greatest distance of a vertex from another one [m]."""
+FAR = 10.0
+"""Distance from the origin, in lengths of a polygon, beyond which its vertices are taken relative
+to its first one: moments about a far origin lose all digits."""
+RESOLUTION = 1e-7
+"""Coarsest spacing of floating-point coordinates, in lengths of a polygon."""
 STRAIGHT = 1e-9
 """Sine of the angle between edges that counts as straight on."""
 
@@ -64,8 +71,8 @@ def centre(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Pol
     ------
     ValueError
         If the polygon has more than `MOST_VERTICES`, is too large, has two vertices at one place,
-        crosses or touches itself, has no area, or a vertex is not finite. Fewer than 3 vertices are
-        refused by `BoxSettings`.
+        crosses or touches itself, has no area, or a vertex is not finite or too far away for its
+        floating-point coordinates. Fewer than 3 vertices are refused by `BoxSettings`.
     """
     for ring in (vertices, *holes):
         _check_ring(f"box {name!r}", ring)
@@ -74,6 +81,7 @@ def centre(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Pol
     polygon = Polygon(vertices, holes)
     if not polygon.is_valid:
         raise ValueError(f"box {name!r}: not a simple polygon: {explain_validity(polygon)}")
+    polygon = translate(polygon, *-nearby_origin(vertices))
     if not polygon.area > 1e-6 * polygon.length**2:
         raise ValueError(
             f"box {name!r}: area {polygon.area:.3g} m2 within {polygon.length:.3g} m of outline, "
@@ -86,6 +94,13 @@ def centre(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Pol
     return translate(polygon, *(-whole.first / whole.area))
 
 
+def nearby_origin(vertices: Vertices) -> FloatArray:
+    """Return the point ``(2,)`` that vertices are taken relative to: the first if all are far."""
+    ring = np.asarray(vertices, dtype=float)
+    is_far = np.abs(ring).max() > FAR * np.ptp(ring, axis=0).max()
+    return ring[0] if is_far else np.zeros(2)
+
+
 def _check_ring(box: str, vertices: Vertices) -> None:
     """Refuse an outline that no body can have."""
     ring = np.asarray(vertices, dtype=float)
@@ -95,6 +110,12 @@ def _check_ring(box: str, vertices: Vertices) -> None:
     extent = 2 * float(np.ptp(ring / 2, axis=0).max())
     if extent > LARGEST:
         raise ValueError(f"{box}: is {extent:.3g} m long, allowed: up to {LARGEST:g} m")
+    spacing = float(np.spacing(np.abs(ring).max()))
+    if spacing > RESOLUTION * extent > 0:
+        raise ValueError(
+            f"{box}: coordinates of {np.abs(ring).max():.3g} m are {spacing:.2g} m apart, too "
+            f"coarse for {extent:.3g} m of outline, allowed: coordinates from a point nearby"
+        )
     edges = np.roll(ring, -1, axis=0) - ring
     short = np.flatnonzero(np.hypot(edges[:, 0], edges[:, 1]) < LEAST_EDGE)
     if len(short):
@@ -154,6 +175,12 @@ def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
         for other in beside[i]:
             heappush(pairs, (min(i, other), max(i, other)))
     return tuple(pieces.values())
+
+
+def box2d_area(piece: FloatArray) -> float:
+    """Return the area of a piece ``(n, 2)`` as Box2D computes it, in single precision [m2]."""
+    x, y = (piece * UNIT).astype(np.float32).T
+    return float(sum(x * np.roll(y, -1) - y * np.roll(x, -1), np.float32(0))) / 2 / UNIT**2
 
 
 def _neighbours(rings: Sequence[FloatArray]) -> nx.Graph:
@@ -242,11 +269,11 @@ class BoxSpec:
             If one is too small to be simulated.
         """
         pieces = () if self.polygon is None else convex_pieces(self.polygon)
-        least = min((Polygon(piece).area for piece in pieces), default=LEAST_PIECE)
-        if least < LEAST_PIECE:
+        smallest = min(map(box2d_area, pieces), default=LEAST_PIECE)
+        if smallest < LEAST_PIECE:
             raise ValueError(
-                f"box {self.name!r}: a convex piece of it has {least:.2g} m2, must be at least "
-                f"{LEAST_PIECE:g} m2 to be simulated"
+                f"box {self.name!r}: a convex piece of it has {smallest:.2g} m2, must be at least "
+                f"{LEAST_PIECE:g} m2 to be simulated; fewer vertices make larger pieces"
             )
         return pieces
 
@@ -308,8 +335,10 @@ class BoxSpec:
     def scaled(self, factor: float) -> BoxSpec:
         """Return the box with mass and lengths, or those that grow, multiplied by `factor`."""
         along = 1.0 if self.grows == "width" else factor
+        x0, y0 = nearby_origin(self.vertices) if self.vertices else (0.0, 0.0)
         outline, *holes = [
-            tuple((along * x, factor * y) for x, y in ring) for ring in (self.vertices, *self.holes)
+            tuple((along * (x - x0), factor * (y - y0)) for x, y in ring)
+            for ring in (self.vertices, *self.holes)
         ]
         return replace(
             self,

@@ -12,7 +12,7 @@ off, so that the future depends on poses and velocities alone and a saved world 
 
 The box rubs on the ground by one friction joint at each of its friction points. Such a joint cuts
 its force to the limit after weighting it with the box's mass as seen from the joint, which leaves
-force not quite against the motion: sliding along its axes, a square meets 4 % less than its
+force not quite against the motion: sliding along its axes, a square meets 4% less than its
 `friction_force`; along its diagonals and in turning, all of it.
 
 A wheel that fails as free has no drive at all: it resists sideways motion only. All other kinds of
@@ -28,7 +28,7 @@ from Box2D import _Box2D
 
 from ....core.numerics import BoolArray, FloatArray, IntArray
 from ...faults.settings import Failures, FailureSettings, Free
-from .boxes import BoxSpec
+from .boxes import UNIT, BoxSpec
 from .geometry import gaps, infrared_readings
 from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
@@ -40,8 +40,6 @@ from .stepping import (
     step_address,
 )
 
-UNIT = 10.0
-"""Box2D units per metre."""
 TOUCHING = 0.001
 """Gap [m] below which a robot counts as touching: Box2D keeps polygons `SKIN` apart, up to a slop
 of 0.5 mm."""

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from nested_agents_spread import SpreadSettings
 
 from nested_agents.core.agents.loop import policy_seed
-from nested_agents.core.agents.many_worlds import ManyWorldsLoop
+from nested_agents.core.agents.many_environments import ManyEnvironmentsLoop
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.failures import LeftAgents
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
@@ -16,9 +17,8 @@ from nested_agents.core.networks.settings import (
     IPPOSettings,
     MAPPOSettings,
 )
-from nested_agents.scenarios.spread import SpreadSettings
 
-SMALL = {"worlds": 4, "rollout": 10, "batch_size": 30, "epochs": 2, "hidden": (8,)}
+SMALL = {"environments": 4, "rollout": 10, "batch_size": 30, "epochs": 2, "hidden": (8,)}
 AGENTS = ("agent1", "agent2", "agent3")
 CHAIN = Hierarchy(AGENTS, [("agent1", "agent2"), ("agent2", "agent3")])
 
@@ -30,7 +30,7 @@ def team_of(settings, seed=0):
 
 def loop_of(team, settings, seed=0):
     world = SpreadSettings(most_decisions=7).build()
-    return ManyWorldsLoop(world.worlds(settings.worlds), world, team, 1000, seed)
+    return ManyEnvironmentsLoop(world.environments(settings.environments), world, team, 1000, seed)
 
 
 def weights(team):
@@ -68,7 +68,7 @@ def test_advantages_by_hand():
     values = np.array([1.0, 1.0, 2.0])[:, None, None]
     last = np.array([False, True, False])[:, None]
     got = estimate(rewards, values, np.array([[8.0]]), last, settings).ravel()
-    # 4 + .5 8 - 2; an end: 2 - 1; 1 + .5 1 - 1 + .25 1
+    # 4 + 0.5 8 - 2; an end: 2 - 1; 1 + 0.5 1 - 1 + 0.25 1
     assert got.tolist() == [0.75, 1.0, 6.0]
 
 
@@ -159,9 +159,9 @@ def test_what_is_told_is_seen():
 
 
 def test_bad_input():
-    with pytest.raises(ValueError, match="needs worlds, 2 or more"):
+    with pytest.raises(ValueError, match="needs environments, 2 or more"):
         HierarchyPPOSettings(normalised="values")
-    with pytest.raises(ValueError, match="messages may fail in one world only"):
+    with pytest.raises(ValueError, match="messages may fail in one environment only"):
         Team(
             HierarchyPPOSettings(**SMALL), SpreadSettings().build(), CHAIN, policy_seed(0),
             (LeftAgents(agents=("agent1",), episode=1),),

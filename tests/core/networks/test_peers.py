@@ -96,7 +96,9 @@ def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> N
     with pytest.raises(SpecError, match=r"'ippo': needs the extra peers, pip install") as raised:
         check_conditions(spec_of("ippo"))
     assert "\n" not in str(raised.value)
-    assert str(raised.value).endswith("learner.worlds = 16 in study = 'experience' does without")
+    assert str(raised.value).endswith(
+        "learner.environments = 16 in study = 'experience' does without"
+    )
 
 
 @pytest.mark.parametrize("kind", SHORT)
@@ -172,7 +174,7 @@ def test_dqn_needs_one_agent() -> None:
 def test_what_needs_rule_bases_says_so() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     (trial,) = trials_of(spec_of("ppo", study="related"))
-    from nested_agents.studies.catalogue.related import measure
+    from nested_agents.research.studies.related import measure
 
     with pytest.raises(ValueError, match="needs FuzzyAgents, the team is of CentralPPO") as raised:
         measure(trial)

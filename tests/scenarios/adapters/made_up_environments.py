@@ -152,6 +152,36 @@ class EndsApart(Walkers):
         return observed, rewards, terminated, truncated, infos
 
 
+class EndsForAll(Walkers):
+    """The key __all__ ends the episode after 5 steps, as in RLlib; no agent has a flag of its own.
+
+    `which` are terminations or truncations, by their place in what a step returns.
+    """
+
+    which = 2
+
+    def step(self, actions: Any) -> Any:
+        parts = list(super().step(actions))
+        parts[2], parts[3] = {"__all__": False}, {"__all__": False}
+        parts[self.which] = {"__all__": self.t >= 5}
+        parts[4] = {"__common__": {}, **parts[4]}
+        return tuple(parts)
+
+
+class CutForAll(EndsForAll):
+    """The same, truncated."""
+
+    which = 3
+
+
+class StrayEnd(Walkers):
+    """Terminations name an agent that nobody knows."""
+
+    def step(self, actions: Any) -> Any:
+        observed, paid, ends, *rest = super().step(actions)
+        return observed, paid, {**ends, "agent_2": False}, *rest
+
+
 class Numbered(Walkers):
     """Ids are numbers, and 0 is one."""
 
@@ -411,6 +441,14 @@ class Turns(AECEnv[Any, Any, Any]):
                 self.rewards[one] = float(one + 1)
             self.truncations = dict.fromkeys(self.agents, self.t >= LENGTH)
         self.agent_selection = self.selector.next()
+
+
+class TurnsForAll(Turns):
+    """The key __all__ of truncations ends the episode after 5 steps."""
+
+    def step(self, action: Any) -> Any:
+        super().step(action)
+        self.truncations = {**self.truncations, "__all__": self.t >= 5}
 
 
 class Cart(gymnasium.Env[Any, Any]):

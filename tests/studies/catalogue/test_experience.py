@@ -8,7 +8,7 @@ from nested_agents.studies.catalogue.experience import analyse, check, measure, 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
 
-PPO = {"kind": "hierarchy-ppo", "worlds": 4, "rollout": 20, "batch_size": 60, "epochs": 1}
+PPO = {"kind": "hierarchy-ppo", "environments": 4, "rollout": 20, "batch_size": 60, "epochs": 1}
 TABLE = {
     "study": "experience",
     "seeds": 1,
@@ -60,7 +60,7 @@ def success(table):
 
 @pytest.mark.parametrize(("kind", "seed"), [("ippo", 10_000), ("hierarchy-ppo", 10_001)])
 def test_networks_learn(kind, seed):
-    learner = {"kind": kind, "worlds": 64, "rollout": 32, "batch_size": 512, "epochs": 5}
+    learner = {"kind": kind, "environments": 64, "rollout": 32, "batch_size": 512, "epochs": 5}
     assert success({"seeds": [seed], "decisions": 60_000, "learner": learner}) >= 0.75
     assert success({"seeds": [seed], "decisions": 1, "preset": "random"}) <= 0.25
 
@@ -78,11 +78,11 @@ def test_a_report_does_without_the_success_of_episodes_in_many_worlds(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"decisions": 79}, "less than a rollout of 80 decisions in 4 worlds"),
-        ({"decisions": None}, "learner.worlds = 4: needs a budget in decisions"),
+        ({"decisions": 79}, "less than a rollout of 80 decisions in 4 environments"),
+        ({"decisions": None}, "learner.environments = 4: needs a budget in decisions"),
         ({"study": "learning-curve"}, "learning-curve counts episodes"),
-        ({"learner": {"kind": "ppo", "worlds": 4}}, "learner.worlds"),
-        ({"preset": "fitted-q", "learner": {"worlds": 4}}, "learner.worlds"),
+        ({"learner": {"kind": "ppo", "environments": 4}}, "learner.environments"),
+        ({"preset": "fitted-q", "learner": {"environments": 4}}, "learner.environments"),
     ],
 )
 def test_bad_input_is_one_line(change, message):

@@ -194,10 +194,10 @@ def test_folders_of_conditions_differ(tmp_path):
 
 
 def test_percents_stay_with_their_numbers():
-    sentence = "x" * 76 + " 3 %, y"
+    sentence = "x" * 76 + " 3%, y"
     assert [line.strip() for line in explain_text._wrapped(sentence).splitlines()] == [
         "x" * 76,
-        "3 %, y",
+        "3%, y",
     ]
 
 
@@ -315,7 +315,7 @@ def test_a_team_of_a_budget_of_decisions_is_trained_again(condition, tmp_path, c
 
 def test_networks_are_not_explained(tmp_path, capsys) -> None:
     table = {"study": "experience", "seeds": 1, "decisions": 40, "steps": 5, "evaluation": 1}
-    learner = {"kind": "ippo", "worlds": 2, "rollout": 10, "batch_size": 20}
+    learner = {"kind": "ippo", "environments": 2, "rollout": 10, "batch_size": 20}
     na.run(table | {"scenario": {"kind": "spread"}, "learner": learner}, tmp_path, jobs=1)
     assert main(["explain", str(tmp_path)]) == 2
     needed = "learner.kind = 'ippo': explain needs agents with rule bases"

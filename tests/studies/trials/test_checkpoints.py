@@ -21,7 +21,7 @@ from nested_agents.studies.trials.checkpoints import Checkpoint
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import Observer
 
-PPO = {"worlds": 4, "rollout": 20, "batch_size": 60, "epochs": 1, "hidden": [8]}
+PPO = {"environments": 4, "rollout": 20, "batch_size": 60, "epochs": 1, "hidden": [8]}
 MANY = {"study": "experience", "seeds": 1, "decisions": 2400, "steps": 25, "evaluation": 2}
 ONE = {"seeds": 1, "episodes": 4, "steps": 12, "evaluation": 1, "keep_teams": True}
 TABLES = {
@@ -168,7 +168,7 @@ def test_worlds_that_do_not_repeat_begin_anew(tmp_path, monkeypatch):
 
     def altered(self):
         reached = read(self)
-        reached.worlds["states"] = reached.worlds["states"] + np.float64(1e-9)
+        reached.environments["states"] = reached.environments["states"] + np.float64(1e-9)
         return reached
 
     monkeypatch.setattr(Checkpoint, "read", altered)

@@ -1,7 +1,7 @@
 """Boxes: mass properties against closed forms and Box2D, friction, scaling, refusals."""
 
-import time
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
 from math import pi, sqrt
@@ -18,6 +18,7 @@ from shapely.geometry.polygon import orient
 from nested_agents.scenarios.box_pushing.world.boxes import (
     AREA,
     BOXES,
+    UNIT,
     BoxSpec,
     Vertices,
     _merge,
@@ -28,7 +29,7 @@ from nested_agents.scenarios.box_pushing.world.boxes import (
 )
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
-from nested_agents.scenarios.box_pushing.world.world import UNIT, World
+from nested_agents.scenarios.box_pushing.world.world import World
 
 L_SHAPE = ((0, 0), (0.2, 0), (0.2, 0.1), (0.1, 0.1), (0.1, 0.2), (0, 0.2))
 FRAME = ((0, 0), (0.2, 0), (0.2, 0.2), (0, 0.2))
@@ -223,6 +224,67 @@ def test_a_piece_too_small_for_the_physics_is_refused_before_it(vertices: Vertic
         _ = box.fixtures
 
 
+@pytest.mark.parametrize("far", [10.0, 1e3, 1e5, 1e6, 2e7])
+@pytest.mark.parametrize("rings", [(FRAME,), (L_SHAPE,), (FRAME, WINDOW)])
+@pytest.mark.parametrize("growth", [1.0, 32.0])
+def test_a_box_is_the_same_anywhere(rings: tuple[Vertices, ...], growth: float, far: float) -> None:
+    def moved(x0: float, y0: float) -> BoxSpec:
+        outline, *holes = [tuple((x + x0, y + y0) for x, y in ring) for ring in rings]
+        return BoxSpec("moved", outline, tuple(holes), mass=0.3).scaled(growth)
+
+    near = moved(0.0, 0.0)
+    resolution = 1e-9 + 100 * float(np.spacing(far))  # of given coordinates, over an edge
+    for box in (moved(far, far / 3), moved(-far, 0.0)):
+        assert box.inertia == pytest.approx(near.inertia, rel=resolution)
+        assert box.area == pytest.approx(near.area, rel=resolution)
+        assert box.friction_radius == pytest.approx(near.friction_radius, rel=resolution)
+        np.testing.assert_allclose(
+            box.outline.edges, near.outline.edges, atol=resolution * near.reach
+        )
+        assert len(box.fixtures) == len(near.fixtures)
+
+
+def test_coordinates_that_are_too_coarse_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"coordinates of 1e\+10 m are 1\.9e-06 m apart"):
+        BoxSpec("far", ((1e10, 0), (1e10 + 0.2, 0), (1e10 + 0.2, 0.2)))
+
+
+def slivers(count: int) -> Iterator[Vertices]:
+    """Outlines that are nearly degenerate: thin bars, spikes, slits, close vertices."""
+    rng = np.random.default_rng(0)
+    for k in range(count):
+        e = float(10 ** rng.uniform(-8, -2))
+        yield (
+            ((0, 0), (0.2, 0), (0.2, e), (0, e)),
+            ((0, 0), (0.2, 0), (0.2, 0.2), (0.1 + e, 0.2), (0.1, 0.3), (0.1 - e, 0.2), (0, 0.2)),
+            ((0, 0), (0.2, 0), (0.2, 0.2), (0.1 + e, 0.2), (0.1, e), (0.1 - e, 0.2), (0, 0.2)),
+            ((0, 0), (0.1, -e), (0.2, 0), (0.2, 0.2), (0.2 + e, 0.2), (0.1, 0.2 + e), (0, 0.2)),
+            ((0, 0), (0.2, 0), (0.2, 0.2), (0.2 - e, 0.2 + e / 2), (0, 0.2)),
+        )[k % 5]
+
+
+@pytest.mark.parametrize("far", [0.0, 1e5, 3e6])
+def test_a_nearly_degenerate_box_is_simulated_or_refused_in_one_line(far: float) -> None:
+    simulated = 0
+    for outline in slivers(150):
+        box, problem = sliver(tuple((x + far, y - far) for x, y in outline))
+        assert "\n" not in problem
+        if box is not None:
+            World([ROBOTS["e-puck"]], box)  # Box2D asserts that it can take the pieces
+            simulated += 1
+    assert simulated > 50
+
+
+def sliver(outline: Vertices) -> tuple[BoxSpec | None, str]:
+    """Return a box, or none and why it is refused."""
+    try:
+        box = BoxSpec("sliver", outline)
+        _ = box.fixtures
+    except ValueError as error:
+        return None, str(error)
+    return box, ""
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_pieces_are_merged_in_the_order_of_the_plain_algorithm(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -233,19 +295,20 @@ def test_pieces_are_merged_in_the_order_of_the_plain_algorithm(seed: int) -> Non
         np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.timeout(20)
 @pytest.mark.parametrize("depth", [0.0, 0.4])
-def test_many_vertices_take_no_time(depth: float) -> None:
-    ring = [
-        ((1 - depth * (i % 2)) * x, (1 - depth * (i % 2)) * y)
-        for i, (x, y) in enumerate(regular(1000))
-    ]
-    begin = time.perf_counter()
+def test_many_vertices_are_cut_into_convex_pieces(depth: float) -> None:
+    radii = [10 * (1 - depth * (i % 2)) for i in range(1000)]
+    ring = [(r * x, r * y) for r, (x, y) in zip(radii, regular(1000), strict=True)]
     box = BoxSpec("gear", tuple(ring))
     pieces = [Polygon(piece) for piece in box.fixtures]
-    assert time.perf_counter() - begin < 5.0
     assert max(len(piece) for piece in box.fixtures) <= 8
     assert sum(piece.area for piece in pieces) == pytest.approx(box.area)
+
+
+def test_an_outline_of_many_vertices_on_little_space_is_refused_before_box2d_does() -> None:
+    with pytest.raises(ValueError, match="fewer vertices"):
+        _ = BoxSpec("disc", tuple(regular(1000))).fixtures
+    World([ROBOTS["e-puck"]], BoxSpec("disc", tuple(regular(200))))
 
 
 def test_a_box_may_grow_along_its_width_only() -> None:
