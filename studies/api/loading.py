@@ -15,7 +15,7 @@ from ..errors import SpecError
 from ..results import foreign, published
 from ..results.parts import join_parts
 from ..results.results import combine
-from ..spec.tables import TomlTable
+from ..spec.tables import SpecTable, TomlTable
 from ..store.store import Store
 from .comparison import Comparison
 from .study import Place, StudyResults
@@ -160,6 +160,7 @@ def _load_one(path: Path) -> StudyResults:
 def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResults:
     """Return the results of several studies, or of parts of one, as those of one."""
     whole = join_parts([(study.outline, study.results) for study in studies])
+    tables = dict[str, SpecTable]()
     if whole is not None:
         outline, results = whole
         labels = [{c: c for c in results.columns}] * len(studies)
@@ -172,6 +173,7 @@ def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResul
             [study._settings for study in studies],
         )
         outline = studies[0].outline._replace(columns=results.columns)
+        tables = {n: study.outline.table for n, study in zip(names, studies, strict=True)}
     settings = dict[str, TomlTable]()
     failed = list[tuple[str, int, str]]()
     for study, new in zip(studies, labels, strict=True):
@@ -185,5 +187,6 @@ def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResul
         _sources=studies[0]._sources,
         _settings=settings,
         _directories=tuple(path for study in studies for path in study._directories),
+        _tables=tables,
         _is_whole=False,
     )

@@ -38,7 +38,7 @@ from ..results.notation import wrapped
 from ..results.results import Results, read
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, other_spec, sources_of
-from ..spec.tables import TomlTable
+from ..spec.tables import SpecTable, TomlTable
 from ..store import durable
 from ..store.store import Store
 from .comparison import Comparison
@@ -74,6 +74,8 @@ class StudyResults:
     _sources: Sources = field(default_factory=Sources, repr=False)
     _settings: Mapping[str, TomlTable] = field(default_factory=dict, repr=False)
     _directories: tuple[Path, ...] = ()
+    _tables: Mapping[str, SpecTable] = field(default_factory=dict, repr=False)
+    """Specs of several studies by name, if these are not parts of one."""
     _is_whole: bool = True
 
     @classmethod

@@ -105,6 +105,7 @@ def _draw_formulas(axes: Axes, rows: Sequence[CostRow], looks: Looks) -> None:
     axes.set_title(f"by formula, |S| = {problem.rules:,}, |A| = {problem.actions:,}", loc="left")
     axes.set_ylabel("log10(operations)")
     for name, look in looks.items():
+        values: dict[int, int | None]
         if name == SINGLE_AGENT:
             values = {row.agents: row.single_agent for row in rows}
         else:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from nested_agents.studies.results import laws
+from nested_agents.studies.results import curves, laws, samples
 from nested_agents.studies.results.analysis import Difference, adjust, verdict_lines
 from nested_agents.studies.results.notation import format_number
 from nested_agents.studies.results.power import (
@@ -204,7 +204,7 @@ def test_told_exponents_are_found_as_often_as_promised() -> None:
     for _ in range(times):
         logs = 0.5 * rng.standard_normal((20, 4)) / 2.0**0.5
         others = 0.5 * rng.standard_normal((20, 4)) / 2.0**0.5 + least * np.log(sizes)
-        samples = [laws.of_numbers(sizes, np.exp(own)) for own in (others, logs)]
-        pair = [laws.fit(laws.POWER, sample, 2) for sample in samples]
+        both = [samples.of_numbers(sizes, np.exp(own)) for own in (others, logs)]
+        pair = [laws.fit(curves.POWER, sample, 2) for sample in both]
         hits += laws.compare(*pair).p < 0.05
     assert 0.74 < hits / times < 0.88
