@@ -84,7 +84,8 @@ def coverage(checked: Sequence[Check]) -> list[str]:
             by_law.setdefault((check.team, check.measure), []).append(check.is_inside)
         shares = np.array([np.mean(inside) for inside in by_law.values()])
         inside = sum(check.is_inside for check in own)
-        factor = np.median([np.sqrt(c.predicted.high / c.predicted.low) for c in own])
+        with np.errstate(divide="ignore"):  # the interval of a rate may begin at 0
+            factor = np.median([np.sqrt(c.predicted.high / c.predicted.low) for c in own])
         text = f"{name}: {inside} of {len(own)} inside, {len(shares)} laws"
         if len(shares) > 1:
             text += f", share {format_estimate(bootstrap(shares, bounds=(0.0, 1.0)))}"

@@ -99,7 +99,8 @@ class Law(NamedTuple):
     def predict(self, size: float, level: float = 0.9, seeds: int | None = None) -> Estimate:
         """Return the law at a size, with an interval of the mean of so many new seeds there.
 
-        By default they are as many as were fitted. The interval lies within the sample's bounds.
+        By default they are as many as were fitted. The interval follows the drift of the largest
+        sizes; it contains the law and lies within the sample's bounds.
         """
         check_sizes(np.array(size))
         shares = 0.5 - level / 2.0, 0.5 + level / 2.0
@@ -114,7 +115,7 @@ class Law(NamedTuple):
         return Estimate(*(np.asarray(np.clip(end, *self.sample.bounds)) for end in (value, *ends)))
 
     def distribution(self, size: float, seeds: int | None = None) -> Mixture:
-        """Return the distribution of the mean of new seeds on the scale, centered on the law."""
+        """Return the distribution of the mean of new seeds on the scale, the drift included."""
         return self._distribution(size, self.noise / (seeds or self.seeds))
 
     def _distribution(self, size: float, noise: float) -> Mixture:
@@ -126,7 +127,7 @@ class Law(NamedTuple):
             (noise / float(self.sample.scale.weight(value)[0]), self._freedom),
         ]
         left = self._drift(x)
-        return _mixed(left.weights, float(value[0]), left.variances + left.shifts**2, parts)
+        return _mixed(left.weights, float(value[0]) + left.shifts, left.variances, parts)
 
     @property
     def _freedom(self) -> float:
@@ -156,16 +157,16 @@ class Law(NamedTuple):
 
 
 def _mixed(
-    weights: Array, mean: float, variances: Array, parts: Sequence[tuple[float, float]]
+    weights: Array, means: Array, variances: Array, parts: Sequence[tuple[float, float]]
 ) -> Mixture:
-    """Return a mixture around a mean; each of `parts` is a further variance and its freedom.
+    """Return a mixture of distributions; each of `parts` is a further variance and its freedom.
 
     Degrees of freedom of sums are Satterthwaite's (1946).
     """
     total = variances + sum(part for part, _ in parts) + FLAT**2
     lack = sum(part**2 / freedom for part, freedom in parts)
     freedoms = np.minimum(total**2 / (lack + FLAT**6), MOST_FREEDOM)
-    return Mixture(weights, np.full_like(total, mean), total, freedoms)
+    return Mixture(weights, means, total, freedoms)
 
 
 def fit(curve: Curve, sample: Sample, resamples: int = RESAMPLES) -> Law:

@@ -70,12 +70,13 @@ class ScalingLaw(NamedTuple):
     def legend(self) -> tuple[str, ...]:
         """How the table's values and intervals are computed, in lines."""
         text = "Intervals of parameters: 95%, seeds resampled, Student's."
+        scales = {law.sample.scale for _, law, *_ in self.fits if law is not None}
         if self.predicted:
             text += (
-                " Predictions: the law at that size, on the scale of the study's table, with the "
-                "90% interval of the mean of as many seeds."
+                " Predictions: the law at that size, with the 90% interval of the mean of as many "
+                "seeds, which follows the drift of the largest sizes."
             )
-        if any(law and law.sample.scale is GEOMETRIC for _, law, *_ in self.fits):
+        if GEOMETRIC in scales:
             text += " Times to a criterion are geometric means."
         return tuple(wrapped(text))
 

@@ -51,9 +51,10 @@ def fit(
 ) -> int:
     """Fit how results grow with the size of teams: exponents, floors, break points, predictions.
 
-    DIR is where a study is kept that sweeps a size, FILE.json a file of results. Conditions that
-    agree in all else have a law each: a power law, one with a floor or a break point; of rates a
-    logistic curve. The one is taken that best predicts the largest sizes from those below.
+    DIR is the folder of a study that sweeps a size, FILE a file of results. Several folders are
+    fitted together if their specs are equal except for the size. Conditions that agree in all else
+    have a law each: a power law, one with a floor or a break point; for rates a logistic curve. The
+    command chooses the law that best predicts the largest sizes from those below.
     """
     from ...api.growth import scaling_law
 
