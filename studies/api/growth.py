@@ -110,11 +110,12 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
     Methods are those of teams that are built for this; a study whose files are not trusted, or
     that is known by its table alone, has none.
     """
-    key = laws_of_results.size_key(results.columns, size)
+    columns = laws_of_results.columns_of(results)
+    key = laws_of_results.size_key(columns, size)
     groups: dict[str, list[tuple[float, str]]] = {}
     for condition, settings in _condition_settings(study).items():
-        if condition in results.columns:
-            row = results.columns[condition]
+        if condition in columns:
+            row = columns[condition]
             with study._sources.active(), suppress(ValueError, ImportError):
                 method = search_method(arrange(settings, 0).team)
                 groups.setdefault(label_but(row, [key]), []).append((float(str(row[key])), method))

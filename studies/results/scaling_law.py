@@ -178,8 +178,9 @@ def scaling_law(
         If there is no such measure, phase or key, the key is no number, a size is below 1 or not
         finite, or the criterion is no share.
     """
-    key = size_key(results.columns, size)
-    sizes = {c: float(str(own[key])) for c, own in results.columns.items()}
+    columns = columns_of(results)
+    key = size_key(columns, size)
+    sizes = {c: float(str(own[key])) for c, own in columns.items()}
     for condition, n in sizes.items():
         _check_size(key.rpartition(".")[2], n, f" (condition {condition!r})")
     for n in predict:
@@ -200,7 +201,7 @@ def scaling_law(
     bounds = shown_as.bounds if criterion is None else NOT_NEGATIVE
     groups: dict[str, list[str]] = {}
     for condition in samples:
-        groups.setdefault(label_but(results.columns[condition], [key]), []).append(condition)
+        groups.setdefault(label_but(columns[condition], [key]), []).append(condition)
     fits = []
     for group, members in groups.items():
         members.sort(key=sizes.__getitem__)
@@ -213,6 +214,13 @@ def scaling_law(
 def _check_size(name: str, size: float, where: str = "") -> None:
     if not 1.0 <= size <= MAX_SIZE:
         raise SpecError(f"{name} = {size:g}{where}: allowed are sizes from 1 to {MAX_SIZE:,}")
+
+
+def columns_of(results: Results) -> Mapping[str, Mapping[str, object]]:
+    """Return what distinguishes each condition; without columns it is its label."""
+    if any(results.columns.values()):
+        return results.columns
+    return {condition: {"condition": condition} for condition in results.columns}
 
 
 def size_key(columns: Mapping[str, Mapping[str, object]], size: str | None = None) -> str:

@@ -132,13 +132,7 @@ class Compared(TypedDict):
 )
 @options.plot
 @options.where
-@click.option(
-    "--columns",
-    multiple=True,
-    metavar="ROLE=COLUMN",
-    help="What the columns of a table of scores are, with commas between: condition and score "
-    "(each may be several, as condition=model+topology), seed, item; by default those called so.",
-)
+@options.columns
 @click.option(
     "--better",
     type=click.Choice(["higher", "lower"]),

@@ -192,6 +192,41 @@ def test_a_search_method_that_changes_is_remarked(tmp_path) -> None:
     )
 
 
+def table(path, sizes, of, seeds=4):
+    """Write a table of scores whose means are those of a law; deviations of seeds sum to zero."""
+    deviations = [0.9, 0.95, 1.05, 1.1]
+    rows = [f"{n},{seed},{of(n) * deviations[seed]}" for n in sizes for seed in range(seeds)]
+    path.write_text("\n".join(["agents,seed,score", *rows]) + "\n")
+    return str(path)
+
+
+def test_a_table_of_scores_is_fitted(tmp_path, capsys) -> None:
+    path = table(tmp_path / "scores.csv", (1, 2, 4, 8), lambda n: 3.0 * n**1.5)
+    assert main(["fit", path, "--columns", "condition=agents", "--predict", "16"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "power law, mean = 3 n^1.5 (4 seeds, 4 sizes from 1 to 8 agents)" in out
+    assert "192 [" in out
+    labeled = tmp_path / "labels.csv"
+    labeled.write_text((tmp_path / "scores.csv").read_text().replace("agents", "condition"))
+    assert main(["fit", str(labeled)]) == 0
+    assert "mean = 3 n^1.5 (4 seeds" in " ".join(capsys.readouterr().out.split())
+
+
+def test_tables_of_other_sizes_are_joined(tmp_path, capsys) -> None:
+    small = table(tmp_path / "small.csv", (1, 2), lambda n: 3.0 * n**1.5)
+    large = table(tmp_path / "large.csv", (4, 8), lambda n: 3.0 * n**1.5)
+    assert main(["fit", small, large, "--columns", "condition=agents"]) == 0
+    assert "mean = 3 n^1.5 (4 seeds, 4 sizes" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_table_with_a_size_below_one_is_refused(tmp_path, capsys) -> None:
+    path = table(tmp_path / "scores.csv", (0.5, 2, 4), lambda n: 3.0 * n**1.5)
+    assert main(["fit", path, "--columns", "condition=agents"]) == 2
+    error = capsys.readouterr().err
+    assert "agents = 0.5" in error
+    assert error.count("\n") == 1
+
+
 def test_the_published_study_of_scaling_by_command_and_in_python(capsys, tmp_path) -> None:
     file = ROWS / "scaling.json"
     figure = tmp_path / "law.svg"
