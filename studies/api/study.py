@@ -22,7 +22,7 @@ from html import escape
 from itertools import chain
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...core.interface.measures import RETURN, SUCCESS
 from ...core.numerics import pd
@@ -56,6 +56,13 @@ Place = str | PathLike[str]
 """Of a directory or a file."""
 
 
+class Defaults(NamedTuple):
+    """What `StudyResults.compare` compares unless it is told otherwise."""
+
+    measure: str | None = None
+    by: str | None = None
+
+
 @dataclass(frozen=True)
 class StudyResults:
     """What the finished trials of a study measured, or those of several studies together.
@@ -77,6 +84,7 @@ class StudyResults:
     _tables: Mapping[str, SpecTable] = field(default_factory=dict, repr=False)
     """Specs of several studies by name, if these are not parts of one."""
     _is_whole: bool = True
+    _defaults: Defaults = field(default_factory=Defaults)
 
     @classmethod
     def of(cls, store: Store) -> StudyResults:
@@ -194,10 +202,11 @@ class StudyResults:
         SpecError
             If there is no such key, measure, phase or reference.
         """
+        by = by or self._defaults.by
         key = None if by == "condition" else by
-        name = self.results.main.name if measure is None else measure
+        name = measure or self._defaults.measure or self.results.main.name
         compared = contrasts(self.results, name, phase, key, reference)
-        return Comparison(compared, self._of_controls)
+        return Comparison(compared, (*self._of_controls, *self.remarks))
 
     def where(self, choice: str) -> StudyResults:
         """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `chosen`."""

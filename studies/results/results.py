@@ -80,6 +80,8 @@ class Results:
     """What is measured of an episode, of any condition; success first."""
     usage: tuple[str, ...] = ()
     """Names of the numbers that differ from run to run, times first."""
+    pairs_episodes: bool = False
+    """Whether conditions are compared on the episodes that both have, such as questions."""
     step_limits: StepLimits = UNLIMITED
     """Longest episode that the spec allows."""
 
@@ -110,6 +112,12 @@ class Results:
         if rows is None or not measure:
             return rows is not None if phase else condition in self._finished
         return measure in self._measured and not np.isnan(self._measured[measure][rows]).any()
+
+    def has_any(self, condition: str, phase: str, measure: str) -> bool:
+        """Tell whether any episode of a phase has a measure, or it is none of episodes."""
+        rows = self._rows.get((phase, condition), np.empty(0, int))
+        values = self._measured.get(measure, np.zeros(len(self.episodes)))
+        return not np.isnan(values[rows]).all()
 
     def of_phase(self, phase: str) -> tuple[str, ...]:
         """Return the conditions that have episodes of a phase."""
@@ -143,12 +151,19 @@ class Results:
         return self.values(condition, SUCCESS.name, phase)
 
     def by_seed(self, condition: str, phase: str, measure: str = SUCCESS.name) -> pd.DataFrame:
-        """Return the `values`: a row for each seed, a column for each episode."""
-        return pd.DataFrame(self.values(condition, measure, phase), self.seeds(condition))
+        """Return a measure's values: a row for each seed that has any, a column for each episode.
+
+        An episode that a seed lacks is not a number.
+        """
+        rows = self._rows[phase, condition]
+        places = self.episodes[["seed", "episode"]].iloc[rows]
+        frame = places.assign(value=self._measured[measure][rows]).dropna(subset="value")
+        wide = frame.pivot(index="seed", columns="episode", values="value")
+        return wide.loc[frame["seed"].unique()]
 
     def means(self, condition: str, phase: str, measure: str = SUCCESS.name) -> pd.Series:
-        """Return the means of `values` by seed."""
-        return pd.Series(self.values(condition, measure, phase).mean(axis=1), self.seeds(condition))
+        """Return the means of a measure's values by seed, of the seeds that have any."""
+        return row_means(self.by_seed(condition, phase, measure))
 
     def other_evaluations(self, condition: str) -> dict[str, str]:
         """Return the phases of a condition's evaluations beside its own, by their names."""
@@ -160,10 +175,14 @@ class Results:
 
     @cached_property
     def main(self) -> Measure:
-        """The measure by which conditions are judged: the first, or returns if nothing is one."""
+        """The measure that is compared: the first, or the return if that never varies.
+
+        Where returns are left out, it is the first measure that can vary.
+        """
         main = main_measure(self.measures)
-        is_left_out = main == RETURN and self.episodes[RETURN.name].isna().all()
-        return self.measures[0] if is_left_out and self.measures else main
+        if main != RETURN or self.episodes[RETURN.name].notna().any():
+            return main
+        return next((m for m in self.measures if not (m.is_rate and m.greatest == 0.0)), main)
 
     @cached_property
     def identical(self) -> tuple[tuple[str, ...], ...]:
@@ -199,6 +218,13 @@ class Results:
         names = {"steps", "return", *(measure.name for measure in self.measures)}
         columns = self.episodes[[name for name in self.episodes if name in names]]
         return {n: own.to_numpy(dtype=float, na_value=np.nan) for n, own in columns.items()}
+
+
+def row_means(values: pd.DataFrame) -> pd.Series:
+    """Return the mean of each row without its missing values."""
+    array = np.ascontiguousarray(values.to_numpy(dtype=float))
+    mean = np.nanmean if np.isnan(array).any() else np.mean
+    return pd.Series(mean(array, axis=1), values.index)
 
 
 UNKNOWN = "agent groups"
@@ -444,7 +470,9 @@ def combine(
     usage = (name for part in parts for name in part.usage)
     measures = join_measures(part.measures for part in parts)
     results = assemble(episodes, trials, phases, columns, measures, usage)
-    return replace(results, step_limits=_loosest(part.step_limits for part in parts)), labels
+    limits = _loosest(part.step_limits for part in parts)
+    pairs_episodes = any(part.pairs_episodes for part in parts)
+    return replace(results, step_limits=limits, pairs_episodes=pairs_episodes), labels
 
 
 def _loosest(limits: Iterable[StepLimits]) -> StepLimits:

@@ -136,7 +136,7 @@ def of_times(sizes: Array, values: Array, censored: BoolArray) -> Sample:
     return Sample(sizes, np.log(values), values, censored, np.ones(len(sizes)), GEOMETRIC)
 
 
-def of_rates(sizes: Array, rates: Array, episodes: Array | int) -> Sample:
+def of_rates(sizes: Array, rates: Array, episodes: Array | float) -> Sample:
     """Return a sample of success rates ``(n_seeds, m)``, each of so many episodes.
 
     Raises

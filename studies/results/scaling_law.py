@@ -197,7 +197,7 @@ def scaling_law(
         samples = _decisions(results, measure, criterion)
         title = f"decisions to {format_number(criterion)} of {measure}"
         shown_as, own = SUCCESS, ""
-    counts = _episodes(results, shown_as, own) if shown_as.is_rate and criterion is None else {}
+    counts = _episodes(results, own) if shown_as.is_rate and criterion is None else {}
     bounds = shown_as.bounds if criterion is None else NOT_NEGATIVE
     groups: dict[str, list[str]] = {}
     for condition in samples:
@@ -260,12 +260,11 @@ def _is_number(value: object) -> bool:
     return True
 
 
-def _episodes(results: Results, measure: Measure, phase: str) -> dict[str, int]:
-    return {
-        c: results.values(c, measure.name, phase).shape[1]
-        for c in results.of_phase(phase)
-        if results.has(c, phase, measure.name)
-    }
+def _episodes(results: Results, phase: str) -> dict[str, float]:
+    """Return the mean number of episodes of a seed by condition."""
+    own = results.episodes[results.episodes["phase"] == phase]
+    counts = own.groupby("condition", sort=False)["seed"].agg(["size", "nunique"])
+    return dict(counts["size"] / counts["nunique"])
 
 
 def _decisions(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
+from ...results.contrasts import mean_estimate, values_by_seed
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rates
 from ..study import measure as measure
@@ -84,7 +85,7 @@ def analyse(results: Results) -> Analysis:
     main = results.main
     for condition in conditions:
         estimates: dict[str, Estimate] = {}
-        episodes = results.values(condition, measures[0].name).shape[1]
+        episodes = results.by_seed(condition, "training", main.name).shape[1]
         for title, m, block in metrics_of(measures, main, results.steps("evaluation"), episodes):
             phase = "evaluation" if block == "evaluation" else "training"
             if results.has(condition, phase, m.name):  # published results keep a part
@@ -114,14 +115,15 @@ def _leave_out_same(table: Sequence[Summary]) -> None:
 
 
 def _of_evaluations(results: Results) -> Analysis:
-    """Estimate what was measured after training: results of others may have no more."""
-    table = []
-    for condition in results.of_phase("evaluation"):
-        estimates = {}
-        for m in results.measures:
-            estimates[m.heading] = estimate_of(results, condition, "evaluation", m)
-        table.append(Summary(condition, len(results.seeds(condition)), estimates))
-    return Analysis(tuple(table))
+    """Estimate what was measured after training: results of other tools may have no more."""
+    estimates: dict[str, dict[str, Estimate]] = {c: {} for c in results.conditions}
+    for m in results.measures:
+        _, values, _ = values_by_seed(results, m.name)
+        for condition, own in values.items():
+            estimates[condition][m.heading] = mean_estimate(m, own)
+    return Analysis(
+        tuple(Summary(c, len(results.seeds(c)), own) for c, own in estimates.items() if own)
+    )
 
 
 def draw(analysis: Analysis) -> Figures:

@@ -7,7 +7,7 @@ import click
 from ...errors import refused
 from .. import options
 from ..display import Form, in_form, print_data, print_table, print_text
-from ..loading import load_results
+from ..loading import read_results, say_remarks
 
 
 @click.command()
@@ -61,7 +61,8 @@ def fit(
     """
     from ...api.growth import scaling_law
 
-    loaded = load_results(sources, where=where, trust=trust, columns=columns)
+    loaded = read_results(sources, where=where, trust=trust, columns=columns)
+    say_remarks(loaded)
     growth = scaling_law(
         loaded, measure, phase=phase, size=size, criterion=criterion, predict=predict
     )
