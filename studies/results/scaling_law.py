@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
