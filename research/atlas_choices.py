@@ -13,14 +13,14 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from ..core.numerics import pd
-from ..studies.results import laws
-from ..studies.results.notation import format_estimate, format_p
-from ..studies.results.samples import Sample, apart
-from ..studies.results.statistics import LEVEL, paired_tests, rate
-from .atlas import MEASURES, NO_FAULT, quality, sample_of
+from nested_agents import rate
+from nested_agents.analysis import LEVEL, format_estimate, format_p, laws, paired_tests
+from nested_agents.analysis import samples as samples_of_laws
+
 from .atlas_predictions import largest_small
+from .atlas_rows import MEASURES, NO_FAULT, quality, sample_of
 
 CASE = ["task", "learner", "fault"]
 """Columns of which every combination is a case."""
@@ -106,9 +106,11 @@ def _choice(
     return HierarchyChoice(case, measure, size, predicted, tuple(rivals), str(nearest), best, p)
 
 
-def _is_above(samples: Mapping[str, Sample], one: str, other: str, size: int) -> bool:
+def _is_above(
+    samples: Mapping[str, samples_of_laws.Sample], one: str, other: str, size: int
+) -> bool:
     """Return whether one hierarchy is better than another, by the 90% interval of its lead."""
-    lead = laws.choose(apart(samples[one], samples[other]))
+    lead = laws.choose(samples_of_laws.apart(samples[one], samples[other]))
     return lead.distribution(size).quantile(TAIL) > 0.0
 
 
