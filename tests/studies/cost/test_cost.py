@@ -406,7 +406,7 @@ def test_the_paper_s_numbers_are_reproduced() -> None:
 def test_the_axis_of_operations_is_their_logarithm(said, agents, tmp_path, monkeypatch) -> None:
     drawn = []
     monkeypatch.setattr(figures, "write", lambda figure, path: drawn.append(figure))
-    names = ("chain", "teams", "tree:2", "coordination-graph")
+    names = ("chain", "best-response", "fitted-q", "hierarchy-ppo")
     command = ("--agents", agents, "--topology", *names, "single-agent", "--plot", "cost.png")
     assert said(*command)[0] == 0
     (figure,) = drawn
