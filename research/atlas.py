@@ -19,8 +19,8 @@ from ..studies.api.running import run
 from ..studies.errors import SpecError
 from ..studies.presentation.progress import Terminal
 from ..studies.results import laws
-from ..studies.results.foreign import read_table
 from ..studies.results.results import Results
+from ..studies.results.score_files import read_table
 from ..studies.spec.controls import LEARN_NOTHING
 from ..studies.spec.tables import label_but
 from ..studies.store import durable
@@ -167,7 +167,7 @@ def read_rows(folder: Path = COMMITTED) -> pd.DataFrame:
     files = sorted(folder.glob("*.parquet"))
     if not files:
         raise SpecError(f"{folder}: holds no rows of the atlas, TASK.parquet")
-    frames = [read_table(path).assign(source=path.stem) for path in files]
+    frames = [read_table(path).frame.assign(source=path.stem) for path in files]
     rows = pd.concat(frames, ignore_index=True)
     return rows.assign(loss=-rows["return"]) if "return" in rows else rows
 

@@ -110,6 +110,7 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
     from ...topologies.builders import join_names
     from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
     from ..presentation.progress import count, say
+    from ..spec.controls import TROUBLESHOOTING
 
     directory = study.directory
     print_study(study)
@@ -121,7 +122,7 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
         names = join_names(study.unlearned, 3)
         print_wrapped(
             f"{names}: no better than frozen weights in evaluation. What to try, and in which "
-            "order: docs/not_learned.md; nested-agents tune tries it for you.",
+            f"order: {TROUBLESHOOTING}; nested-agents tune tries it for you.",
             first="hint    ",
             indent=8,
         )

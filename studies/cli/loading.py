@@ -32,24 +32,35 @@ def open_study(directory: Path) -> Iterator[Store]:
 
 
 def load_results(
+    sources: Sequence[Path], *, study: str | None = None, where: str | None = None, trust: bool
+) -> StudyResults:
+    """Return the results at some places, as a study analyses them, and print their remarks."""
+    results = read_results(sources, where=where, trust=trust)
+    say_remarks(results)
+    return results if study is None else results.as_study(study)
+
+
+def read_results(
     sources: Sequence[Path],
     *,
-    study: str | None = None,
-    where: str | None = None,
+    where: str | None,
     trust: bool,
     columns: Sequence[str] = (),
-    better: Literal["higher", "lower"] = "higher",
+    better: Literal["higher", "lower"] | None = None,
 ) -> StudyResults:
-    """Return the results at some places, as a study analyses them, or a choice of the trials."""
+    """Return the results at some places, or a choice of their trials."""
     from ..api.loading import load
 
     if trust:
         trust_files(*sources)
     results = load(*sources, columns=columns, better=better)
+    return results if where is None else results.where(where)
+
+
+def say_remarks(results: StudyResults) -> None:
+    """Print the remarks on results, apart from what other programs read."""
     for remark in results.remarks:
         say(remark)
-    results = results if where is None else results.where(where)
-    return results if study is None else results.as_study(study)
 
 
 def trust_files(*sources: Path) -> None:
@@ -98,9 +109,9 @@ def untrusted(source: Path) -> dict[str, str]:
             files = store.sources()
             tables: object = [store.spec(), *store.settings().values()]
     else:
-        from ..results import published  # pandas takes its time
+        from ..api.loading import load  # pandas takes its time
 
-        tables = published.load(source).outline.table
+        tables = load(source).outline.table
     return _untrusted(source, files, tables)
 
 
