@@ -9,12 +9,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from itertools import chain
-from shlex import quote
 from shutil import get_terminal_size
 from textwrap import fill
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from ...core.plugins.printing import printable
+from ...core.plugins.printing import printable, shell_word
 
 if TYPE_CHECKING:
     from ..api.study import StudyResults
@@ -126,7 +125,7 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
             first="hint    ",
             indent=8,
         )
-    typed = quote(str(directory))
+    typed = shell_word(directory)
     print_text(f"rows    nested-agents results {typed} --format csv")
     print_text(f"report  nested-agents report {typed}")
     if study.failed:
