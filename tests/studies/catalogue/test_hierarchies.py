@@ -79,7 +79,8 @@ def test_what_the_reference_has_not_finished_is_not_compared() -> None:
         arrays.pop("topology=chain, value_of=team, robots=8")
     results.seeds["topology=chain, value_of=own, robots=8"] = tuple(range(40, 60))
     analysis = analyse(results.frames())
-    assert list(analysis.differences) == ["2 robots, own", "2 robots, team"]
+    assert list(analysis.differences) == ["2 robots, own", "2 robots, team", "8 robots, own"]
+    assert not any(d.paired for d in analysis.differences["8 robots, own"])
     assert len(analysis.table) == 11
 
 
