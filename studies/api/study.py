@@ -30,7 +30,7 @@ from ...core.plugins.sources import Sources
 from ...core.plugins.words import closest
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
-from ..presentation.headlines import headlines
+from ..presentation.headlines import below_random, headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.choices import choose_trials
 from ..results.contrasts import contrasts, power_with_first
@@ -137,9 +137,9 @@ class StudyResults:
 
     @property
     def _of_controls(self) -> tuple[str, ...]:
-        """What must be said of controls, in lines, see `nested_agents.studies.spec.controls`."""
+        """Remarks on controls, and on learners that are below them, in lines."""
         there = {c: self._settings[c] for c in self.conditions if c in self._settings}
-        return control_lines(there)
+        return (*control_lines(there), *below_random(self.results, there))
 
     @property
     def unlearned(self) -> tuple[str, ...]:

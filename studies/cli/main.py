@@ -128,13 +128,25 @@ def nested_agents() -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
-    # SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
+    warnings.formatwarning = _format_warning
+    # `core.fonts` says it in one line for all characters of a figure.
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     warnings.filterwarnings("ignore", message=r".*joblib will operate in serial mode")  # never used
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors in REFUSING:
             stream.reconfigure(errors=IN_ASCII)
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
+
+
+def _format_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    line: str | None = None,
+) -> str:
+    """Return a warning in one line, without the place in the code that raises it."""
+    return printable(f"{PROGRAM}: warning: {' '.join(str(message).split())}\n")
 
 
 def _check_address_space() -> None:

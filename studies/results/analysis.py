@@ -17,7 +17,7 @@ from ...core.numerics import pd
 from ..errors import WIDTH
 from .notation import format_estimate, format_p, wrapped
 from .power import power_lines
-from .results import STEPS, Results
+from .results import STEPS, Results, row_means
 from .statistics import (
     LEVEL,
     NOT_NEGATIVE,
@@ -71,12 +71,13 @@ def estimate_of(
     results: Results, condition: str, phase: str, measure: Measure, part: slice = slice(None)
 ) -> Estimate:
     """Return the mean of a measure of episodes, or of a part, with its interval over seeds."""
-    values = results.values(condition, measure.name, phase)[:, part]
-    if measure.is_rate:
+    values = results.values(condition, measure.name, phase, part)
+    if measure.is_rate and not np.isnan(values).any():
         return rate(values)
+    means = row_means(pd.DataFrame(values)).to_numpy()
     if measure.name == STEPS.name:
-        return steps_estimate(values.mean(axis=1), results.steps(phase))
-    return bootstrap(values.mean(axis=1), bounds=measure.bounds)
+        return steps_estimate(means, results.steps(phase))
+    return bootstrap(means, bounds=measure.bounds)
 
 
 def estimate_over_seeds(values: Array, measure: Measure) -> Estimate:

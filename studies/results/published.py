@@ -24,7 +24,7 @@ from ..store.database import SECONDS as PARTS
 from ..store.durable import read_text
 from .exported import Description
 from .json_values import JsonValue, parse
-from .results import SECONDS, Array, Results, StepLimits, from_arrays
+from .results import SECONDS, Array, Results, StepLimits, from_arrays, pad_rows
 
 GATHERINGS = get_args(Measure.__annotations__["gathering"])
 """How the steps of an episode make one number."""
@@ -201,10 +201,14 @@ Packed = Sequence[object] | dict[str, object]
 
 
 def _pack(values: np.ndarray, *, is_rate: bool) -> Packed:
+    is_ragged = bool(np.isnan(values).any())
+    rows = [row[~np.isnan(row)] for row in values]
     if not is_rate:
-        return _constant(values) or values.tolist()
-    rows = ["".join("1" if v else "0" for v in row) for row in values]
-    return rows if len(rows) < FEW else {"flags": "".join(rows), "shape": list(values.shape)}
+        return [row.tolist() for row in rows] if is_ragged else _constant(values) or values.tolist()
+    flags = ["".join("1" if v else "0" for v in row) for row in rows]
+    if is_ragged or len(flags) < FEW:
+        return flags
+    return {"flags": "".join(flags), "shape": list(values.shape)}
 
 
 def _constant(values: np.ndarray) -> Packed | None:
@@ -341,10 +345,11 @@ def _arrays(
                 raise ValueError(f"{own.key}: no measure is called so")
             unpack = _unpack_rates if name in rates else _unpack
             array = unpack(own, room, len(seeds[condition]), MOST_EPISODES)
-            if name == "steps" and (array.dtype.kind != "i" or array.min() < 0):
+            known = array[~np.isnan(array)]
+            if name == "steps" and not ((known == np.rint(known)) & (known >= 0)).all():
                 raise own.refusal("whole numbers, none below 0")
             arrays[condition][name] = array
-        if len({array.shape for array in arrays[condition].values()}) > 1:
+        if len({np.isnan(array).tobytes() for array in arrays[condition].values()}) > 1:
             raise ValueError(f"{value.key}: must have as many episodes of every measure")
     return arrays
 
@@ -376,8 +381,10 @@ def _unpack(value: JsonValue, room: Room, n_seeds: int, *most: int) -> Array:
     if isinstance(value.content, dict):
         number = value.child("all").number()
         array = np.full(room.take(value.child("shape"), n_seeds, *most), number)
+    elif most:
+        array = pad_rows([row.array(1) for row in value.items()] or [np.empty(0)])
     else:
-        array = value.array(1 + len(most))
+        array = value.array(1)
     return _check_rows(array, value, n_seeds)
 
 
@@ -389,10 +396,8 @@ def _unpack_rates(value: JsonValue, room: Room, n_seeds: int, most: int) -> Arra
         if len(flags) != math.prod(shape):
             raise value.child("shape").refusal(f"that of {len(flags)} flags")
         return _check_rows(flags.reshape(shape), value, n_seeds)
-    rows = [_bits(row) for row in value.items()]
-    if len(set(map(len, rows))) > 1:
-        raise value.refusal("rows of equal length")
-    return _check_rows(np.array(rows), value, n_seeds)
+    rows = [_bits(row) for row in value.items()] or [np.empty(0)]
+    return _check_rows(pad_rows(rows), value, n_seeds)
 
 
 def _bits(value: JsonValue) -> Array:

@@ -59,6 +59,7 @@ class StepLimits(NamedTuple):
 
 
 UNLIMITED = StepLimits()
+EVERY_EPISODE = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,17 +124,28 @@ class Results:
         """Return the conditions that have episodes of a phase."""
         return tuple(condition for own, condition in self._rows if own == phase)
 
-    def values(self, condition: str, measure: str, phase: str = "training") -> Array:
-        """Return what was measured of a condition's episodes, ``(n_seeds, n_episodes)``.
+    def values(
+        self,
+        condition: str,
+        measure: str,
+        phase: str = "training",
+        part: slice = EVERY_EPISODE,
+    ) -> Array:
+        """Return a measure of the episodes of a condition ``(n_seeds, n_episodes)``.
+
+        Seeds that train for a number of decisions may have different numbers of episodes. The rows
+        of those with fewer end in values that are not a number.
 
         Parameters
         ----------
         condition
-            Its label.
+            Label of the condition.
         measure
             Name of a measure, ``steps`` or ``return``.
         phase
-            Of the episodes.
+            Phase of the episodes.
+        part
+            Episodes of each seed, such as its last five.
 
         Raises
         ------
@@ -142,9 +154,12 @@ class Results:
         """
         rows = self._rows[phase, condition]
         values = self._measured[measure][rows]
-        if measure in ("steps", *(m.name for m in self.measures if m.is_rate)):
-            values = values.astype(int)
-        return values.reshape(len(np.unique(self.episodes["seed"].to_numpy()[rows])), -1)
+        seeds = self.episodes["seed"].to_numpy()[rows]
+        starts = 1 + np.flatnonzero(seeds[1:] != seeds[:-1])
+        series = [own[part] for own in np.split(values, starts)]
+        values = pad_rows(series)
+        is_whole = measure in ("steps", *(m.name for m in self.measures if m.is_rate))
+        return values.astype(int) if is_whole and not np.isnan(values).any() else values
 
     def success(self, condition: str, phase: str = "training") -> Array:
         """Return the `values` of success."""
@@ -218,6 +233,23 @@ class Results:
         names = {"steps", "return", *(measure.name for measure in self.measures)}
         columns = self.episodes[[name for name in self.episodes if name in names]]
         return {n: own.to_numpy(dtype=float, na_value=np.nan) for n, own in columns.items()}
+
+
+def pad_rows(rows: Sequence[Array]) -> Array:
+    """Return rows as one array, in which those that are shorter end in NaN.
+
+    Examples
+    --------
+    >>> pad_rows([np.array([1, 2]), np.array([3])]).tolist()
+    [[1.0, 2.0], [3.0, nan]]
+    """
+    longest = max(map(len, rows))
+    if all(len(row) == longest for row in rows):
+        return np.stack(rows)
+    padded = np.full((len(rows), longest), np.nan)
+    for own, row in zip(padded, rows, strict=True):
+        own[: len(row)] = row
+    return padded
 
 
 def row_means(values: pd.DataFrame) -> pd.Series:
@@ -345,7 +377,7 @@ def from_arrays(
     ----------
     phases
         By phase, condition and name of a measure, ``steps`` or ``return``, the values
-        ``(n_seeds, n_episodes)``.
+        ``(n_seeds, n_episodes)``. Episodes that a seed does not have are not a number.
     seeds
         By condition, in the order of the arrays' rows.
     numbers, usage
@@ -365,7 +397,8 @@ def from_arrays(
                 where = {"seed": np.repeat(own, count), "phase": phase}
                 where["episode"] = np.tile(np.arange(count), len(own))
                 values = {name: array.ravel() for name, array in arrays.items()}
-                episodes.append(pd.DataFrame({**label, **where, **values}))
+                known = ~np.all([np.isnan(own) for own in values.values()], axis=0)
+                episodes.append(pd.DataFrame({**label, **where, **values})[known])
         kept = {**numbers.get(condition, {}), **usage.get(condition, {})}
         trials.append(pd.DataFrame({**label, "seed": own, "state": DONE, **kept}))
     names = [name for own in usage.values() for name in own]

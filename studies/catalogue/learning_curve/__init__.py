@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
@@ -24,6 +26,7 @@ BLOCK = 5
 """Episodes at each end of training that the table averages over."""
 BLOCKS = {"first": slice(BLOCK), "last": slice(-BLOCK, None), "evaluation": slice(None)}
 """The episodes that the table averages over, of training or of evaluation, by name."""
+UNEQUAL = "Seeds trained for different numbers of episodes; curves end with the shortest."
 COLUMNS = 3
 """Panels of the figure that stand beside each other, but for four, which are a square."""
 
@@ -98,8 +101,10 @@ def analyse(results: Results) -> Analysis:
     for m in dict.fromkeys((main, *measures)):
         own = [c for c in conditions if results.has(c, "training", m.name)]
         if own and (m == main or not m.is_rate):
-            followed.append((m, {c: results.values(c, m.name) for c in own}))
-    return Analysis(tuple(table), cases=followed)
+            values = {c: results.values(c, m.name) for c in own}
+            followed.append((m, values))
+    is_ragged = any(np.isnan(v).any() for _, values in followed for v in values.values())
+    return Analysis(tuple(table), (UNEQUAL,) * is_ragged, followed)
 
 
 def _leave_out_same(table: Sequence[Summary]) -> None:
@@ -141,7 +146,8 @@ def draw(analysis: Analysis) -> Figures:
     figure, panels = f.grid(len(followed), columns, (2.8, 2.1), (0.0, 1.0), 7.2, sharex=True)
     seeds = {line.condition: line.seeds for line in analysis.table}
     for axes, (measured, training) in zip(panels.flat, followed, strict=False):
-        for condition, curve in curves_of(measured, training).items():
+        complete = {c: v[:, ~np.isnan(v).any(axis=0)] for c, v in training.items()}
+        for condition, curve in curves_of(measured, complete).items():
             episodes = range(len(curve.value))  # counted from 0, as in rows and specs
             marker = "o" if len(curve.value) == 1 else None
             band = 0.12 if curve.value.any() else 0.0  # those that never succeed share one band

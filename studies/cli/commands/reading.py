@@ -5,12 +5,11 @@ import json
 import sys
 import time
 from pathlib import Path
-from shlex import quote
 from typing import Literal, TypedDict, Unpack
 
 import click
 
-from ....core.plugins.printing import printable
+from ....core.plugins.printing import printable, shell_word
 from ...api.status import describe, failures, progress
 from ...errors import SpecError, refused
 from ...presentation.progress import say
@@ -57,7 +56,7 @@ def status(directory: Path, watch: bool) -> int:
     for text in failures(failed):
         print_text(f"\n{text}")
     if failed:
-        print_text(f"\nto run them again: nested-agents retry {quote(str(directory))}")
+        print_text(f"\nto run them again: nested-agents retry {shell_word(directory)}")
     return 1 if failed else 0
 
 
