@@ -39,7 +39,7 @@ def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
     assert star.p < 0.05 < tree.p
     assert star.estimate.low < -0.6 < star.estimate.high < -0.4
     text = "\n".join(analysis.notes)
-    of_team = "8 robots, team: evaluation success, less that of chain:\n  worse: star, -."
+    of_team = "8 robots, team: evaluation success, less that of chain:\n  worse: star, -0."
     assert of_team in text
     assert "adjusted over 8 comparisons (Holm)." in text
     assert max(map(len, text.splitlines())) <= 80
