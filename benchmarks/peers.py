@@ -1,8 +1,7 @@
 """Time PPO in a hierarchy, with edges and without: ``python -m benchmarks.peers``.
 
 Agents are the joints of an arm. The processor's time of a decision is taken by size and topology;
-that of an update as a paired ratio: the same number of steps with and without edges in turn. Needs
-the extra ``peers``.
+that of an update as a paired ratio: the same number of steps with and without edges in turn.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.core.interface.experience import Experience, Observation
-from nested_agents.core.networks.policies import HierarchyPPO
+from nested_agents.core.networks.agents import PPOAgents
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
@@ -55,10 +54,10 @@ def updates(rounds: int) -> dict[str, list[float]]:
     teams, taken = {name: acting(UPDATED, name) for name in TOPOLOGIES}, {}
     for _ in range(rounds):
         for name, (scenario, team, states) in teams.items():
-            buffer = team.only(HierarchyPPO).policies["all"].model.rollout_buffer
+            rollout = team.only(PPOAgents).policies["all"].rollout
             last = False
             while not last:
-                last = buffer.pos == buffer.buffer_size - 1
+                last = rollout.steps == len(rollout.rewards) - 1
                 seen = Observation(states, scenario)
                 decision = team.act(seen)
                 transition = scenario.step(np.zeros(UPDATED, dtype=int))

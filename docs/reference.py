@@ -56,7 +56,7 @@ MODULES = {
         "interface.spaces", "interface.scenario", "interface.prediction", "interface.measures",
         "interface.experience", "interface.agents", "interface.plain", "hierarchy.hierarchy",
         "hierarchy.turns", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
-        "functions.settings", "functions.plain", "functions.recorded", "agents.mixed",
+        "functions.settings", "functions.agents", "agents.mixed",
         "agents.team", "agents.fuzzy", "agents.peer",
         "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
         "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",

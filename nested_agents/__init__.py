@@ -60,7 +60,7 @@ _PLACES = {
     "Prediction": ("core.interface.prediction", "Prediction"),
     "Placement": ("core.interface.agents", "Placement"),
     "Peer": ("core.agents.peer", "Peer"),
-    "PeerSettings": ("core.networks.settings", "PeerSettings"),
+    "PeerSettings": ("core.agents.peer", "PeerSettings"),
     "Scenario": ("core.interface.scenario", "Scenario"),
     "ScenarioSettings": ("core.plugins.settings", "ScenarioSettings"),
     "Session": ("studies.trials.session", "Session"),

@@ -36,21 +36,10 @@ FOLDER = "sources"
 """Where a study keeps copies, below its own directory."""
 MOST_BYTES = 1_000_000
 """Of a file; a larger one is no program."""
-ANSWERS = "answers.db"
-"""Where a study keeps what functions have answered, see `core.functions.recorded`."""
 TEAMS = ".npz"
 """Suffix of files that hold what a team remembers; as text they are kept in base 64."""
 GRAPHS = (".graphml", ".json", ".toml")
 """Suffixes of files that hold a hierarchy."""
-
-
-class Answers(NamedTuple):
-    """Where a study keeps what functions of users have answered."""
-
-    path: Path
-    """The file."""
-    calls: bool = True
-    """Whether they may be called for answers that are missing."""
 
 
 class Checkpoints(NamedTuple):
@@ -86,8 +75,6 @@ class Sources:
 
     Attributes
     ----------
-    answers
-        Where functions' answers are kept; none: nowhere.
     checkpoints
         Where trials put down what they have come to; none: nowhere.
 
@@ -108,7 +95,6 @@ class Sources:
         brought_by: str | None = None,
     ) -> None:
         self.folder = folder
-        self.answers: Answers | None = None
         self.checkpoints: Checkpoints | None = None
         self._texts = dict(texts or {})
         self._studies = [place for place in (study, folder) if place is not None]
@@ -124,7 +110,7 @@ class Sources:
 
     def __getstate__(self) -> dict[str, Any]:
         # Of what was sent to a worker all that is known is that its sender has run it.
-        own = {"_was_sent": True, "answers": self.answers, "checkpoints": self.checkpoints}
+        own = {"_was_sent": True, "checkpoints": self.checkpoints}
         return {**vars(Sources(None, self._texts)), **own}
 
     @property
@@ -137,7 +123,6 @@ class Sources:
         sources = Sources(None, {name: self.text(name) for name in sorted(names)})
         sources._brought = {name: by for name, by in self._brought.items() if name in names}
         sources._brought_by = self._brought_by
-        sources.answers = self.answers
         return sources
 
     def text(self, name: str) -> str:

@@ -12,7 +12,6 @@ from itertools import product
 from string import ascii_uppercase
 from textwrap import wrap
 
-from ...scenarios.matrix_games.plays import whole_episode
 from ...studies.catalogue.study import check_evaluated as check
 from ...studies.catalogue.study import distinct, system_of
 from ...studies.errors import WIDTH
@@ -36,7 +35,7 @@ COLUMNS = 3
 
 def measure(trial: Trial) -> TrialResult:
     """Train, and evaluate after the first and the last episode; imported by name in workers."""
-    session = Session(trial, whole_episode)
+    session = Session(trial)
     session.train(1)
     with session.team.drawing_apart():
         session.evaluate(phase=AFTER_ONE)

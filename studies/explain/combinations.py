@@ -44,15 +44,13 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "worlds"
 PLAYERS: SpecTable = {"kind": f"{EXAMPLES / 'levers.py'}:Levers", "players": 3}
 LEVERS = Setting(PLAYERS, "players", "player1", PLAYERS)
 """For Q-learning: a state holds what was done. Every player is a body."""
-NETWORK: SpecTable = {"hidden": [8], "batch_size": 4}
-POLICY: SpecTable = {**NETWORK, "rollout": 4, "epochs": 1}
+POLICY: SpecTable = {"hidden": [8], "batch_size": 4, "rollout": 4, "epochs": 1}
 BATCH: SpecTable = {"kind": "batch-td", "weights": "role"}
 SHORT: dict[str, SpecTable] = {
     "ppo": POLICY,
     "ippo": POLICY,
     "hierarchy-ppo": POLICY,
     "mappo": POLICY,
-    "dqn": {**NETWORK, "begin": 2},
     "written": {"value": {"distance": -1.0}},
 }
 """What learners are set to in trials so short."""
@@ -187,7 +185,7 @@ def spec_of(learner: str, changes: SpecTable) -> dict[str, object]:
         "steps": 4,
         "evaluation": 1,
         "scenario": world.scenario,
-        "agents": "team" if learner == "dqn" else "actuator",
+        "agents": "actuator",
         **changes,
         "learner": {**own, **laid},
     }

@@ -39,7 +39,6 @@ def test_the_smallest_benchmark_runs(run: Run, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_ppo_in_a_hierarchy_is_timed(run: Run) -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     lines = run("benchmarks.peers", "--number", "1", "--rounds", "1").splitlines()
     assert lines[-1].startswith("update of 8 agents, chain / independent: ")
 

@@ -95,14 +95,14 @@ def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(
     ("spec", "extras", "agents"),
     [
-        ("swimmer", ("mujoco", "stable_baselines3"), {2}),
-        ("swimmer_4", ("mujoco", "stable_baselines3"), {4}),
+        ("swimmer", ("mujoco",), {2}),
+        ("swimmer_4", ("mujoco",), {4}),
         ("swimmer_transfer", ("mujoco",), {4}),
         ("swimmer_n", ("mujoco",), {2, 4, 8, 16}),
         ("spread", ("mpe2",), {3}),
-        ("spread_ppo", ("mpe2", "stable_baselines3"), {3}),
+        ("spread_ppo", ("mpe2",), {3}),
         ("aloha", (), {10}),
-        ("aloha_ppo", ("stable_baselines3",), {10}),
+        ("aloha_ppo", (), {10}),
         ("aloha_copies", (), {10}),
     ],
 )
@@ -110,7 +110,7 @@ def test_specs_of_worlds_of_others_run(
     spec: str, extras: tuple[str, ...], agents: set[int]
 ) -> None:
     for extra in extras:
-        pytest.importorskip(extra, reason="extras mpe, mujoco, peers")
+        pytest.importorskip(extra, reason="extras mpe, mujoco")
     path = SPECS / f"{spec}.toml"
     few = ["seeds=1", "episodes=2", "steps=3", "evaluation=1"]
     teams = set()

@@ -1,8 +1,6 @@
 """The benchmark push-n: its worlds, its rules, its entries."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any, get_args
 
@@ -144,19 +142,6 @@ def test_specs_that_break_a_rule(
     assert message in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.slow
-def test_a_learner_of_another_library_is_entered(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    pytest.importorskip("stable_baselines3")
-    path = tmp_path / "ppo.json"
-    script = ROOT / "examples" / "benchmark_ppo.py"
-    subprocess.run([sys.executable, script, path, "64"], check=True, timeout=280)
-    assert main(["benchmark", "check", str(path)]) == 0
-    assert "PPO of examples, 2 robots x 5 seeds" in capsys.readouterr().out
-    assert push_n.load_entry(path).teams[0].decisions == (64,) * 5
 
 
 def test_the_command_offers_what_entries_may_be() -> None:

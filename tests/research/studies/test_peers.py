@@ -1,7 +1,4 @@
-"""The peers study: evaluations on the way, comparison and figure; of ours alone, as they are quick.
-
-What stable-baselines3 learns is in tests/core/networks.
-"""
+"""The peers study: evaluations on the way, comparison and figure."""
 
 from pathlib import Path
 

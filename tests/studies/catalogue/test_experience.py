@@ -81,7 +81,7 @@ def test_a_report_does_without_the_success_of_episodes_in_many_worlds(tmp_path):
         ({"decisions": 79}, "less than a rollout of 80 decisions in 4 environments"),
         ({"decisions": None}, "learner.environments = 4: needs a budget in decisions"),
         ({"study": "learning-curve"}, "learning-curve counts episodes"),
-        ({"learner": {"kind": "ppo", "environments": 4}}, "learner.environments"),
+        ({"learner": {"kind": "ppo", "environments": 0}}, "learner.environments"),
         ({"preset": "fitted-q", "learner": {"environments": 4}}, "learner.environments"),
     ],
 )

@@ -117,14 +117,11 @@ SHORT = {"rollout": 4, "batch_size": 4, "epochs": 1, "hidden": [8]}
         ({"kind": "hierarchy-ppo", **SHORT}, "actuator", {"messages": 1, "joint_actions": 8}),
         ({"kind": "mappo", **SHORT}, "actuator", {"messages": 0, "joint_actions": 8}),
         ({"kind": "ppo", **SHORT}, "actuator", {"messages": 0, "joint_actions": 8}),
-        ({"kind": "dqn", "hidden": [8]}, "team", {"messages": 0, "agents": 1}),
     ],
 )
 def test_agents_of_every_kind_are_counted(
     learner: dict[str, Any], agents: str, expected: dict[str, float]
 ) -> None:
-    if "hidden" in learner:
-        pytest.importorskip("stable_baselines3", reason="extra [peers]")
     table = {
         "study": "scaling",
         "seeds": [7],
@@ -146,7 +143,6 @@ def test_agents_of_every_kind_are_counted(
 
 
 def test_weights_of_networks_by_hand() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     table = {
         "scenario": {"kind": "line-up", "carts": 2},
         "learner": {"kind": "hierarchy-ppo", "critic": "own", **SHORT},

@@ -20,7 +20,6 @@ GENERATED = "<!-- What follows is printed by: nested-agents combine --format mar
 
 @pytest.mark.slow
 def test_every_cell_runs_or_says_why_not_as_the_page_does() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     every = list(cells())
     count = sum(map(len, AXES.values())) * len(LEARNERS.built_in)
     assert len({cell[:3] for cell in every}) == len(every) == count
@@ -43,8 +42,6 @@ def test_every_cell_runs_or_says_why_not_as_the_page_does() -> None:
     ],
 )
 def test_cells_of_each_verdict(axis: str, case: str, learner: str, verdict: str) -> None:
-    if learner in ("mappo", "mixed"):
-        pytest.importorskip("stable_baselines3", reason="extra [peers]")
     assert attempt(spec_of(learner, AXES[axis][case])).verdict == verdict
 
 

@@ -11,7 +11,7 @@ from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import arrange
 
-FOLDER = Path(__file__).resolve().parents[2] / "examples" / "debate"
+FOLDER = Path(__file__).resolve().parents[1] / "debate"
 sys.path.insert(0, str(FOLDER))
 
 from debate import exact  # noqa: E402 - an example

@@ -1,12 +1,10 @@
-"""
-A debate: agents that err, and who hears whom
-=============================================
+"""A debate among agents that err.
 
-Every agent answers one question of two answers. Its draft is wrong with an error rate of its own.
-It hears the answers of those who tell it, and answers what most of these and its draft say. An
-episode is a debate, each of its steps a round. `exact` tries all drafts of a few agents: how often
-the team is wrong, without a random number. No model is called: a function of yours takes the place
-of `answer`, see docs/tutorials/functions.md.
+Every agent answers one question that has two possible answers. Its draft is wrong with a given
+error rate. It receives the answers of its senders, and answers what the majority of these and its
+own draft say. An episode is a debate, and each step is a round. `exact` enumerates all drafts of a
+few agents and returns how often the team is wrong. No model is called: replace `answer` by your own
+function, see docs/tutorials/functions.md.
 """
 
 from typing import Literal
@@ -89,17 +87,17 @@ def team_errors(wrong, speaks):
     return np.where(share == 0.5, 0.5, share > 0.5)  # a coin decides
 
 
-def answer(observation, told, actions):
-    """Answer what most have answered, the own draft among them, which decides a tie."""
+def answer(observation, received, actions):
+    """Return the answer of the majority, own draft included; the draft decides a tie."""
     draft = actions[int(observation["draft"])]
-    answers = [draft, *(message.action for message in told.values())]
+    answers = [draft, *(message.action for message in received.values())]
     same = answers.count(draft)
     other = actions[1 - actions.index(draft)]
     return {"action": draft if 2 * same >= len(answers) else other, "message": len(answers)}
 
 
 def lead(observation, actions):
-    """Answer the own draft, as a leader that knows better."""
+    """Return the own draft, like a leader that ignores the others."""
     return actions[int(observation["draft"])]
 
 

@@ -1,4 +1,4 @@
-"""PPO in a hierarchy: who is told what, one reward per joint step, what edges are worth."""
+"""Agents that act by PPO: communication, rewards, failures of messages, joint learners."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -32,7 +32,8 @@ TREE = [("a", "b"), ("a", "c"), ("b", "d")]
 def spec_of(topology: Any = "chain", **learner: Any) -> Spec:
     return Spec.of(
         {
-            "study": "peers", "seeds": [10_000], "episodes": 3, "steps": 20, "evaluation": 2,
+            "study": "learning-curve", "seeds": [10_000],
+            "episodes": 3, "steps": 20, "evaluation": 2,
             "scenario": {"kind": "line-up", "carts": CARTS}, "topology": topology,
             "learner": {**SHORT, **learner},
         }
@@ -61,7 +62,8 @@ def team_of(
     scenario: Any, hierarchy: Hierarchy | None = None, failures: Any = (), **table: Any
 ) -> tuple[Team, Any]:
     """A team, and the agents that it is made of."""
-    settings = LEARNERS.model("hierarchy-ppo").model_validate({**SHORT, **table})
+    table = {**SHORT, **table}
+    settings = LEARNERS.model(table["kind"]).model_validate(table)
     hierarchy = hierarchy or Hierarchy(scenario.agents, [])
     team = Team(settings, scenario, hierarchy, np.random.SeedSequence(0), failures)
     return team, team.parts[0]
@@ -82,30 +84,29 @@ def told_of(team: Team, joint: Any) -> Any:
     """What all agents are told ``(n, width)`` who are made to decide a joint action."""
     agents: Any = team.parts[0]
     inputs = agents.perceive(look(agents.scenario), explore=False)
-    inputs.noise[np.arange(len(joint)), joint] = 1e9
+    inputs.noise[0, np.arange(len(joint)), joint] = 1e9
     team.messages.advance(team._walk(look(agents.scenario), (inputs,)))
-    return inputs.seen[:, : agents.width]
+    return inputs.actor[0, :, : len(agents.told_names)]
 
 
 def test_turns_and_messages_by_hand() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     hierarchy = Hierarchy("abcd", TREE)
     slots = slots_of(hierarchy, [0] * 4, [True])
     assert [slot.agents.tolist() for slot in slots] == [[0], [1, 2], [3]]
     told = [list(zip(slot.senders, slot.receivers, strict=True)) for slot in slots]
     assert told == [[], [(0, 1), (0, 2)], [(0, 3), (1, 3)]]
     team, agents = team_of(Players("abcd", 3, "xxyx"), hierarchy, weights="role")
-    turns = [agents._policies_of(slot.agents) for slot in slots]
-    own = [[(policy, places.tolist()) for policy, places in turn] for turn in turns]
-    assert own == [[(0, [0])], [(0, [0]), (1, [1])], [(0, [0])]]
-    assert agents.width == 6  # of a and b; nobody is told by c or d
+    by_role = agents.policies["x"], agents.policies["y"]
+    turns = [agents._grouped(slot.agents) for slot in slots]
+    own = [[(by_role.index(policy), who.tolist()) for policy, who in turn] for turn in turns]
+    assert own == [[(0, [0])], [(0, [1]), (1, [2])], [(0, [3])]]
+    assert len(agents.told_names) == 6  # of a and b; nobody is told by c or d
     by_a, by_b = [0, 0, 1], [1, 0, 0]
     told = told_of(team, [2, 0, 1, 1]).tolist()
     assert told == [[0] * 6, by_a + [0] * 3, by_a + [0] * 3, by_a + by_b]
 
 
 def test_parents_alone_are_heard() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     chain = Hierarchy("abc", pairwise("abc"), told="parents")
     slots = slots_of(chain, [0] * 3, [True])
     assert [slot.receivers.tolist() for slot in slots] == [[], [1], [2]]
@@ -113,54 +114,49 @@ def test_parents_alone_are_heard() -> None:
     silent = Hierarchy("abc", pairwise("abc"), told="none")
     (slot,) = slots_of(silent, [0] * 3, [True])
     assert (slot.agents.tolist(), slot.receivers.tolist()) == ([0, 1, 2], [])
-    assert team_of(Players("abc", 2), silent)[1].width == 0
+    assert not team_of(Players("abc", 2), silent)[1].told_names
 
 
 @pytest.mark.parametrize("weights", ["all", "role", "own"])
 @pytest.mark.parametrize("critic", ["central", "own"])
-def test_the_masked_pass_has_the_probabilities_of_acting(weights: str, critic: str) -> None:
-    torch: Any = pytest.importorskip("torch", reason="extra [peers]")
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+@pytest.mark.parametrize("kind", ["hierarchy-ppo", "ppo"])
+def test_rollouts_hold_the_probabilities_by_which_agents_acted(
+    kind: str, weights: str, critic: str
+) -> None:
     scenario = LineUpSettings(carts=CARTS).build()
     hierarchy = Hierarchy(scenario.agents, pairwise(scenario.agents))
-    team, agents = team_of(scenario, hierarchy, weights=weights, critic=critic)
-    assert len(agents.policies) == {"all": 1, "role": 1, "own": CARTS}[weights]
-    sequence(scenario, team, 24)  # updated after 16, and 8 steps are in the buffers
-    for part in agents.policies.values():
-        buffer, n = part.model.rollout_buffer, len(part.agents)
-        assert buffer.pos == 8
-        told = buffer.observations[:8, :, : agents.width]
-        for row, agent in enumerate(part.agents):
-            assert (told[:, row].sum(axis=1) == len(hierarchy.above(agent))).all()
-        # The first of the eight was decided before the update.
-        seen = torch.as_tensor(buffer.observations[1:8].reshape(7 * n, -1))
-        actions = torch.as_tensor(buffer.actions[1:8].reshape(-1))
-        values, logs, _ = part.model.policy.evaluate_actions(seen, actions)
-        for ours, theirs in ((buffer.log_probs, logs), (buffer.values, values)):
-            assert ours[1:8].ravel() == pytest.approx(theirs.detach().numpy().ravel(), abs=1e-5)
+    own = {"weights": weights, "critic": critic} if kind == "hierarchy-ppo" else {}
+    team, agents = team_of(scenario, hierarchy, kind=kind, **own)
+    expected = {"all": 1, "role": 1, "own": CARTS}[weights] if own else 1
+    assert len(agents.policies) == expected
+    sequence(scenario, team, 24)  # updated after 16, and 8 steps are in the rollouts
+    for name, policy in agents.policies.items():
+        rollout, rows = policy.rollout, agents._rows[name]
+        assert rollout.steps == 8
+        inputs = rollout.actor_inputs[:8, 0]
+        if own:
+            told = inputs[..., : len(agents.told_names)].sum(axis=2)
+            assert (told == [len(hierarchy.above(agent)) for agent in rows]).all()
+        logits = policy.logits(inputs.reshape(-1, inputs.shape[-1])).astype(float)
+        logs = logits - np.log(np.exp(logits).sum(axis=2, keepdims=True))
+        actions = rollout.actions[:8, 0].reshape(*logits.shape[:2], 1)
+        chosen = np.take_along_axis(logs, actions, axis=2).sum(axis=(1, 2))
+        assert rollout.log_probs[:8, 0].ravel() == pytest.approx(chosen, abs=1e-5)
 
 
 def test_permuting_agents_permutes_results() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     first = LineUpSettings(carts=CARTS).build()
-    n, n_actions, names = CARTS, len(first.action_set), first.agents
+    names = first.agents
     order = [2, 0, 3, 1]  # who stands at each place in the second
     edges = [(names[0], names[1]), (names[1], names[2]), (names[2], names[3])]
     second: Any = LineUpSettings(carts=CARTS).build()
     second.agents = tuple(names[i] for i in order)
     _, one = team_of(first, Hierarchy(first.agents, edges), critic="own")
     team, other = team_of(second, Hierarchy(second.agents, edges), critic="own")
-    heard = [[0, 1, 2], [i for i in order if i != 3]]
-    told = [n_actions * heard[0].index(i) + a for i in heard[1] for a in range(n_actions)]
-    n_states = one.inputs.n_own - n
-    columns = [*told, *(len(told) + k for k in range(n_states))]
-    columns += [len(told) + n_states + i for i in order]
-    theirs = dict(one.policies["all"].model.policy.state_dict())
-    first_layer = "mlp_extractor.policy_net.0.weight"
-    theirs[first_layer] = theirs[first_layer][:, columns]
-    other.policies["all"].model.policy.load_state_dict(theirs)
+    rows = [one.input_names.actor.index(name) for name in other.input_names.actor]
+    other.policies["all"].actor.warm_start(one.policies["all"].actor, rows)
     states = first.reset(4)
-    noise = np.random.default_rng(0).gumbel(size=(n, n_actions))
+    noise = np.random.default_rng(0).gumbel(size=(CARTS, len(first.action_set)))
     logits, joint = decided(one, Hierarchy(first.agents, edges), states, noise)
     permuted, acted = decided(other, team.hierarchy, states[order], noise[order])
     assert permuted == pytest.approx(logits[order], abs=1e-6)
@@ -173,13 +169,12 @@ def decided(agents: Any, hierarchy: Hierarchy, states: Any, noise: Any) -> tuple
     team.parts = (agents,)
     seen = look(agents.scenario, states)
     inputs = agents.perceive(seen, explore=False)
-    inputs.noise[:] = noise
+    inputs.noise[0] = noise
     joint = team._walk(seen, (inputs,))
-    return inputs.logits, joint
+    return inputs.logits[0], joint
 
 
 def test_a_joint_step_has_one_reward_for_all() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     scenario = LineUpSettings(carts=CARTS).build()
     for value_of, spread in (("team", 0.0), ("own", 1.0)):
         team, agents = team_of(scenario, value_of=value_of)
@@ -187,7 +182,7 @@ def test_a_joint_step_has_one_reward_for_all() -> None:
         own = np.arange(CARTS, dtype=float)
         transition = Transition(scenario.reset(1), own, False, False, {})
         team.learn(Experience(seen, team.act(seen), transition, last=False))
-        rewards = agents.policies["all"].model.rollout_buffer.rewards[0]
+        rewards = agents.policies["all"].rollout.rewards[0]
         assert (np.ptp(rewards) > 0) == (spread > 0)
 
 
@@ -210,7 +205,6 @@ def failures_of(*tables: dict[str, Any]) -> Any:
 @pytest.mark.parametrize("edges", [TREE[:2], list(pairwise("abc"))], ids=["star", "chain"])
 @pytest.mark.parametrize("failure", FAILURES)
 def test_what_is_told_is_what_arrives(failure: str, edges: Any) -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     n_actions = 3
     hierarchy = Hierarchy("abc", edges)
     failures = failures_of(FAILURES[failure])
@@ -227,7 +221,7 @@ def test_what_is_told_is_what_arrives(failure: str, edges: Any) -> None:
             senders, actions, _ = messages.heard(agent, joint)
             arriving[agent, senders, actions] = 1.0
         messages.advance(joint)
-        assert agents.width == 2 * n_actions, "of a and b, who decide before another"
+        assert len(agents.told_names) == 2 * n_actions, "of a and b, who decide before another"
         assert (told_of(team, joint) == arriving.reshape(3, -1)).all()
 
 
@@ -236,18 +230,15 @@ def echoing(agents: Any, untold: int) -> None:
 
     Of nobody told, they do `untold`.
     """
-    from nested_agents.core.networks.training import set_weights, weights_of
-
-    n_actions = agents.shape[1]
-    weights = weights_of(agents.policies["all"].model.policy)
-    weights = {name: np.zeros_like(array) for name, array in weights.items()}
-    into, out = weights["mlp_extractor.policy_net.0.weight"], weights["action_net.weight"]
-    weights["action_net.bias"][untold] = 0.5
-    for unit in range(agents.width):
+    n_actions = len(agents.scenario.action_set)
+    policy = agents.policies["all"]
+    policy.weights[:] = 0.0
+    (into, _), (out, biases) = policy.actor._layers
+    biases[untold] = 0.5
+    for unit in range(len(agents.told_names)):
         sender, action = divmod(unit, n_actions)
         into[unit, unit] = 5.0
-        out[(action + 1) % n_actions, unit] = 10.0**sender
-    set_weights(agents.policies["all"].model.policy, weights)
+        out[unit, (action + 1) % n_actions] = 10.0**sender
 
 
 @pytest.mark.parametrize(
@@ -262,7 +253,6 @@ def echoing(agents: Any, untold: int) -> None:
     ],
 )
 def test_agents_act_by_what_arrives(failure: Any, joint: list[int]) -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     failures = failures_of(failure) if failure else ()
     world = Players("abc", 4)
     team, agents = team_of(world, Hierarchy("abc", TWO), failures, hidden=(12,))
@@ -273,7 +263,6 @@ def test_agents_act_by_what_arrives(failure: Any, joint: list[int]) -> None:
 
 
 def test_agents_whose_messages_may_fail_begin_as_others_do() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     scenario = LineUpSettings(carts=CARTS).build()
     star = Hierarchy(scenario.agents, [("cart1", f"cart{k}") for k in (2, 3, 4)])
     seen = look(scenario, scenario.reset(3))
@@ -290,7 +279,6 @@ def test_agents_whose_messages_may_fail_begin_as_others_do() -> None:
 
 def test_what_arrives_is_learned_from() -> None:
     """Agents are paid for doing as the one does whom they are told of, in place of the first."""
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     failures = failures_of({"kind": "reparented", "agents": "c", "superior": "b"})
     world = Players("abc", 2)
     table = {"rollout": 32, "learning_rate": 0.003, "entropy": 0.05}
@@ -304,12 +292,11 @@ def test_what_arrives_is_learned_from() -> None:
         team.learn(Experience(seen, decision, transition, last=True))
     for action in (0, 1):
         inputs = agents.perceive(look(world), explore=False)
-        inputs.noise[1, action] = 1e9
+        inputs.noise[0, 1, action] = 1e9
         assert team._walk(look(world), (inputs,))[2] == action
 
 
 def test_without_edges_it_is_mappo_and_by_own_critics_ippo() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     told_nothing = [{"topology": "independent"}, {"topology": {"kind": "chain", "told": "none"}}]
     for kind, critic in (("mappo", "central"), ("ippo", "own")):
         (trial,) = trials_of(spec_of(kind=kind))
@@ -322,7 +309,6 @@ def test_without_edges_it_is_mappo_and_by_own_critics_ippo() -> None:
 
 
 def test_policies_of_probabilities_are_evaluated_by_sampled_actions_too() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     session = Session(trials_of(spec_of())[0])
     session.train(1)
     state = session.team.parts[0].rng.bit_generator.state
@@ -333,8 +319,7 @@ def test_policies_of_probabilities_are_evaluated_by_sampled_actions_too() -> Non
 
 
 def test_what_cannot_be_passed_down_is_refused() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
-    problem = "neighbours decide at the same time and tell each other nothing"
+    problem = "neighbors act at the same time and tell each other nothing"
     with pytest.raises(SpecError, match=problem) as raised:
         check_conditions(spec_of("simultaneous"))
     assert "\n" not in str(raised.value)
@@ -395,9 +380,8 @@ def test_a_learner_of_ones_own_is_given_the_hierarchy_if_it_asks(
 @pytest.mark.slow
 @pytest.mark.parametrize("game", ["climbing", "penalty:-30"])
 def test_a_chain_finds_the_optimum_of_games_where_independent_agents_do_not(game: str) -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     table = {
-        "study": "games", "seeds": [0, 1, 2], "episodes": 5, "steps": 1000, "evaluation": 1,
+        "study": "learning-curve", "seeds": [0], "episodes": 5, "steps": 1000, "evaluation": 1,
         "scenario": {"kind": "matrix-game", "game": game, "observed": "own"},
         "learner": {"kind": "hierarchy-ppo", "discount": 0.0},
         "sweep": {"topology": ["chain", "independent"]},
@@ -407,4 +391,4 @@ def test_a_chain_finds_the_optimum_of_games_where_independent_agents_do_not(game
         rows = run_trial(trial).rows
         last = next(row for row in rows if row.phase == "evaluation")
         rates[trial.settings.topology.kind].append(last.measures["success"])
-    assert rates == {"chain": [1, 1, 1], "independent": [0, 0, 0]}
+    assert rates == {"chain": [1], "independent": [0]}
