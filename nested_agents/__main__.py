@@ -13,7 +13,7 @@ import signal
 from functools import partial
 from types import FrameType
 
-from .core.isolation import drop_empty_entries
+from .core.isolation import drop_empty_entries, restore_child_signal
 
 
 def main() -> int:
@@ -27,6 +27,7 @@ def main() -> int:
         # What is done cannot be interrupted; other handlers Python puts away before it has ended.
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     drop_empty_entries()
+    restore_child_signal()
     from .studies.cli.main import main as run
 
     try:
