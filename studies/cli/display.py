@@ -9,12 +9,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from itertools import chain
-from shlex import quote
 from shutil import get_terminal_size
 from textwrap import fill
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from ...core.plugins.printing import printable
+from ...core.plugins.printing import printable, shell_word
 
 if TYPE_CHECKING:
     from ..api.study import StudyResults
@@ -110,6 +109,7 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
     from ...topologies.builders import join_names
     from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
     from ..presentation.progress import count, say
+    from ..spec.controls import TROUBLESHOOTING
 
     directory = study.directory
     print_study(study)
@@ -121,11 +121,11 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
         names = join_names(study.unlearned, 3)
         print_wrapped(
             f"{names}: no better than frozen weights in evaluation. What to try, and in which "
-            "order: docs/not_learned.md; nested-agents tune tries it for you.",
+            f"order: {TROUBLESHOOTING}; nested-agents tune tries it for you.",
             first="hint    ",
             indent=8,
         )
-    typed = quote(str(directory))
+    typed = shell_word(directory)
     print_text(f"rows    nested-agents results {typed} --format csv")
     print_text(f"report  nested-agents report {typed}")
     if study.failed:

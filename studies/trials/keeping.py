@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...core.interface.measures import Measure
+from ...core.plugins.printing import shell_word
 from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ...core.plugins.words import closest, show
 from ..errors import SpecError
@@ -225,7 +226,8 @@ def _mismatch_of_study(
     if mismatch is not None and is_copy(copy, spec, notes):
         raise SpecError(
             f"{copy}: is not the spec of the study beside it: {mismatch}; if you did not edit it, "
-            f"it is damaged: nested-agents retry {store.directory} goes on by the database"
+            f"it is damaged: nested-agents retry {shell_word(store.directory)} goes on by the "
+            "database"
         )
     return mismatch
 

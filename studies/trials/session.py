@@ -194,10 +194,10 @@ class Session:
         )  # fmt: skip
 
     def train_until(self, decisions: int) -> int:
-        """Let the team learn until it has decided so often in all; return how often it has.
+        """Train the team up to a total number of decisions; return how many there were.
 
-        In many environments at once if its learner says so: then rows are of the first
-        environment's episodes.
+        A learner of many environments trains in all of them at once. Rows are the episodes that
+        ended, in this order; decisions in episodes that are still running at the end count, too.
         """
         environments = self.trial.settings.learner.n_environments
         if self.trial.settings.learner.kind in LEARN_NOTHING:
@@ -233,8 +233,7 @@ class Session:
         rates = [m.name for m in self._measures if m.source == "terminated"]
         done = self.trained
         while self._many.decisions < decisions:
-            ended = self._many.step()
-            if ended is not None:
+            for ended in self._many.step():
                 measured = dict.fromkeys(rates, ended.terminated)
                 row = EpisodeRow("training", done, ended.steps, measured, ended.return_)
                 self._rows.append(row)
@@ -269,6 +268,12 @@ class Session:
         self._keep_team()
         self._evaluate(self._own, phase, observe)
 
+    def evaluate_sampled(self, phase: str = SAMPLED) -> None:
+        """Evaluate by actions drawn from the policy, if the team has one of probabilities."""
+        if self.team.is_sampled:
+            with self.team.drawing_apart():
+                self._evaluate(self._own, phase, None, explore=True)
+
     def run_other_evaluations(self, observers: Mapping[str, Observer] | None = None) -> None:
         """Evaluate in each of the trial's `evaluations`, whatever the others are.
 
@@ -278,9 +283,7 @@ class Session:
         """
         self._go_through_curriculum()
         trial = self.trial
-        if self.team.is_sampled:
-            with self.team.drawing_apart():
-                self._evaluate(self._own, SAMPLED, None, explore=True)
+        self.evaluate_sampled()
         others = transfer(self._own, trial.settings, trial.evaluations, trial.seed)
         for name, there in others:
             with self.team.drawing_apart():

@@ -6,6 +6,7 @@ from typing import TypedDict, Unpack
 
 import click
 
+from ....core.plugins.printing import shell_word
 from .. import options
 from ..display import print_data, print_table, print_text, show_results
 
@@ -100,8 +101,8 @@ def run(
         if not (out / DATABASE).exists() or spec.resolve() != (out / SPEC_FILE).resolve():
             raise
         raise SpecError(
-            f"{error}; if you did not edit {spec}, it is damaged: nested-agents retry {out} goes "
-            "on by the database"
+            f"{error}; if you did not edit {spec}, it is damaged: nested-agents retry "
+            f"{shell_word(out)} goes on by the database"
         ) from None
     return show_results(run(changed, out, observer=Terminal(), **running), figures)
 
