@@ -90,9 +90,6 @@ MODULES = {
         "results.power", "results.contrasts", "results.aggregates", "results.published",
         "catalogue.study", "cost.cost", "cost.profile", "cost.table",
     )),
-    "results": ("What has been published, and what is said of it.", (
-        "claims", "measures", "push_n",
-    )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""
 

@@ -69,6 +69,7 @@ _PLACES = {
     "StackedEnvironments": ("core.interface.stacked", "StackedEnvironments"),
     "StateSpace": ("core.interface.spaces", "StateSpace"),
     "SpecError": ("studies.errors", "SpecError"),
+    "Study": ("studies.catalogue.study", "Study"),
     "StudyResults": ("studies.api.study", "StudyResults"),
     "Summary": ("studies.results.analysis", "Summary"),
     "TDLambdaSettings": ("core.learners.td", "TDLambdaSettings"),

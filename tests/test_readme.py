@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import nested_agents as na
-from nested_agents.research import ROWS
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
+from research import RESULTS
 
 ROOT = Path(__file__).resolve().parent.parent
 WITH_SPECS = ("README.md", "docs/start.md")
@@ -54,7 +54,7 @@ def test_the_python_runs(
 
 
 def test_the_table_of_the_readme_is_published(capsys: pytest.CaptureFixture[str]) -> None:
-    edges = ROWS / "edges.json"
+    edges = RESULTS / "edges.json"
     assert (
         main(["table", str(edges), "--columns", "evaluation success", "--format", "markdown"]) == 0
     )

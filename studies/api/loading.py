@@ -182,7 +182,8 @@ def _open(path: Path) -> Opened:
 def _of_published(path: Path, file: JsonValue) -> StudyResults:
     kept = published.read_file(file)
     remarks = (f"{path}: {kept.note}",) if kept.note else ()
-    return StudyResults(kept.outline, kept.results, (), remarks, Sources(brought_by=str(path)))
+    sources = Sources(path.parent, brought_by=str(path))
+    return StudyResults(kept.outline, kept.results, (), remarks, sources)
 
 
 def _results_of(

@@ -8,9 +8,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from ...core.plugins.sources import Sources, files_in, is_file
+from ...core.plugins.sources import Sources, files_in, is_file, is_reference, split
 from ...core.plugins.trust import is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
+from ...topologies.files import read_file
+from ..errors import refused
 from ..presentation.progress import say
 from ..spec.outline import other_spec
 from ..store.database import DATABASE, SPEC_FILE
@@ -100,7 +102,7 @@ def untrusted(source: Path) -> dict[str, str]:
     """Return the code of others that a study brings along or names, by what it is.
 
     These are the Python files that are kept with it, and modules by name; those of a file of
-    results are named in its spec.
+    results are named in its spec. Of the files that such a spec names, only the study's is run.
     """
     files: dict[str, str] = {}
     if source.is_dir():
@@ -110,14 +112,18 @@ def untrusted(source: Path) -> dict[str, str]:
     else:
         from ..api.loading import load  # pandas takes its time
 
-        tables = load(source).outline.table
+        outline = load(source).outline
+        tables = outline.table
+        if is_reference(outline.study):
+            name = split(outline.study)[0]
+            with refused(f"{source}: study: "):
+                files = {name: Sources(source.parent).text(name)}
     return _untrusted(source, files, tables)
 
 
 def _untrusted(source: Path, files: Mapping[str, str], tables: object) -> dict[str, str]:
     """Return untrusted files, and untrusted modules that tables and files of hierarchies name."""
     texts = {f"{n}, which came with {source},": t for n, t in files.items() if n.endswith(".py")}
-    from ...topologies.files import read_file  # NumPy and pydantic take their time
 
     contents: list[object] = []
     with Sources(None, files).active():

@@ -4,7 +4,6 @@ from typing import Any
 import pytest
 from made_up_results import NOTHING, Arrays, scaling
 
-from nested_agents.research import SPECS
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
 from nested_agents.studies.catalogue.study import draw_figures, load_study
@@ -13,6 +12,7 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import arrange, check_conditions
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
 
 SIZES = {2: 0.9, 8: 0.9, 64: 0.5}
 

@@ -1,4 +1,4 @@
-"""Digests of rows of published studies of boxes: ``python -m benchmarks.digests > FILE``.
+"""Digests of rows of published studies of boxes: ``python -m research.digests > FILE``.
 
 Trials of one seed, cut short, of every published condition in which boxes are pushed. Two files,
 made on two machines or with two builds of Box2D, are compared line by line: equal digests are
@@ -15,10 +15,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import nested_agents as na
-from nested_agents.studies.errors import SpecError
-from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import Session
-from nested_agents.studies.trials.trial import Trial, trials_of
+from nested_agents import Session, Spec, SpecError
+from nested_agents.study import Trial, trials_of
 
 ROOT = Path(__file__).parents[1]
 EPISODES = 2
@@ -53,7 +51,7 @@ def digest(trial: Trial) -> str:
 
 def main() -> None:
     """Print a line for every condition."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.digests", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m research.digests", description=__doc__)
     parser.parse_args()
     for path in specs():
         for trial in trials(path):

@@ -5,8 +5,8 @@ import pytest
 from made_up_results import Arrays
 
 from nested_agents.studies.catalogue.hierarchies import analyse
-from nested_agents.studies.catalogue.hierarchies.pooled import Effect, effects, lines_of
 from nested_agents.studies.results.statistics import Estimate
+from research.studies.edges import Effect, effects, lines_of
 
 SEEDS = 10
 
@@ -40,7 +40,7 @@ def test_effects_are_means_over_settings() -> None:
     assert decisions.p == pytest.approx(2 * 2.0 ** (1 - SEEDS))  # two tests, all signs agree
     text = " ".join(" ".join(lines_of({"star": (success, decisions)}, "chain")).split())
     assert "star (2 settings): success -0.25 [-0.25, -0.25]" in text
-    assert "decisions x1.50 [1.50, 1.50], p = 0.0039: different" in text
+    assert "decisions x1.5 [1.5, 1.5], p = 0.004: different" in text
     assert any(note.startswith("All settings together") for note in analysis.notes)
 
 

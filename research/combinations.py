@@ -1,28 +1,31 @@
-"""What goes with what: every built-in learner against every other part of a condition, by trying.
+"""Compatibility of learners with the other parts of a condition, found by running each pair.
 
-A cell is a learner and one case of an axis: a topology, say, or a failure of messages. It is a
-trial of a few decisions, which is trained, evaluated and, where its team is kept, restored. Then it
-runs; or what the case asks for is left out, as the learner knows nothing of it; or it is refused.
-The sentence that says why is that of the warning, or of the refusal itself.
+``python -m research.combinations [LEARNER ...]`` prints the exceptions as Markdown; ``--write``
+writes them into docs/combinations.md. Each pair of a learner and a case, such as a topology or a
+failure of messages, is a trial of a few decisions, which is trained, evaluated and, where its team
+is kept, restored. It runs; or the part is left out with a warning, because the learner does not use
+it; or it is refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+import argparse
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
-from ...core.learners import LEARNERS, LearnerSettings
-from ...core.plugins.words import closest
-from ..errors import SpecError
-from ..spec.spec import Spec
-from ..spec.tables import SpecTable
-from ..store.durable import TEAM
-from ..trials.arrangement import check_conditions
-from ..trials.session import Session, run_trial
-from ..trials.trial import trials_of
+from nested_agents import LearnerSettings, Spec, SpecError
+from nested_agents.parts import LEARNERS
+from nested_agents.study import Session, check_conditions, run_trial, trials_of
+from nested_agents.terminal import closest, print_lines, run_to_status
 
-"""A spec, or what is laid over it."""
+from . import FOLDER
+
+SpecTable = dict[str, Any]
+PAGE = FOLDER.parent / "docs" / "combinations.md"
+MARK = "<!-- Written by: python -m research.combinations --write -->\n\n"
+"""Line of the page before the generated part."""
+TEAM = "team"
+"""Name of the file that holds a kept team."""
 
 
 class Setting(NamedTuple):
@@ -40,7 +43,7 @@ class Setting(NamedTuple):
 
 BOX: SpecTable = {"kind": "box-pushing", "robots": 2}
 LINE = Setting({"kind": "line-up", "carts": 3}, "carts", "cart1", BOX)
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "worlds"
+EXAMPLES = FOLDER.parent / "examples" / "worlds"
 PLAYERS: SpecTable = {"kind": f"{EXAMPLES / 'levers.py'}:Levers", "players": 3}
 LEVERS = Setting(PLAYERS, "players", "player1", PLAYERS)
 """For Q-learning: a state holds what was done. Every player is a body."""
@@ -230,15 +233,13 @@ def attempt(table: SpecTable) -> Trying:
 
 
 def cells(learners: Sequence[str] = ()) -> Iterator[Combination]:
-    """Run the cells of some learners, or of all that are built in, and yield them axis by axis.
+    """Run every case with some learners, or with all that are built in, axis by axis.
 
     Raises
     ------
     SpecError
-        If there is no such learner, or this is no checkout: a world is one of the examples.
+        If there is no such learner.
     """
-    if not EXAMPLES.is_dir():
-        raise SpecError(f"{EXAMPLES}: is not there; combine runs in a checkout alone")
     unknown = [name for name in learners if name not in LEARNERS.built_in]
     if unknown:
         raise SpecError(f"{unknown[0]}: unknown learner; {closest(unknown[0], LEARNERS.built_in)}")
@@ -246,3 +247,46 @@ def cells(learners: Sequence[str] = ()) -> Iterator[Combination]:
         for learner in learners or LEARNERS.built_in:
             for case, changes in cases.items():
                 yield Combination(axis, case, learner, attempt(spec_of(learner, changes)))
+
+
+def exceptions(tried: Iterable[Combination]) -> Iterator[str]:
+    """Yield a table of what does not run as asked, as Markdown.
+
+    Learners that have the same cases with the same reason share a row.
+    """
+    cases: dict[tuple[str, str, str, str], list[str]] = {}
+    for axis, case, learner, (verdict, sentence) in tried:
+        if verdict != "yes":
+            own = f"learner.kind = {learner!r}"
+            reason = sentence.removeprefix(f"{own}: ").replace(own, "learner.kind = ...")
+            cases.setdefault((axis, verdict, reason, learner), []).append(case)
+    learners: dict[tuple[str, str, str, str], list[str]] = {}
+    for (axis, verdict, reason, learner), own in cases.items():
+        learners.setdefault((axis, ", ".join(own), verdict, reason), []).append(learner)
+    yield "| part | cases | learners | outcome | reason |"
+    yield "|---|---|---|---|---|"
+    for (axis, own_cases, verdict, reason), names in learners.items():
+        outcome = {"left out": "left out", "no": "refused"}[verdict]
+        yield f"| {axis} | {own_cases} | {', '.join(names)} | {outcome} | {reason} |"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print or write the exceptions, and return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m research.combinations", description=__doc__)
+    parser.add_argument("learners", nargs="*", metavar="LEARNER", help="by default all")
+    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
+    options = parser.parse_args(arguments)
+    lines = exceptions(cells(options.learners))
+    if not options.write:
+        print_lines(lines)
+        return 0
+    if options.learners:
+        raise SpecError(f"--write: the page has all learners, not {options.learners}")
+    before, mark, _ = PAGE.read_text(encoding="utf-8").partition(MARK)
+    generated = "".join(f"{line}\n" for line in lines)
+    PAGE.write_text(before + mark + generated, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_to_status("research.combinations", main))
