@@ -104,7 +104,7 @@ RANGE = re.compile(r"(\d{1,15})(?::(\d{1,15})(?::(\*?)(\d{1,15}))?)?", re.ASCII)
 """First and last number, and what is added or multiplied from one number to the next."""
 
 
-class Quantities(TypedDict):
+class QuantityOptions(TypedDict):
     """Quantities of the formulas as they are typed, see `nested_agents.studies.cost.table`."""
 
     memberships: tuple[str, ...]
@@ -165,7 +165,7 @@ def cost(
     network: bool,
     form: costs.Form,
     plot: Path | None,
-    **typed: Unpack[Quantities],
+    **typed: Unpack[QuantityOptions],
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if requested, measured.
 
