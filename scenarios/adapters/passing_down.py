@@ -28,7 +28,7 @@ from ...core.hierarchy.failures import MessageFailure
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.hierarchy.messages import Messages
 from ...core.numerics import FloatArray, IntArray
-from .simulators import flags_by_agent
+from .simulators import Player, flags_by_agent
 
 
 class PassingDownEnv(parallel_to_aec_wrapper):
@@ -72,6 +72,9 @@ class PassingDownEnv(parallel_to_aec_wrapper):
     >>> env.agent_selection, env.observe("robot1.right")[-8:].tolist()
     ('robot1.right', [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     """
+
+    terminations: dict[Player, bool]
+    truncations: dict[Player, bool]
 
     def __init__(
         self,
