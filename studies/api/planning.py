@@ -1,28 +1,25 @@
-"""Tells what a study will take and what it can find, before anything is spent on it.
+"""Estimate the time of a study from pilot episodes, and its statistical power.
 
-Episodes of every condition are tried for a while, to see what a step takes and after how many they
-end, on a seed that no study reports. Deciding and simulating take a time per step. Learning may
-take one per step, too, and one per step kept so far: a regression over all of training grows with
-the square of its length. A process has to start, too, to load or compile what each condition needs,
-and to build each trial: that is measured once. All of this is processor time; the time of the clock
-that it comes to depends on what else the machine does, which is seen while planning.
+One trial of every condition runs a few pilot episodes on a seed that no study reports. The time per
+step is extrapolated to the whole study. Learning by regression over all experience also takes a
+time that grows with the steps kept, so both parts are fitted to the pilot episodes.
 """
 
-import os
+from __future__ import annotations
+
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
 from textwrap import wrap
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core.interface.measures import Measure, main_measure
-from ...core.numerics import FloatArray, IntArray, optimize, pd
+from ...core.numerics import FloatArray, optimize, pd
 from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
@@ -37,87 +34,74 @@ from ..trials.session import Session, run_trial
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import cores
 from ..workers.workers import check_jobs
-from .running import CHECKPOINT, examine
+from .running import examine
 from .study import Place
 
-SEED = 10_000
-"""Of the trials that are tried out."""
-TRIED = 1.0
-"""Processor time [s] for which episodes of training are tried of every condition."""
-TRIED_ACTIONS = "joint actions"
-"""What is counted beside the costs of decisions."""
-EPISODES = 2
-"""That are tried at least, of training and of every evaluation."""
-WHOLE = 10_000
-"""Agents times steps up to which an episode is tried: of more agents its first steps only."""
-QUICK = 0.25
-"""Least steps of the other episodes, as a fraction of the mean of those tried last."""
-LONG = 2.0
-"""Most steps of the other episodes, as a multiple of the longest of those tried last."""
-FASTER = 0.7
-"""By what another process, and other seeds, may take less time than what was tried."""
-SLOWER = 2.2
-"""By what they may take more."""
-KEEPING = np.array([0.02, 0.05, 0.15])
-"""Seconds to hand out a trial and to keep it, from, likely and to: a disk takes longer than a
-processor."""
-STARTS = 5
-"""Starts of a process that a run takes: the command's own, its workers', which start together, and
-as much as three more for the store, the tables and the figures."""
+PILOT_SEED = 10_000
+"""Seed of all pilot episodes."""
+PILOT_S = 1.0
+"""Time after which no further pilot episode of training starts [s]."""
+MIN_PILOT_EPISODES = 2
+"""Minimum number of pilot episodes, of training and of each evaluation."""
+MAX_AGENT_STEPS = 10_000
+"""Maximum product of agents and steps of a pilot episode; larger teams run the first steps only."""
+FASTER = 0.4
+"""Lower end of the range of times, as a fraction: other programs may stop."""
+SLOWER = 2.5
+"""Upper end of the range of times, as a fraction."""
+LONGEST = 2.0
+"""Maximum mean steps of all episodes, as a multiple of the longest pilot episode."""
+STORING_S = 0.05
+"""Time to hand out a trial and to store its results [s]."""
+PROCESS_STARTS = 5
+"""Starts of a process in a run: the command, its workers, and the store, tables and figures."""
 START = f"import {Session.__module__}, matplotlib.pyplot"
-"""What a process imports."""
+"""Program that imports what every process of a run imports."""
+JOINT_ACTIONS = "joint actions"
+"""Name of the number of joint actions tried, among the costs of a decision."""
 
-Range = tuple[float, float]
-"""From and to."""
 
-
-class ConditionCost(NamedTuple):
-    """What a condition takes, by one of its trials."""
+class PilotCost(NamedTuple):
+    """Cost of one condition, extrapolated from its pilot episodes."""
 
     seconds: FloatArray
-    """Processor time [s] of a trial, from, likely and to ``(3,)``."""
-    loading: float
-    """Processor time [s] to import, load and compile what the first step needs, once a process."""
-    memory: float
-    """What the team holds in the end [bytes]."""
+    """Time of one trial [s]: lower, mean, upper ``(3,)``."""
+    startup: float
+    """Time to import, compile and build what the first step needs, once per process [s]."""
     decision: Mapping[str, float]
-    """What a decision costs of what functions count, by name; without functions nothing."""
+    """Mean costs that agents report of one decision, by name; empty if they report none."""
     decisions: int
-    """How many the trials of all seeds take at most."""
+    """Maximum number of decisions of one trial."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a study will take and what it can find."""
+    """Estimated time of a study, and the differences that it can detect."""
 
     outline: StudyOutline
-    """What the study consists of."""
+    """Conditions, seeds and lengths of the study."""
     trials: int
-    """How many there are."""
+    """Number of trials."""
     processes: int
-    """How many run at a time."""
-    seconds: Range | None
-    """Time of the whole study [s], from and to: by how early episodes end that were not tried, and
-    by what else this machine does."""
-    likely: float | None
-    """The same if episodes take as long as those that were tried last, and this machine stays as
-    busy as it is."""
+    """Number of trials that run at a time."""
+    seconds: float | None
+    """Time of the whole study if it goes on as the pilot episodes did [s]; None: no pilot."""
+    range: tuple[float, float] | None
+    """Lower and upper bound of this time [s]; None: no pilot."""
     memory: float | None
-    """Of all processes together [bytes], about."""
+    """Approximate memory of all processes [bytes]; None: no pilot, or unknown on this system."""
     comparisons: int
-    """With the first condition."""
+    """Number of conditions that are compared with the first."""
     measure: Measure
-    """By which conditions are compared: success, or the return where nothing is one."""
+    """Measure by which conditions are compared: success, or the return where there is none."""
     deviation: float | None
-    """Standard deviation of paired differences that is supposed; None: of returns nobody knows."""
+    """Assumed standard deviation of paired differences; None: unknown."""
     smallest: float | None
-    """The smallest difference that is of interest; None: of returns nobody has named one."""
+    """Smallest difference of interest; None: unknown."""
     warnings: tuple[str, ...] = ()
-    """What looks wrong and is not refused, a line each."""
-    costs: Mapping[str, ConditionCost] = field(default_factory=dict)
-    """By label, what conditions take that were tried."""
-    environments: int = 1
-    """Number of environments in which a learner learns at once, the largest of all conditions."""
+    """Doubtful settings that are not refused, one line each."""
+    costs: Mapping[str, PilotCost] = field(default_factory=dict)
+    """Cost of each condition by label."""
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -128,36 +112,35 @@ class Plan:
         outline = self.outline
         n_seeds = len(outline.seeds)
         conditions = count(len(outline.columns), "condition")
-        steps = count(outline.steps, "step")
         processes = count(self.processes, "process", "es")
         yield f"study    {outline.study}: {conditions} x {count(n_seeds, 'seed')}"
-        yield f"trials   {self.trials}, each {outline.lengths} of up to {steps}"
-        if self.environments > 1:
-            yield f"learning in up to {self.environments} environments, whose decisions add up"
-        if self.seconds is not None and self.likely is not None:
-            quick, slow = map(duration, self.seconds)
-            usual = duration(self.likely)
-            yield f"time     about {usual} with {processes}, as episodes take that were tried;"
-            yield f"         {quick} to {slow}, by how early they end and what else runs here"
-        if self.memory is not None:
+        yield (
+            f"trials   {self.trials}, each {outline.lengths} of up to "
+            f"{count(outline.steps, 'step')}"
+        )
+        if self.seconds is not None and self.range is not None:
+            lower, upper = map(duration, self.range)
+            yield f"time     about {duration(self.seconds)} with {processes} ({lower} to {upper}),"
+            yield "         extrapolated from pilot episodes"
+        if self.memory:
             yield f"memory   about {self.memory / 1e9:.1f} GB with {processes}"
-        if any(cost.seconds[1] > CHECKPOINT for cost in self.costs.values()):
-            most = max(cost.memory for cost in self.costs.values()) / 1e6
-            yield f"killed   a trial goes on from its checkpoint, every {duration(CHECKPOINT)}, of"
-            yield f"         about {most:.1f} MB, or starts anew where users' files learn"
         if any(cost.decision for cost in self.costs.values()):
-            yield from self._decisions()
+            yield from self._decision_costs()
         if self.comparisons:
             yield ""
-            supposed = self.deviation, self.smallest
-            is_rate = self.measure.is_rate
-            yield from planned_text(n_seeds, self.comparisons, *supposed, of_rates=is_rate)
+            yield from planned_text(
+                n_seeds,
+                self.comparisons,
+                self.deviation,
+                self.smallest,
+                of_rates=self.measure.is_rate,
+            )
         yield from self._exponents()
         for warning in self.warnings:
             yield from wrap(warning, WIDTH)
 
     def _exponents(self) -> Iterator[str]:
-        """Yield which exponents of growth can be told apart, if sizes are swept."""
+        """Yield which differences of scaling exponents the study can detect, if it sweeps sizes."""
         columns = self.outline.columns
         with suppress(SpecError):
             key = size_key(columns)
@@ -169,22 +152,20 @@ class Plan:
                 yield ""
                 yield from exponent_text(fewest, len(self.outline.seeds), max(1, len(groups) - 1))
 
-    def _decisions(self) -> Iterator[str]:
-        """Yield what a decision costs under every condition, and the study at most."""
+    def _decision_costs(self) -> Iterator[str]:
+        """Yield the costs of a decision by condition, and their maximum over the study."""
         costs = self.costs.values()
         names = list(dict.fromkeys(name for cost in costs for name in cost.decision))
-        width = max(map(len, self.costs))
+        frame = pd.DataFrame({label: cost.decision for label, cost in self.costs.items()}).T
         yield ""
-        yield " ".join([" " * width, *(f"{name:>{len(name)}}" for name in names)])
-        for label, cost in self.costs.items():
-            values = (f"{cost.decision.get(name, 0.0):>{len(name)}.4g}" for name in names)
-            yield " ".join([f"{label:<{width}}", *values])
-        most = (
-            f"{sum(cost.decision.get(n, 0.0) * cost.decisions for cost in costs):,.0f} {n}"
+        yield from frame[names].to_string(float_format="{:.4g}".format).splitlines()
+        n_seeds = len(self.outline.seeds)
+        maxima = (
+            f"{n_seeds * sum(c.decision.get(n, 0.0) * c.decisions for c in costs):,.0f} {n}"
             for n in names
-            if n != TRIED_ACTIONS
+            if n != JOINT_ACTIONS
         )
-        yield from wrap(f"Means of a decision, as tried. The study: at most {', '.join(most)}.")
+        yield from wrap(f"Means of a pilot decision. The study: at most {', '.join(maxima)}.")
 
 
 def plan(
@@ -195,21 +176,21 @@ def plan(
     smallest: float | None = None,
     timed: bool = True,
 ) -> Plan:
-    """Return what a study will take and what it can find; some seconds a condition are run.
+    """Estimate the time of a study and the differences that it can detect.
 
     Parameters
     ----------
     spec
         A `Spec`, a table, or the path of a TOML file.
     jobs
-        Trials at a time; by default one for every core.
+        Number of trials that run at a time; default: one per core.
     deviation
-        Standard deviation that is supposed of the differences of single seeds; by default .25 of
-        success rates, and unknown of returns.
+        Assumed standard deviation of the paired differences of single seeds; default: 0.25 for
+        success rates, unknown for returns.
     smallest
-        The smallest difference that is of interest; by default .2 of success rates.
+        Smallest difference of interest; default: 0.2 for success rates, none for returns.
     timed
-        Whether to try the conditions out.
+        Whether to run pilot episodes, which take some seconds per condition.
 
     Raises
     ------
@@ -222,229 +203,208 @@ def plan(
     measure = main_measure(examine(spec))
     for name, value in (("deviation", deviation), ("smallest", smallest)):
         if value is not None and not 0.0 < value <= (1.0 if measure.is_rate else np.inf):
-            most = " and at most 1" if measure.is_rate else ""
-            raise SpecError(f"--{name} {value:g}: must be above 0{most}")
+            maximum = " and at most 1" if measure.is_rate else ""
+            raise SpecError(f"--{name} {value:g}: must be above 0{maximum}")
     if measure.is_rate:
         deviation = deviation or USUAL_DEVIATION
         smallest = smallest or SMALLEST
     elif deviation is None and smallest is not None:
-        raise SpecError(f"--smallest {smallest:g}: of returns it needs --deviation, too")
+        raise SpecError(f"--smallest {smallest:g}: for returns, give --deviation, too")
     trials = trials_of(spec)
     processes = max(1, min(jobs or cores(), len(trials)))
-    estimate = _estimate(spec, trials, processes) if timed else (None, None, None, {})
-    seconds, likely, memory, costs = estimate
+    conditions = len(spec.conditions())
+    costs: dict[str, PilotCost] = {}
+    seconds = memory = None
+    if timed:
+        starting = PROCESS_STARTS * _time_of_start()
+        with spec.sources.active():
+            costs = {trial.condition: pilot(trial) for trial in trials[:conditions]}
+        seconds = starting + _elapsed(costs, len(spec.seeds), processes)
+        memory = processes * _peak_memory()
     return Plan(
         outline=StudyOutline.of(spec),
         trials=len(trials),
         processes=processes,
-        seconds=seconds,
-        likely=likely,
+        seconds=None if seconds is None else float(seconds[1]),
+        range=None if seconds is None else (FASTER * seconds[0], SLOWER * seconds[2]),
         memory=memory,
-        comparisons=len(spec.conditions()) - 1,
+        comparisons=conditions - 1,
         measure=measure,
         deviation=deviation,
         smallest=smallest,
         warnings=spec.warnings(),
         costs=costs,
-        environments=max(c.settings.learner.n_environments for c in spec.conditions()),
     )
 
 
-def _estimate(
-    spec: Spec, trials: Sequence[Trial], processes: int
-) -> tuple[Range, float, float, dict[str, ConditionCost]]:
-    """Return the time of a study [s], from and to, the likely one, its memory [bytes], and costs.
-
-    These are what conditions take, by label.
-    """
-    begin = time.perf_counter()
-    used = _used()
-    # Ctrl-C is for this process, which then kills that one: it would print a traceback.
-    subprocess.run([sys.executable, "-c", START], check=True, process_group=0)
-    starting = STARTS * (_used() - used)
-    with spec.sources.active():
-        by_label = {
-            trial.condition: try_out(trial, len(spec.seeds))
-            for trial in trials[: len(spec.conditions())]
-        }
-    tried = list(by_label.values())
-    loading = sum(each.loading for each in tried)  # less, if what was compiled here is kept
-    each_seed = np.sum([one.seconds / processes + KEEPING for one in tried], axis=0)
-    quick, usual, slow = len(spec.seeds) * each_seed
-    # Processes that have no trial left wait for the last one.
-    slow += (1 - 1 / processes) * max(each.seconds[-1] for each in tried)
-    busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
-    least = FASTER * busy**0.5  # other programs may stop
-    most = SLOWER * busy  # or go on
-    memory = _peak() + max(each.memory for each in tried)
-    shortest = least * (starting + quick)
-    longest = most * (starting + loading + slow)
-    likely = busy * (starting + loading + usual)
-    return (float(shortest), float(longest)), float(likely), processes * memory, by_label
-
-
-def _peak() -> float:
-    """Return the most memory that this process has had [bytes]; none where no system tells it."""
-    if sys.platform == "win32":
-        return 0.0
-    import resource
-
-    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-    return peak * (1 if sys.platform == "darwin" else 1024)
-
-
-def try_out(trial: Trial, seeds: int = 1) -> ConditionCost:
-    """Return what the trials of a condition take, all of its seeds where it says so."""
-    if trial.decisions is not None:
-        return try_out_decisions(trial, trial.decisions, seeds)
-    alone = replace(trial, seed=SEED, curriculum=(), evaluation=min(trial.evaluation, EPISODES))
-    brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
-    loading = _seconds(partial(run_trial, brief))
-    building = _seconds(partial(Session, alone))
+def pilot(trial: Trial) -> PilotCost:
+    """Run pilot episodes of a trial and return its extrapolated cost."""
+    max_steps = max(2, MAX_AGENT_STEPS // len(trial.world().agents))
     longest = trial.evaluation_steps or trial.steps
-    cut = max(2, WHOLE // len(trial.world().agents))
+    begin = perf_counter()
     session = Session(
-        replace(alone, steps=min(trial.steps, cut), evaluation_steps=min(longest, cut))
+        replace(
+            trial,
+            seed=PILOT_SEED,
+            curriculum=(),
+            evaluation=min(trial.evaluation, MIN_PILOT_EPISODES),
+            steps=min(trial.steps, max_steps),
+            evaluation_steps=min(longest, max_steps),
+        )
     )
-    held = _bytes(session)
-    training = _seconds_of_episodes(session, trial.episodes)
-    in_own = _seconds(session.evaluate)
-    in_others = _seconds(session.run_other_evaluations)
-    rows = session.result().rows
-    by_phase = pd.DataFrame(rows).groupby("phase")["steps"]
-    lengths = {phase: steps.to_numpy(float) for phase, steps in by_phase}
-    steps = lengths.pop("training")
-
-    acting = in_own / sum(lengths.get("evaluation", [1.0]))
-    per_step = (in_own + in_others) / max(sum(map(sum, lengths.values())), 1.0)
-    mean_lengths = [_mean_length(tried, longest, cut) for tried in lengths.values()]
-    evaluating = per_step * np.sum(mean_lengths, axis=0)
-
-    episodes = np.array([*(stage.episodes for stage in trial.curriculum), trial.episodes])
-    whole = steps[steps < cut]
-    others = (episodes.sum() - len(whole)) * _mean_length(
-        steps[len(training) // 2 :], trial.steps, cut
+    building = perf_counter() - begin
+    if trial.decisions is None:
+        run_trial(replace(session.trial, episodes=1, steps=2, evaluation_steps=2))  # compiles
+        startup = perf_counter() - begin
+        steps, seconds = _pilot_episodes(session, trial.episodes)
+        n_episodes = np.array([*(stage.episodes for stage in trial.curriculum), trial.episodes])
+        totals = np.outer(_mean_steps(steps, trial.steps, max_steps), n_episodes)
+        decisions = int(n_episodes.sum()) * trial.steps
+        rounds = 1
+    else:
+        _train_for(session, 1)  # compiles
+        startup = perf_counter() - begin
+        steps, seconds = _pilot_rollouts(session, trial.decisions)
+        totals = np.full((3, 1), float(trial.decisions))
+        decisions = trial.decisions
+        rounds = 1 + len(stops(trial.decisions))
+    is_regression = (
+        trial.settings.learner.n_environments == 1 and steps.max(initial=0.0) < max_steps
     )
-    mean = (whole.sum() + others) / episodes.sum()
-    beside = np.array(training) - acting * steps
-    if len(whole):
-        learning = learning_time(steps, beside, mean, episodes)
-    else:  # beginnings do not tell how learning grows
-        learning = mean * episodes.sum() * max(beside.sum(), 0.0) / steps.sum()
-    seconds = building + acting * mean * episodes.sum() + learning
-    growth = mean[-1] * episodes.sum() / steps.sum()
-    memory = held + growth * max(_bytes(session) - held, 0.0)
-    rounds = trial.evaluation * (1 + len(trial.evaluations))
-    decisions = int(episodes.sum()) * trial.steps + rounds * longest
-    whole_trial = seconds + trial.evaluation * evaluating
-    return ConditionCost(whole_trial, loading, memory, _decision(session), seeds * decisions)
+    training = extrapolate(steps, seconds, totals, grows=is_regression)
+    evaluating, lengths = _pilot_evaluations(session, longest, max_steps)
+    n_evaluations = trial.evaluation * (rounds - 1 + len(lengths))
+    mean_lengths = np.mean(lengths, axis=0) if lengths else np.zeros(3)
+    return PilotCost(
+        building + training + evaluating * n_evaluations * mean_lengths,
+        startup,
+        _decision_costs(session),
+        decisions + n_evaluations * longest,
+    )
 
 
-def try_out_decisions(trial: Trial, budget: int, seeds: int = 1) -> ConditionCost:
-    """Return what the trials of a condition take that train for a budget of decisions.
+def extrapolate(
+    steps: FloatArray, seconds: FloatArray, totals: FloatArray, *, grows: bool
+) -> FloatArray:
+    """Return the time to train for more steps than the pilot did [s].
 
-    Rollouts of many environments, or episodes of one, are tried; then two episodes of
-    evaluation, of which there are as many more as there are stops on the way.
+    An episode of T steps takes ``T (a + b N)``, where N is the number of steps kept at its end; a
+    and b are fitted to the pilot episodes.
+
+    Parameters
+    ----------
+    steps, seconds
+        Steps and time [s] of each pilot episode ``(n,)``.
+    totals
+        Steps of each stage of training ``(..., n_stages)``; every stage starts with none kept.
+    grows
+        Whether the time of a step may grow with the steps kept; if not, b is 0.
     """
-    begin = time.process_time()
-    session = Session(replace(trial, seed=SEED, evaluation=min(trial.evaluation, EPISODES)))
-    held = _bytes(session)
-    environments = trial.settings.learner.n_environments
-    piece = max(1, environments * trial.settings.learner.model_dump().get("rollout", 1))
-    learns = trial.settings.learner.kind not in LEARN_NOTHING
-    done = session.train_until(min(piece, budget)) if learns else 0
-    loading = time.process_time() - begin
-    taken = list[tuple[int, float]]()
-    while learns and done < budget and sum(seconds for _, seconds in taken) < TRIED:
-        spent = session.spent
-        reached = session.train_until(min(done + piece, budget))
-        taken.append((reached - done, session.spent - spent))
+    if not len(steps):
+        return np.zeros(totals.shape[:-1])
+    terms = [steps, steps * np.cumsum(steps)][: 1 + grows]
+    per_step, *per_kept = optimize.nnls(np.stack(terms, axis=1), np.maximum(seconds, 0.0))[0]
+    growing = per_kept[0] * (totals**2).sum(axis=-1) / 2 if per_kept else 0.0
+    return np.asarray(per_step * totals.sum(axis=-1) + growing)
+
+
+def _pilot_episodes(session: Session, n_episodes: int) -> tuple[FloatArray, FloatArray]:
+    """Train some episodes; return their steps and times [s], ``(n,)`` each."""
+    seconds = list[float]()
+    while len(seconds) < n_episodes and (
+        len(seconds) < MIN_PILOT_EPISODES or sum(seconds) < PILOT_S
+    ):
+        begin = perf_counter()
+        session.train(1, len(seconds))
+        seconds.append(perf_counter() - begin)
+    rows = session.result().rows
+    steps = [float(row.steps) for row in rows if row.phase == "training"]
+    return np.array(steps), np.array(seconds)
+
+
+def _pilot_rollouts(session: Session, budget: int) -> tuple[FloatArray, FloatArray]:
+    """Train for a part of a budget of decisions; return decisions and times [s], ``(n,)`` each."""
+    steps, seconds = list[float](), list[float]()
+    if session.trial.settings.learner.kind in LEARN_NOTHING:
+        return np.array(steps), np.array(seconds)
+    done = session.train_until(1)
+    while not steps or (done < budget and sum(seconds) < PILOT_S):
+        begin = perf_counter()
+        reached = _train_for(session, done + 1)
+        seconds.append(perf_counter() - begin)
+        steps.append(float(reached - done))
         done = reached
-    training = np.zeros(3)
-    if taken:
-        counts, seconds = np.array(taken).T
-        if environments > 1:  # what is kept between updates does not grow
-            training += budget * seconds.sum() / counts.sum()
-        else:
-            rounds = np.array([budget / counts.mean()])
-            training += learning_time(counts, seconds, np.array([counts.mean()]), rounds)
-    elif learns:
-        training += loading * budget / done
-    held += max(_bytes(session) - held, 0.0) if environments > 1 else 0.0
-    evaluating = _seconds(session.finish)
-    rows = pd.DataFrame(session.result().rows)
-    lengths = rows[rows["phase"] != "training"].groupby("phase")["steps"]
-    longest = trial.evaluation_steps or trial.steps
-    each = [_mean_length(steps.to_numpy(float), longest, longest + 1) for _, steps in lengths]
-    per_step = evaluating / max(float(lengths.sum().sum()), 1.0)
-    evaluations = trial.evaluation * per_step * (sum(each) + len(stops(budget)) * each[0])
-    decisions = budget + trial.evaluation * longest * (len(each) + len(stops(budget)))
-    return ConditionCost(
-        training + evaluations, loading, held, _decision(session), seeds * decisions
-    )
+    return np.array(steps), np.array(seconds)
 
 
-def _decision(session: Session) -> dict[str, float]:
-    """Return what a decision has cost, and how many joint actions were tried, where it is told."""
+def _train_for(session: Session, decisions: int) -> int:
+    """Train until a number of decisions is reached, one whole update at least; return how many."""
+    learner = session.trial.settings.learner
+    update = learner.n_environments * int(learner.model_dump().get("rollout", 1))
+    return session.train_until(decisions - 1 + update)
+
+
+def _pilot_evaluations(
+    session: Session, longest: int, max_steps: int
+) -> tuple[float, list[FloatArray]]:
+    """Evaluate; return the time of a step [s] and the mean steps of each kind of evaluation."""
+    begin = perf_counter()
+    rows = session.finish().rows
+    seconds = perf_counter() - begin
+    lengths: dict[str, list[int]] = {}
+    for row in rows:
+        if row.phase != "training":
+            lengths.setdefault(row.phase, []).append(row.steps)
+    total = sum(map(sum, lengths.values()))
+    means = [_mean_steps(np.array(own, float), longest, max_steps) for own in lengths.values()]
+    return seconds / max(total, 1), means
+
+
+def _mean_steps(pilot: FloatArray, maximum: int, cut: int) -> FloatArray:
+    """Return the mean steps of all episodes: lower, mean, upper ``(3,)``.
+
+    Episodes of `cut` steps did not run to their end; they may have up to `maximum`.
+    """
+    mean = float(pilot.mean())
+    if pilot.max() >= cut:
+        return np.array([mean, (mean + maximum) / 2.0, maximum])
+    return np.array([mean / 2.0, mean, min(maximum, LONGEST * pilot.max())])
+
+
+def _decision_costs(session: Session) -> dict[str, float]:
+    """Return the mean costs of a pilot decision that agents report, and joint actions tried."""
     names = [measure.name for measure in session.team.costs]
     rows = [row for row in session.result().rows if row.measures.keys() >= set(names)]
     steps = sum(row.steps for row in rows)
     if not names or not steps:
         return {}
     costs = {name: sum(row.measures[name] for row in rows) / steps for name in names}
-    return {**costs, TRIED_ACTIONS: session.team.counts.joint_actions / steps}
+    return {**costs, JOINT_ACTIONS: session.team.counts.joint_actions / steps}
 
 
-def _seconds_of_episodes(session: Session, episodes: int) -> list[float]:
-    """Train for a while; return the processor time of each episode [s]."""
-    seconds = list[float]()
-    while len(seconds) < episodes and (len(seconds) < EPISODES or sum(seconds) < TRIED):
-        seconds.append(_seconds(partial(session.train, 1, len(seconds))))
-    return seconds
+def _elapsed(costs: Mapping[str, PilotCost], n_seeds: int, processes: int) -> FloatArray:
+    """Return the time of all trials [s]: lower, mean, upper ``(3,)``."""
+    trials = np.array([cost.seconds for cost in costs.values()])
+    elapsed = n_seeds * (trials / processes + STORING_S).sum(axis=0)
+    elapsed[1:] += sum(cost.startup for cost in costs.values())
+    # At the end, idle processes wait for the last trial.
+    elapsed[2] += (1 - 1 / processes) * trials[:, 2].max()
+    return elapsed
 
 
-def learning_time(
-    steps: FloatArray, seconds: FloatArray, mean: FloatArray, episodes: FloatArray | IntArray
-) -> FloatArray:
-    """Return the processor time [s] to learn from all episodes of a trial.
-
-    An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
-
-    Parameters
-    ----------
-    steps, seconds
-        Of the episodes that were tried: their steps, and the time that was learned from them [s].
-    mean
-        Mean steps of an episode; several possible ones.
-    episodes
-        How many there are in every stage of training.
-    """
-    (per_step, per_kept), _ = optimize.nnls(
-        np.stack([steps, steps * np.cumsum(steps)], axis=1), np.maximum(seconds, 0.0)
-    )
-    kept = mean * (episodes * (episodes + 1)).sum() / 2
-    return np.asarray(mean * (per_step * episodes.sum() + per_kept * kept))
+def _time_of_start() -> float:
+    """Return the time in which a process starts and imports the toolkit [s]."""
+    begin = perf_counter()
+    # Own process group: Ctrl-C reaches this process alone, which then ends the child.
+    subprocess.run([sys.executable, "-c", START], check=True, process_group=0)
+    return perf_counter() - begin
 
 
-def _mean_length(tried: Sequence[float] | FloatArray, most: int, cut: int) -> FloatArray:
-    """Return the mean steps of episodes that were not tried to their ends: from, likely and to."""
-    longest = max(tried)
-    mean = float(np.mean(tried))
-    if longest >= cut:
-        return np.array([mean, (mean + most) / 2.0, most])
-    return np.array([QUICK * mean, mean, min(most, LONG * longest)])
+def _peak_memory() -> float:
+    """Return the peak memory of this process [bytes]; 0 if the system does not report it."""
+    if sys.platform == "win32":
+        return 0.0
+    import resource
 
-
-def _used() -> float:
-    """Return the processor time of this process and of those that it has waited for [s]."""
-    return sum(os.times()[:4])
-
-
-def _seconds(call: Callable[[], object]) -> float:
-    begin = time.process_time()
-    call()
-    return time.process_time() - begin
-
-
-def _bytes(session: Session) -> float:
-    return float(sum(array.nbytes for array in session.team.arrays().values()))
+    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    return peak * (1 if sys.platform == "darwin" else 1024)

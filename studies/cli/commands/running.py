@@ -168,21 +168,21 @@ class Supposed(TypedDict):
     "--deviation",
     type=float,
     metavar="SD",
-    help="Supposed standard deviation of differences of seeds; by default 0.25 of success rates.",
+    help="Assumed standard deviation of differences of seeds; default: 0.25 for success rates.",
 )
 @click.option(
     "--smallest",
     type=float,
     metavar="D",
-    help="The smallest difference of interest; by default 0.2 of success rates.",
+    help="Smallest difference of interest; default: 0.2 for success rates.",
 )
-@click.option("--timed/--no-timed", default=True, help="Try episodes of every condition.")
+@click.option("--timed/--no-timed", default=True, help="Run pilot episodes of every condition.")
 @options.trust
 @options.changes
 def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Unpack[Supposed]) -> int:
-    """Tell trials, time, memory and the differences that a study can find, before it is run.
+    """Estimate the time and memory of a study, and the differences that it can detect.
 
-    SPEC.toml says what to run. Episodes of every condition are tried out for a second.
+    SPEC.toml is the spec of the study. Every condition runs some pilot episodes; nothing is kept.
     """
     from ...api import planning
     from ...spec.spec import Spec
