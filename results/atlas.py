@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..core.numerics import pd
-from ..core.plugins.words import closest
+from ..core.plugins.words import closest, command_line
 from ..studies.api.loading import load
 from ..studies.api.running import run
 from ..studies.errors import SpecError
@@ -111,7 +111,7 @@ def run_tasks(out: Path, jobs: int | None, tasks: Sequence[str] = ()) -> Path:
 def _run(task: str, spec: Path, out: Path, jobs: int | None) -> pd.DataFrame:
     study = run(spec, out, jobs=jobs, observer=Terminal())
     if study.failed:
-        raise SpecError(f"{out}: {len(study.failed)} trials failed: nested-agents status {out}")
+        raise SpecError(f"{out}: {len(study.failed)} trials failed: {command_line('status', out)}")
     names = {c: str(own["name"]).split(", ") for c, own in study.results.columns.items()}
     teams = {c: TeamKind(task, *parts) for c, parts in names.items()}
     return trial_rows(study.results, teams)

@@ -6,7 +6,7 @@ from typing import get_args
 
 import click
 
-from ..core.plugins.words import closest
+from ..core.plugins.words import closest, command_line
 from ..studies import catalogue
 from ..studies.api.running import run as run_study
 from ..studies.api.study import StudyResults
@@ -92,7 +92,9 @@ def _run_one(spec: Path, folder: Path, jobs: int | None) -> StudyResults:
     """Run a study, or what is left of it, of which no trial may fail."""
     ran = run_study(spec, folder, jobs=jobs, observer=Terminal())
     if ran.failed:
-        raise SpecError(f"{folder}: {len(ran.failed)} trials failed: nested-agents status {folder}")
+        raise SpecError(
+            f"{folder}: {len(ran.failed)} trials failed: {command_line('status', folder)}"
+        )
     return ran
 
 

@@ -4,12 +4,12 @@ import io
 import sys
 import time
 from pathlib import Path
-from shlex import quote
 from typing import Literal, TypedDict, Unpack
 
 import click
 
 from ....core.plugins.printing import printable
+from ....core.plugins.words import command_line
 from ...api.status import describe, failures, progress
 from ...errors import SpecError, refused
 from ...presentation.progress import say
@@ -49,7 +49,7 @@ def status(directory: Path, watch: bool) -> int:
     for text in failures(failed):
         print_text(f"\n{text}")
     if failed:
-        print_text(f"\nto run them again: nested-agents retry {quote(str(directory))}")
+        print_text(f"\nto run them again: {command_line('retry', directory)}")
     return 1 if failed else 0
 
 
@@ -250,7 +250,7 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
     """Write one file with a row for every episode, and one with a row for every trial.
 
     DIR is where the study is kept. JSON is one small file of spec, seeds and rounded measures, fit
-    to be published with a paper; `nested-agents table` reads it.
+    to be published with a paper; the command table reads it.
     """
     folder = directory / "export" if out is None else out
     if trust:
@@ -297,9 +297,8 @@ def _contents(store: Store, form: Files) -> dict[str, bytes]:
     try:
         return {f"{name}.parquet": frame.to_parquet() for name, frame in frames.items()}
     except ImportError:
-        raise SpecError(
-            "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"
-        ) from None
+        install = command_line("install", "pyarrow", program="pip")
+        raise SpecError(f"--format parquet: pyarrow is not installed; {install}") from None
 
 
 @click.command()
