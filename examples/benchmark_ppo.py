@@ -4,7 +4,7 @@ Enter a learner of another library in push-n
 
 Stable-baselines3's PPO learns in the Gymnasium environment, is evaluated in the worlds of the
 benchmark, and its entry is written. Needs ``pip install stable-baselines3``. Then ``python
-benchmark_ppo.py ppo.json 20000``, and ``nested-agents benchmark table ppo.json``.
+benchmark_ppo.py ppo.json 20000``, and ``./dev exec nested-agents benchmark table ppo.json``.
 """
 
 import sys

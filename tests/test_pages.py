@@ -34,11 +34,11 @@ PAGES = sorted(
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 NAME = re.compile(r"# (\w+\.\w+)\b")
 UNTESTED = re.compile(r"^# not tested: \S", re.MULTILINE)
-LANGUAGES = {"python", "toml", "json", "sh", "text", "bibtex"}
+LANGUAGES = {"text", "bibtex"}
 DEV = set(re.findall(r"^  ([a-z]+)  ", (ROOT / "dev").read_text(encoding="utf-8"), re.MULTILINE))
-OTHER_PROGRAMS = {"cp", "dask", "eval", "pip"}
+OTHER_PROGRAMS = {"cp", "eval", "pip"}
 SMALL = ("seeds=2", "episodes=2", "steps=8", "evaluation=1")
-NOT_RUN = ("--backend dask", "--measured")
+NOT_RUN = ("--backend dask", "--measured", "--out /tmp")
 """Commands of tutorials that need a cluster or take long; other tests run their like."""
 
 
@@ -69,7 +69,7 @@ def check_command(words: list[str]) -> list[str]:
     if program == "nested-agents":
         parse(nested_agents, click.Context(nested_agents), arguments)
         return arguments
-    assert program in ("python", "pip"), words
+    assert program in ("python", "pip", "dask"), words
     if program == "python":
         is_there = arguments[0] == "-m" and find_spec(arguments[1]) is not None
         assert is_there or (ROOT / arguments[0]).is_file(), words
@@ -134,7 +134,7 @@ def test_the_blocks_of_a_page(
             check_spec(name, text, tmp_path)
         elif language == "json":
             json.loads(text)
-        elif language == "sh":
+        elif language in ("sh", "bash"):
             for words in commands(text):
                 arguments = check_command(words)
                 is_typed = "tutorials/" in page and not any(p in " ".join(words) for p in NOT_RUN)
@@ -145,6 +145,15 @@ def test_the_blocks_of_a_page(
             assert language in LANGUAGES, f"{page}: a block of {language}"
             for words in commands("\n".join(re.findall(r"^\$ .*", text, re.MULTILINE))):
                 check_command(words)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_commands_in_sentences_of_a_page(page: str) -> None:
+    prose = BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8"))
+    for text in re.findall(r"`((?:\./dev |nested-agents |python )[^`]*)`", prose):
+        words = shlex.split(text)
+        if words[0] != "nested-agents" or len(words) > 2:  # two words name a command
+            check_command(words)
 
 
 def test_the_list_of_tutorials_is_complete() -> None:

@@ -117,6 +117,8 @@ class _Commands(click.Group):
 
 @click.group(
     cls=_Commands,
+    help="Define hierarchies of learning agents and measure how learning, failure recovery and cost "
+    "scale.",
     epilog=f"To begin with: {command_line('demo')}",
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
@@ -124,7 +126,7 @@ class _Commands(click.Group):
     None, "-V", "--version", package_name=PROGRAM, message=f"{PROGRAM} %(version)s"
 )
 def nested_agents() -> None:
-    """Define hierarchies of learning agents and measure how learning, failure recovery and cost scale."""
+    """Parse the options that all commands share."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
