@@ -11,7 +11,7 @@ ROOT = Path(__file__).parent
 FOLDERS = ("core", "topologies", "scenarios", "studies")
 NEEDED = {
     "torch": "core/networks/*.py",
-    "mujoco": "scenarios/swimmers.py",
+    "mujoco": "plugins/swimmers/nested_agents_swimmers/*.py",
 }
 """Modules that need an extra."""
 collect_ignore_glob = [pattern for extra, pattern in NEEDED.items() if not find_spec(extra)]

@@ -27,7 +27,7 @@ STEPS = 30
 
 def specs() -> Iterator[Path]:
     """Yield the specs of what is published, and of the catalogue."""
-    for folder in ("results/specs", "studies/catalogue"):
+    for folder in ("research/specs", "studies/catalogue"):
         yield from sorted((ROOT / folder).rglob("*.toml"))
 
 

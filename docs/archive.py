@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import nested_agents as na
-from nested_agents.results import ROWS
+from nested_agents.research import ROWS
 
 ABOUT = """---
 orphan: true
@@ -12,7 +12,7 @@ nosearch: true
 ---
 # Archive of published tables
 
-Each file of `results/rows` as `nested-agents table` prints it, without times.
+Each file of `research/results` as `nested-agents table` prints it, without times.
 [](../reproduce.md) names the specs.
 """
 

@@ -51,7 +51,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": "gallery",
     "default_thumb_file": str(HERE / "diagrams" / "program.svg"),
     "filename_pattern": r"/plot_",
-    "ignore_pattern": r"(^|/)(__init__|grade|labs|questions)\.py$",
+    "ignore_pattern": r"(^|/)__init__\.py$",
     "download_all_examples": False,
     "show_memory": False,
     "write_computation_times": False,

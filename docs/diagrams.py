@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 
 from nested_agents.core.agents.cost import Problem
 from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.results import ROWS
+from nested_agents.research import ROWS
 from nested_agents.studies.presentation import figures
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
 from nested_agents.studies.results import published
@@ -233,7 +233,7 @@ def scale() -> Figure:
         figures.draw_line(axes, [n for *_, n in points], estimates, i, len(SUCCESS))
     figures.scale_axis(axes, (2, 4, 8, 16, 32, 64))
     axes.set(xlabel="robots", ylabel="evaluation success", ylim=(-0.03, 1.03))
-    figures.name_lines(figure, [label for label, _ in SUCCESS], "bars: 95 % intervals")
+    figures.name_lines(figure, [label for label, _ in SUCCESS], "bars: 95% intervals")
     return figure
 
 

@@ -17,7 +17,6 @@ from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLE
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
-from nested_agents.scenarios.vmas_tasks import VmasTask
 from nested_agents.studies.cli.main import COMMANDS, load_command
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.results.results import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
@@ -204,7 +203,7 @@ def columns() -> Iterator[str]:
     yield "A scenario declares its own measures ([](../extending.md#a-scenario)). These are those"
     yield "of the built-in scenarios.\n"
     # Built only of an environment, or a task.
-    adapted = {"gymnasium": AdaptedWorld, "pettingzoo": AdaptedWorld, "vmas": VmasTask}
+    adapted = {"gymnasium": AdaptedWorld, "pettingzoo": AdaptedWorld}
     for kind in SCENARIOS.built_in:
         yield f"### `{kind}`\n"
         declared = adapted.get(kind) or SCENARIOS.parsed(kind).build()

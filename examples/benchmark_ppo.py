@@ -12,7 +12,7 @@ from pathlib import Path
 
 from stable_baselines3 import PPO
 
-from nested_agents.results.push_n import LEAST_SEEDS, STEPS, Entry, TeamScores, evaluate
+from nested_agents.research.push_n import LEAST_SEEDS, STEPS, Entry, TeamScores, evaluate
 from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
 
 PATH, DECISIONS, ROBOTS = Path(sys.argv[1]), int(sys.argv[2]), 2

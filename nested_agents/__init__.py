@@ -24,6 +24,10 @@ __version__: str
 if not Path(__file__).with_name("core").exists():  # a checkout: the four folders stand beside
     __path__.append(str(Path(__file__).parents[1]))
 
+from .core.isolation import ignore_settings_files
+
+ignore_settings_files()
+
 _PLACES = {
     "Agents": ("core.interface.agents", "Agents"),
     "ActionSet": ("core.interface.spaces", "ActionSet"),
@@ -35,11 +39,13 @@ _PLACES = {
     "ChainView": ("scenarios.kinematic_chain.variables", "ChainView"),
     "Counts": ("core.interface.agents", "Counts"),
     "DecisionProblem": ("core.evaluators.evaluator", "DecisionProblem"),
+    "Environments": ("core.interface.environments", "Environments"),
     "Deliberation": ("core.evaluators.evaluator", "Deliberation"),
     "EvaluatorSettings": ("core.evaluators", "EvaluatorSettings"),
     "ExplorationSettings": ("core.decision.exploration", "ExplorationSettings"),
     "FrozenSettings": ("core.learners.td", "FrozenSettings"),
     "FuzzyAgents": ("core.agents.fuzzy", "FuzzyAgents"),
+    "GymnasiumSettings": ("scenarios.adapters.settings", "GymnasiumSettings"),
     "Hierarchy": ("core.hierarchy.hierarchy", "Hierarchy"),
     "KinematicChain": ("scenarios.kinematic_chain.scenario", "KinematicChain"),
     "KinematicChainSettings": ("scenarios.kinematic_chain.config", "KinematicChainSettings"),
@@ -52,6 +58,7 @@ _PLACES = {
     "NO_SUCCESS": ("core.interface.measures", "NO_SUCCESS"),
     "SUCCESS": ("core.interface.measures", "SUCCESS"),
     "Prediction": ("core.interface.prediction", "Prediction"),
+    "Placement": ("core.interface.agents", "Placement"),
     "Peer": ("core.agents.peer", "Peer"),
     "PeerSettings": ("core.networks.settings", "PeerSettings"),
     "Scenario": ("core.interface.scenario", "Scenario"),
@@ -59,13 +66,17 @@ _PLACES = {
     "Session": ("studies.trials.session", "Session"),
     "Settings": ("core.plugins.settings", "Settings"),
     "Spec": ("studies.spec.spec", "Spec"),
+    "StackedEnvironments": ("core.interface.stacked", "StackedEnvironments"),
     "StateSpace": ("core.interface.spaces", "StateSpace"),
     "SpecError": ("studies.errors", "SpecError"),
     "StudyResults": ("studies.api.study", "StudyResults"),
     "Summary": ("studies.results.analysis", "Summary"),
     "TDLambdaSettings": ("core.learners.td", "TDLambdaSettings"),
     "Team": ("core.agents.team", "Team"),
+    "TeamSettings": ("core.learners.learner", "TeamSettings"),
     "TopologySettings": ("topologies", "TopologySettings"),
+    "Transitions": ("core.interface.environments", "Transitions"),
+    "Turn": ("core.hierarchy.turns", "Turn"),
     "Transition": ("core.interface.scenario", "Transition"),
     "Variable": ("core.interface.spaces", "Variable"),
     "View": ("scenarios.box_pushing.states.relational", "View"),
@@ -73,6 +84,7 @@ _PLACES = {
     "build_hierarchy": ("topologies", "build"),
     "check_scenario": ("scenarios.checking.checker", "check_scenario"),
     "compare_table": ("studies.api.loading", "compare_table"),
+    "choice": ("core.interface.spaces", "choice"),
     "cost_table": ("studies.cost.table", "cost_table"),
     "control_loop": ("core.agents.loop", "control_loop"),
     "detectable": ("studies.results.power", "detectable"),

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import sys
+
+if __name__ == "__main__" and not sys.flags.safe_path:
+    sys.path.pop(0)  # the current folder, which -m puts there
+
 import atexit
 import os
 import signal
 from functools import partial
 from types import FrameType
+
+from .core.isolation import drop_empty_entries
 
 
 def main() -> int:
@@ -19,6 +26,7 @@ def main() -> int:
         signal.signal(signal.SIGINT, partial(_interrupt, pressed))
         # What is done cannot be interrupted; other handlers Python puts away before it has ended.
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+    drop_empty_entries()
     from .studies.cli.main import main as run
 
     try:

@@ -32,7 +32,6 @@ WORLDS = {
     "BoxPushing": ("box-pushing", 450),
     "Arm": ("kinematic-chain", 60),
     "LineUp": ("line-up", 40),
-    "Signals": ("signals", 20),
     "MatrixGame": ("matrix-game", 1),
     "TeamGame": ("team-game", 1),
 }

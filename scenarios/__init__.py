@@ -14,24 +14,23 @@ from ..core.plugins.settings import ScenarioSettings
 
 __all__ = ["DEFAULT", "SCENARIOS"]
 
+PLUGINS = {"signals": "signals", "spread": "spread", "swimmer": "swimmers", "vmas": "vmas"}
+"""Scenarios in the folder plugins of the repository, and the folder of each."""
 SCENARIOS = SettingsRegistry(
     "scenario",
     {
         "box-pushing": f"{__name__}.box_pushing.config:BoxPushingSettings",
         "matrix-game": f"{__name__}.matrix_games.scenario:MatrixGameSettings",
         "team-game": f"{__name__}.matrix_games.team_games:TeamGameSettings",
-        "signals": f"{__name__}.signals.scenario:SignalsSettings",
         "kinematic-chain": f"{__name__}.kinematic_chain.config:KinematicChainSettings",
         "line-up": f"{__name__}.line_up:LineUpSettings",
-        "spread": f"{__name__}.spread:SpreadSettings",
-        "vmas": f"{__name__}.vmas_tasks:VmasSettings",
         "gymnasium": f"{__name__}.adapters.settings:GymnasiumSettings",
         "pettingzoo": f"{__name__}.adapters.settings:PettingZooSettings",
     },
     ScenarioSettings,
     moved={
-        "pushing-points": "is a file of its own: scenario.kind = "
-        "'examples/worlds/pushing_points.py:PushingPoints', relative to the spec",
+        name: f"is a plug-in that is not installed: pip install plugins/{folder}, in a checkout"
+        for name, folder in PLUGINS.items()
     },
 )
 """Scenarios by the name that specs use."""

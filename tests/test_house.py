@@ -19,7 +19,6 @@ ALLOWED = {
     "topologies": {"topologies", "core"},
     "scenarios": {"scenarios", "core"},
     "studies": {"studies", "core", "topologies", "scenarios"},
-    "results": {"results", "studies", "core", "topologies", "scenarios"},
 }
 STUDIES = (
     "errors", "store", "spec", "trials", "workers", "results", "presentation", "catalogue",
@@ -259,7 +258,7 @@ def definitions(folder: str) -> Iterator[tuple[str, str, bool]]:
 def test_words_are_the_fields_and_a_class_name_has_one_meaning() -> None:
     classes: dict[str, list[str]] = {}
     private = []
-    for folder in (*ALLOWED, "benchmarks", "examples", "docs", "paper"):
+    for folder in (*ALLOWED, "research", "benchmarks", "examples", "docs"):
         for place, name, is_class in definitions(folder):
             if is_class and name != "Settings":  # that of a part, nested in its class
                 classes.setdefault(name, []).append(place)

@@ -37,8 +37,8 @@ def test_the_container_is_not_root() -> None:
 
 
 TOP = {
-    ".ci", ".github", "benchmarks", "core", "docs", "examples", "nested_agents", "paper",
-    "results", "scenarios", "studies", "tests", "topologies",
+    ".ci", ".github", "benchmarks", "core", "docs", "examples", "nested_agents",
+    "plugins", "research", "scenarios", "studies", "tests", "topologies",
     ".containerignore", ".gitignore", ".pre-commit-config.yaml", ".readthedocs.yaml",
     "CHANGELOG.md", "CITATION.cff", "CODE_OF_CONDUCT.md", "CONTRIBUTING.md", "Containerfile",
     "DECISIONS.md", "LICENSE", "README.md", "box2d.lock", "conftest.py", "dev", "pyproject.toml",

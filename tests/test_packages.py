@@ -108,5 +108,5 @@ def test_the_wheel_holds_the_four_packages(packages: dict[str, Path], checkout: 
     assert sources <= names
     assert {"nested_agents/__main__.py", "nested_agents/py.typed"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"nested_agents"}
-    assert "nested_agents/studies/catalogue/shapes/shapes.toml" in names
-    assert [name for name in names if name.startswith("nested_agents/results/")] == []
+    assert "nested_agents/research/specs/shapes.toml" in names
+    assert [name for name in names if name.startswith("nested_agents/research/")] == []

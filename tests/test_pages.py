@@ -1,4 +1,4 @@
-"""README, CONTRIBUTING and the pages of docs/: every block that is code runs, parses or validates.
+"""README, CONTRIBUTING and all further pages: every block that is code runs, parses or validates.
 
 The blocks of a page are taken in order, in one folder and one Python namespace. A block whose first
 line is ``# name.py`` or ``# name.toml`` is that file. Python runs as it stands. TOML is a spec, or
@@ -28,7 +28,14 @@ ROOT = Path(__file__).resolve().parent.parent
 GENERATED = {"reference", "gallery", "_build"}
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
-    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md"))
+    for path in (
+        *(ROOT / "README.md", ROOT / "CONTRIBUTING.md"),
+        *(
+            page
+            for folder in ("docs", "plugins", "research")
+            for page in (ROOT / folder).rglob("*.md")
+        ),
+    )
     if not GENERATED & set(path.parts)
 )
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -114,7 +121,7 @@ def smaller(arguments: list[str], page: str) -> list[str]:
 def test_the_blocks_of_a_page(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for folder in ("results", "studies", "examples"):  # of the checkout, where commands are typed
+    for folder in ("research", "studies", "examples"):  # of the checkout, where commands are typed
         (tmp_path / folder).symlink_to(ROOT / folder)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)

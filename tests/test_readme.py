@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nested_agents as na
-from nested_agents.results import ROWS
+from nested_agents.research import ROWS
 from nested_agents.studies.cli.main import main, nested_agents
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -36,7 +36,13 @@ class Measure:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """The least and the greatest value, infinite where none is known."""
+        """Range of the measure: 0 to 1 for a rate, infinite where no end is known.
+
+        >>> SUCCESS.bounds, RETURN.bounds
+        ((0.0, 1.0), (-inf, inf))
+        """
+        if self.is_rate:
+            return 0.0, 1.0
         least = -math.inf if self.least is None else self.least
         return least, math.inf if self.greatest is None else self.greatest
 

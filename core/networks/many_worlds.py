@@ -6,7 +6,7 @@ Networks begin orthogonal, and values may be normalised by the moments of return
 (2022) advise. The clipped loss of a minibatch of m transitions with advantages a, made to have mean
 0 and deviation 1, ratios r of probabilities, entropies H, values v and returns g is::
 
-    -mean(min(r a, clip(r, 1 - c, 1 + c) a)) - e mean(H) + .5 mean((v - g)^2)
+    -mean(min(r a, clip(r, 1 - c, 1 + c) a)) - e mean(H) + 0.5 mean((v - g)^2)
 """
 
 from __future__ import annotations

@@ -37,6 +37,7 @@ from types import CodeType, FunctionType
 from typing import IO, Any, TypeVar, cast
 
 from .. import locks
+from ..isolation import python_command
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -168,13 +169,11 @@ def _child(parent: int) -> tuple[IO[bytes], IO[bytes]]:
 
     It ends when the process does.
     """
-    program = f"from {__name__} import serve; serve()"
     child = subprocess.Popen(
-        [sys.executable, "-c", program],
+        python_command(f"from {__name__} import serve; serve()"),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         start_new_session=True,
     )
     atexit.register(child.__exit__, None, None, None)

@@ -35,7 +35,9 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
 from .models import Kinds
+from .origin import checked_origin
 from .settings import Settings, tuples
+from .trust import module_named
 from .words import closest
 
 if TYPE_CHECKING:
@@ -128,12 +130,12 @@ class Registry:
         if sources.is_reference(name):
             return sources.active().load(name)
         place = self.built_in.get(name) or self.installed().get(name)
-        is_module = "." in name.partition(":")[0] and ":" in name
-        if place is None and not is_module:
-            unknown = f"{closest(name, self.names())}, or one of your own as file.py:NAME"
-            raise ValueError(self.moved.get(name, unknown))
         if place is None:
-            sources.active().permit(name.partition(":")[0])
+            module = module_named(name)
+            if "." not in module:
+                unknown = f"{closest(name, self.names())}, or one of your own as file.py:NAME"
+                raise ValueError(self.moved.get(name, unknown))
+            sources.active().permit(module)
         try:
             return resolve_name(place or name)
         except Exception as error:
@@ -193,7 +195,7 @@ class SettingsRegistry(Registry):
     ...     def __init__(self, settings):
     ...         self.wheels = settings.wheels
     >>> carts = SettingsRegistry("cart", {}, Settings)
-    >>> model = carts.adapted("cart.py:Cart", Cart)
+    >>> model = carts.adapted("cart", Cart)
     >>> model(wheels=4).build().wheels
     4
     """
@@ -244,8 +246,7 @@ class SettingsRegistry(Registry):
         if not (isinstance(own, type) and issubclass(own, self.root)):
             base = f"{self.base.__module__}.{self.base.__qualname__}"
             raise ValueError(f"is no {self.kind}, whose Settings inherit {base}")
-        if not callable(thing):
-            raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
+        thing = checked_origin(name, thing, self.kind, self.root)
         has_own = hasattr(thing, "Settings")
         made_by: object = thing
         if isinstance(thing, type) and own is not self.base:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from fnmatch import fnmatchcase
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
 from pydantic import (
@@ -116,6 +116,10 @@ def unwritten(default: Any) -> Any:
     So a new key leaves the identities of trials, and what is kept of them, as they were.
     """
     return Field(exclude_if=lambda value: value == default)
+
+
+FailureSpan: TypeAlias = tuple[int, int | None]
+"""Episodes in which a failure begins and ends; None if it lasts."""
 
 
 class SettingsError(ValueError):
@@ -240,14 +244,14 @@ class ScenarioSettings(PartSettings):
         return None
 
     @property
-    def onsets(self) -> tuple[int, ...]:
-        """Episodes in which its ``failures``, if it has any, begin."""
-        return tuple(failure.episode for failure in dict(self).get("failures", ()))
+    def failure_spans(self) -> tuple[FailureSpan, ...]:
+        """When its ``failures``, if it has any, begin and end."""
+        return tuple((f.episode, f.end_episode) for f in dict(self).get("failures", ()))
 
     @property
     def onset(self) -> int | None:
-        """Episode in which the first of them begins; none: never."""
-        return min(self.onsets, default=None)
+        """Episode in which the first failure begins, if any does."""
+        return min((begin for begin, _ in self.failure_spans), default=None)
 
 
 def tuples(value: Any) -> Any:

@@ -18,8 +18,11 @@ from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
+ENVIRONMENT_KEYS = ("id", "env_id")
+"""Keys whose value is the name of an environment; ``env_id`` is an option of old environments."""
+
 LIBRARIES = ("gymnasium", "mpe2", "pettingzoo")
-"""Packages that anybody may name: the toolkit itself offers their environments."""
+"""Packages whose environments every study may name, because the toolkit offers them."""
 
 _noted: set[str] = set()
 """Digests of what this process trusts, also where no list can be written."""
@@ -76,10 +79,32 @@ def _place_of(package: str) -> str | None:
     return spec.origin or (folders[0] if folders else None)
 
 
-def modules_in(value: object, key: str = "") -> Iterator[tuple[str, str]]:
-    """Yield the modules that settings name, at any depth, each with the dotted key that does.
+def module_named(text: str) -> str:
+    """Return the module that a text names, ``"package.module:Name"``; empty if it names none.
 
-    They stand as ``"package.module:Name"``; the ``id`` of an environment names one without a colon.
+    Everything before the first colon counts, also if it is no proper name of a module. References
+    to files, ``"file.py:Name"``, name no module.
+
+    Examples
+    --------
+    >>> module_named("arms.seven:Arm"), module_named("evil.:X"), module_named("arm.py:Arm")
+    ('arms.seven', 'evil.', '')
+    """
+    module, colon, _ = text.partition(":")
+    return module if colon and ".py:" not in text else ""
+
+
+def is_module_name(text: str) -> bool:
+    """Return whether a text is the full name of a module, such as ``arms.seven``."""
+    return all(part.isidentifier() for part in text.split("."))
+
+
+def modules_in(value: object, key: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the modules that settings name, at any depth, each with its dotted key.
+
+    A kind names its module with a dot in it, so that ``"chain:reversed"`` names none. Modules of
+    environments may have any name, and PettingZoo's stand without a colon; those of `LIBRARIES` are
+    left out.
 
     Examples
     --------
@@ -93,11 +118,14 @@ def modules_in(value: object, key: str = "") -> Iterator[tuple[str, str]]:
         for inner in value:
             yield from modules_in(inner, key)
     elif isinstance(value, str):
-        module, colon, _ = value.replace("/", ".").partition(":")
-        is_id = key.rpartition(".")[2] == "id"
-        is_named = is_id or (bool(colon) and "." in module)
-        is_file = value[: len(module)].endswith(".py")
-        if is_named and not is_file and all(part.isidentifier() for part in module.split(".")):
+        module = module_named(value)
+        if key.rpartition(".")[2] in ENVIRONMENT_KEYS:
+            path = value.replace("/", ".")
+            if not module and is_module_name(path) and not value.endswith(".py"):
+                module = path
+            if module and module.partition(".")[0] not in LIBRARIES:
+                yield module, key
+        elif "." in module:
             yield module, key
 
 

@@ -15,11 +15,17 @@ from importlib import import_module
 from typing import Any
 
 import gymnasium
+from pettingzoo import AECEnv, ParallelEnv
 
 from ...core.plugins import sources
+from ...core.plugins.origin import checked_origin
+from ...core.plugins.trust import is_module_name, modules_in
 from ...core.plugins.words import near
 from .settings import AdaptedSettings, GymnasiumSettings
 from .simulators import Environment, GymnasiumSimulator, Simulator, simulator_of
+
+ENVIRONMENTS = (gymnasium.Env, AECEnv, ParallelEnv)
+"""Classes of environments."""
 
 Make = Callable[[AdaptedSettings, str | None], Simulator]
 """Makes a simulator of settings that renders in a mode of its environment, or does not."""
@@ -33,19 +39,25 @@ def maker_of(settings: AdaptedSettings) -> Make:
     ValueError
         If a file cannot be run, or has no such name; one line.
     """
-    if not (sources.is_reference(settings.id) or settings.id.endswith(".py")):
-        return make_by_id
     try:
-        return OfFile(sources.active().load(settings.id))
+        if sources.is_reference(settings.id) or settings.id.endswith(".py"):
+            thing = sources.active().load(settings.id)
+            return OfFile(checked_origin(settings.id, thing, "environment", *ENVIRONMENTS))
+        module, colon, registered = settings.id.partition(":")
+        if colon and (":" in registered or not is_module_name(module)):
+            raise ValueError("must be written module:name")
+        for named, _ in modules_in({"id": settings.id, "options": settings.options}):
+            sources.active().permit(named)
     except ValueError as error:
         raise ValueError(f"scenario.id = {settings.id!r}: {error}") from None
+    return make_by_id
 
 
 @dataclass(frozen=True)
 class OfFile:
     """Makes environments by what a user's file has: the same for the same text of the file."""
 
-    creator: object
+    creator: Callable[..., object]
     """A function or class that makes an environment."""
 
     def __call__(self, settings: AdaptedSettings, render_mode: str | None) -> Simulator:
@@ -57,9 +69,6 @@ class OfFile:
             If it cannot be made, or is of another kind; one line.
         """
         try:
-            if not callable(self.creator):
-                is_what = f"is {type(self.creator).__name__}"
-                raise ValueError(f"{is_what}, allowed: a function or class that makes one")
             simulator = simulator_of(self.creator(**_options(settings, render_mode)))
             is_alone = isinstance(simulator, GymnasiumSimulator)
             if is_alone != isinstance(settings, GymnasiumSettings):
@@ -117,7 +126,10 @@ def _creator_of_pettingzoo(name: str) -> Callable[..., object]:
     creator = _registered(registered)
     if creator is not None:
         return creator
-    module = import_module(name.replace("/", "."))
+    path = name.replace("/", ".")
+    if not is_module_name(path):
+        raise ValueError("must be written module:name, or as a module")
+    module = import_module(path)
     of_module: Callable[..., object] = getattr(module, "parallel_env", None) or module.env
     return of_module
 

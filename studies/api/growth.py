@@ -36,7 +36,7 @@ class Growth:
         return self.analysis.notes
 
     def figure(self) -> Figure:
-        """Return what was measured, the laws and their 90 % predictions."""
+        """Return what was measured, the laws and their 90% predictions."""
         from ..presentation.growth import draw_laws  # matplotlib takes its time
 
         return draw_laws(self.analysis)
@@ -76,7 +76,7 @@ def scaling_law(
     criterion
         Fit the decisions of training until this share of five episodes in a row succeeds.
     predict
-        Sizes to predict, beside those that were run: the mean of as many seeds, with its 90 %
+        Sizes to predict, beside those that were run: the mean of as many seeds, with its 90%
         interval.
 
     Raises

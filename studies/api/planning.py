@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.interface.measures import Measure, main_measure
+from ...core.isolation import python_command
 from ...core.numerics import FloatArray, optimize, pd
 from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
@@ -396,7 +397,7 @@ def _time_of_start() -> float:
     """Return the time in which a process starts and imports the toolkit [s]."""
     begin = perf_counter()
     # Own process group: Ctrl-C reaches this process alone, which then ends the child.
-    subprocess.run([sys.executable, "-c", START], check=True, process_group=0)
+    subprocess.run(python_command(START), check=True, process_group=0)
     return perf_counter() - begin
 
 

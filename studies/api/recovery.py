@@ -26,7 +26,8 @@ from ...scenarios.faults.wrappers import (
 )
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
-from ..results.statistics import BLOCK, REGAINED, bootstrap, rate, recovery
+from ..results.recovery import BLOCK, REGAINED, recovery
+from ..results.statistics import bootstrap, exactly, rate
 
 Data: TypeAlias = Any
 """An observation, action or space of Gymnasium, whose types are the environment's own; by agent of
@@ -109,6 +110,8 @@ class FaultCourse(NamedTuple):
     """``(n_seeds, n_episodes)`` returns without the faults."""
     faulty: FloatArray
     """``(n_seeds, n_episodes)`` returns with the faults."""
+    end: int | None = None
+    """Episode from which on no fault is left, if there is one."""
 
     @property
     def shortfall(self) -> FloatArray:
@@ -127,10 +130,13 @@ class FaultCourse(NamedTuple):
         blocks = {
             "before": self.faulty[:, k - BLOCK : k],
             "just after": self.faulty[:, k : k + BLOCK],
-            "end": self.faulty[:, -BLOCK:],
-            "end, no fault": self.healthy[:, -BLOCK:],
         }
+        if self.end is not None:
+            blocks["after its end"] = self.faulty[:, self.end : self.end + BLOCK]
+        blocks |= {"end": self.faulty[:, -BLOCK:], "end, no fault": self.healthy[:, -BLOCK:]}
         estimates = {title: bootstrap(block.mean(axis=1)) for title, block in blocks.items()}
+        if self.end is not None:
+            estimates["fault ends [episode]"] = exactly(self.end)
         estimates |= {
             "cumulative loss": bootstrap(self.shortfall.sum(axis=1)),
             "recovered": rate(recovered[:, None]),
@@ -211,8 +217,16 @@ def recovery_table(
         for name, schedule in faults.items():
             faulty = [returns(make, policy, schedule, s, episodes, steps, **wrapping) for s in run]
             onset = min(fault.episode for fault in schedule)
-            courses.append(FaultCourse(f"{acting}: {name}", onset, healthy, np.array(faulty)))
+            end = _last_end(schedule, episodes)
+            course = FaultCourse(f"{acting}: {name}", onset, healthy, np.array(faulty), end)
+            courses.append(course)
     return RecoveryTable(tuple(courses))
+
+
+def _last_end(faults: Sequence[ActuatorFault], episodes: int) -> int | None:
+    """Return the episode from which on no fault is left, if it is one of so many."""
+    ends = [episodes if fault.end_episode is None else fault.end_episode for fault in faults]
+    return max(ends) if max(ends) < episodes else None
 
 
 def returns(

@@ -112,7 +112,7 @@ class StudyResults:
         return self.results.episodes
 
     def table(self, columns: Sequence[str] = ()) -> SummaryTable:
-        """Return conditions against estimates with their 95 % intervals.
+        """Return conditions against estimates with their 95% intervals.
 
         Parameters
         ----------

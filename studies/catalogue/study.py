@@ -68,14 +68,13 @@ def load_study(name: str) -> Study:
     """
     with refused(f"study = {name!r}: "):
         entry = STUDIES.find(name)
+    missing = [part for part in PARTS if not callable(offered(entry, part))]
+    if missing:
+        raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
     source = entry() if isinstance(entry, type) else entry
     names = OPTIONS | {part: part for part in PARTS}
     known = {own: offered(source, part, MISSING) for part, own in names.items()}
-    parts: dict[str, Any] = {own: part for own, part in known.items() if part is not MISSING}
-    missing = [part for part in PARTS if not callable(parts.get(part))]
-    if missing:
-        raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
-    return Study(**parts)
+    return Study(**{own: part for own, part in known.items() if part is not MISSING})
 
 
 def notes_of(analysis: Any) -> tuple[str, ...]:

@@ -53,7 +53,7 @@ def print_lines(lines: Iterable[str]) -> None:
 
 
 def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> None:
-    """Print estimates by condition, each over its 95 % interval, and its legend or another one."""
+    """Print estimates by condition, each over its 95% interval, and its legend or another one."""
     from rich.console import Console
 
     table.print(Console())

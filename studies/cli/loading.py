@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from ...core.plugins.sources import Sources, files_in
-from ...core.plugins.trust import LIBRARIES, is_trusted, module_text, modules_in
+from ...core.plugins.trust import is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
 from ..presentation.progress import say
 from ..spec.outline import other_spec
@@ -106,6 +106,6 @@ def untrusted(source: Path) -> dict[str, str]:
 def _untrusted(source: Path, files: Mapping[str, str], tables: object) -> dict[str, str]:
     """Return what is not trusted of files, and of the modules that tables name."""
     texts = {f"{n}, which came with {source},": t for n, t in files.items() if n.endswith(".py")}
-    modules = {m for m, _ in modules_in(tables) if m.partition(".")[0] not in LIBRARIES}
-    texts |= {f"{name}, which {source} names,": module_text(name) for name in modules}
+    modules = {module for module, _ in modules_in(tables)}
+    texts |= {f"{name}, which {source} names,": module_text(name) for name in sorted(modules)}
     return {title: text for title, text in texts.items() if not is_trusted(text)}

@@ -31,9 +31,9 @@ REFUSING = ("strict", "surrogateescape")
 LEAST_ADDRESSES = 10**9
 """Of the process [bytes]: with less, libraries of linear algebra crash or wait for ever."""
 
-PUBLISHED = "...results.commands"
+PUBLISHED = "...research.commands"
 """Module of the commands on what has been published."""
-RESULTS = Path(__file__).parents[2] / "results"
+RESULTS = Path(__file__).parents[2] / "research"
 """Where that is in a checkout; an installed package does not have it."""
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Run": {
@@ -101,7 +101,7 @@ class _Commands(click.Group):
         if command is None and args[0] in COMMANDS:
             raise SpecError(
                 f"{args[0]}: is a command on published results, which are in the repository, in "
-                "results/, not in the installed package"
+                "research/, not in the installed package"
             )
         if command is None:
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
@@ -117,8 +117,8 @@ class _Commands(click.Group):
 
 @click.group(
     cls=_Commands,
-    help="Define hierarchies of learning agents and measure how learning, failure recovery and cost "
-    "scale.",
+    help="Define hierarchies of learning agents and measure how learning, failure recovery and "
+    "cost scale.",
     epilog=f"To begin with: {command_line('demo')}",
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )

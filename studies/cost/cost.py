@@ -97,7 +97,7 @@ class StepCost:
 
     @property
     def step(self) -> Estimate:
-        """The mean time of a step over repeats with its 95 % interval [s]; of one, no interval."""
+        """The mean time of a step over repeats with its 95% interval [s]; of one, no interval."""
         return bootstrap(self.repeats, bounds=NOT_NEGATIVE)
 
 

@@ -32,7 +32,7 @@ from ...core.evaluators.evaluator import Aggregation
 from ...core.numerics import pd
 from ...topologies.view import align, format_count
 from ..errors import WIDTH, SpecError
-from ..results.notation import two_figures
+from ..results.notation import format_number
 from ..spec.spec import Spec
 from ..spec.tables import label_but
 from ..trials.arrangement import Arrangement, arrange, check_conditions
@@ -285,7 +285,7 @@ def _lines(rows: Sequence[Profile]) -> Iterator[str]:
 
 
 def _figures(value: float) -> str:
-    return "-" if value == 0.0 else two_figures(value)
+    return "-" if value == 0.0 else format_number(value)
 
 
 def _growth(rows: Sequence[Profile]) -> Iterator[str]:
@@ -304,8 +304,9 @@ def _growth(rows: Sequence[Profile]) -> Iterator[str]:
         most = max(shares, key=shares.__getitem__)
         text = (
             f"{f'{group}: ' * bool(group)}{first.agents} to {last.agents} agents: decisions take "
-            f"{two_figures(longer)} times as long: {two_figures(tried)} times the joint actions, "
-            f"each {two_figures(longer / tried)} times as long. {shares[most]:.0%} is {most}"
+            f"{format_number(longer)} times as long: {format_number(tried)} times the joint "
+            f"actions, each {format_number(longer / tried)} times as long. {shares[most]:.0%} is "
+            f"{most}"
         )
         yield from wrap(f"{text}; {_evaluators(own)}.", WIDTH, subsequent_indent="  ")
 

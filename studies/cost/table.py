@@ -22,7 +22,7 @@ from ...core.plugins.words import command_line, expect, expect_each
 from ...topologies.view import align, format_count
 from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex
-from ..results.notation import bracketed
+from ..results.notation import format_estimate
 from ..results.statistics import Estimate
 from .cost import (
     LABELLED,
@@ -156,7 +156,7 @@ def _table(rows: Sequence[CostRow]) -> str:
         lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
         most = max((len(row.measured.repeats) for row in rows if row.measured), default=1)
         if most > 1:
-            lines += [f"[]: 95 % interval of the mean of {most} repeats, each with a new team;"]
+            lines += [f"[]: 95% interval of the mean of {most} repeats, each with a new team;"]
         lines += ["-: not measured, beyond a second or so a step."]
         lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
     if "network" in tables:
@@ -191,7 +191,7 @@ def _measured_cells(row: CostRow) -> list[str]:
     step = row.measured.step
     ms = _amount(1e3 * float(step.value))
     if len(row.measured.repeats) > 1:
-        ms = bracketed(Estimate(*(1e3 * end for end in step)))
+        ms = format_estimate(Estimate(*(1e3 * end for end in step)))
     counts = joint, *astuple(row.measured.counted)
     return [*map(scientific, counts), ms, _amount(1e-6 * row.measured.memory)]
 

@@ -188,9 +188,9 @@ def percent(share: float) -> str:
     """Return a share in whole percents.
 
     >>> percent(0.254), percent(0.0004), percent(0.0)
-    ('25 %', '<1 %', '0 %')
+    ('25%', '<1%', '0%')
     """
-    return "<1 %" if 0 < share < 0.005 else f"{100 * share:.0f} %"
+    return "<1%" if 0 < share < 0.005 else f"{share:.0%}"
 
 
 def exponent(parts: Sequence[Parts]) -> int:

@@ -265,8 +265,8 @@ def draw_forest(
 ) -> Figures:
     """Return by its name a figure of panels side by side, sorted by the last; or no figure.
 
-    Points are means over seeds, bars their 95 % intervals. Full points differ significantly from
-    the null (p < .05, adjusted), hollow ones do not.
+    Points are means over seeds, bars their 95% intervals. Full points differ significantly from
+    the null (p < 0.05, adjusted), hollow ones do not.
 
     Parameters
     ----------
@@ -307,13 +307,13 @@ def draw_forest(
 def _forest_legend(figure: Figure, lines: Sequence[Difference]) -> None:
     point = {"marker": "o", "ls": "", "color": "#444444"}
     handles = [
-        handle("significantly different (adjusted p < .05)", **point),
+        handle("significantly different (adjusted p < 0.05)", **point),
         handle("no significant difference", **point, markerfacecolor="white"),
         handle("higher than the reference", color=COLOURS[0], linewidth=1.5),
         handle("lower than the reference", color=COLOURS[1], linewidth=1.5),
     ]
     seeds = count_seeds(line.seeds for line in lines)
-    add_legend(figure, handles, f"means over {seeds} seeds, bars: 95 % intervals", ncols=2)
+    add_legend(figure, handles, f"means over {seeds} seeds, bars: 95% intervals", ncols=2)
 
 
 def count_seeds(counts: Iterable[int]) -> str:

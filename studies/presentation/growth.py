@@ -32,7 +32,7 @@ def growth_figures(results: Results) -> dict[str, Figure]:
 
 
 def draw_laws(analysis: ScalingLaw) -> Figure:
-    """Return the figure: seeds are points, lines laws, bands 90 % predictions of their mean.
+    """Return the figure: seeds are points, lines laws, bands 90% predictions of their mean.
 
     Sizes that were not run are left of the band's end beyond the dotted line.
     """
@@ -51,7 +51,7 @@ def draw_laws(analysis: ScalingLaw) -> Figure:
         else:
             figures.log_axis(axes)
         axes.axvline(sizes[-1], color="#888888", linewidth=0.8, ls=":")
-        figures.name_lines(figure, [group for group, _ in known], "bands: 90 % of new means")
+        figures.name_lines(figure, [group for group, _ in known], "bands: 90% of new means")
     axes.set_title(analysis.title, loc="left")
     axes.set_xlabel(analysis.size)
     return figure

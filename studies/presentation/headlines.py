@@ -5,7 +5,7 @@ from typing import Any
 
 from ..results.analysis import Difference, estimate_of
 from ..results.contrasts import contrasts
-from ..results.notation import bracketed
+from ..results.notation import format_estimate
 from ..results.results import Results
 from ..results.statistics import LEVEL
 from ..spec.controls import LEARN_NOTHING, control_of, is_drawn
@@ -62,7 +62,7 @@ def _sentence(
 
 
 def _evaluated(results: Results, condition: str) -> str:
-    return bracketed(estimate_of(results, condition, "evaluation", results.main))
+    return format_estimate(estimate_of(results, condition, "evaluation", results.main))
 
 
 def _is_below(difference: Difference) -> bool:

@@ -27,7 +27,7 @@ from ...core.plugins.printing import printable
 from ...core.plugins.words import expect_each, near
 from ..errors import SpecError
 from ..results.analysis import Summary
-from ..results.notation import bracketed
+from ..results.notation import format_estimate
 from ..results.statistics import FEW, Estimate, exactly, stack_estimates
 from .legend import meanings
 from .progress import count
@@ -171,7 +171,7 @@ class SummaryTable:
         return "\n".join([*map(str.rstrip, file.getvalue().splitlines()), *self.legend])
 
     def print(self, console: Console) -> None:
-        """Print a line of estimates for each condition, each with its 95 % interval.
+        """Print a line of estimates for each condition, each with its 95% interval.
 
         Columns that do not fit side by side without breaking a word follow below, as a further
         table. How many seeds there are is a column if conditions differ in it.
@@ -204,7 +204,7 @@ class SummaryTable:
         if not self.rows:
             return ["no trial has finished"]
         over = count(self.seeds, "seed") if self.seeds else "seeds"
-        return [f"Means over {over} with 95 % intervals.", self.remark]
+        return [f"Means over {over} with 95% intervals.", self.remark]
 
     @property
     def meanings(self) -> dict[str, str]:
@@ -263,7 +263,7 @@ class SummaryTable:
             for name, seeds, cells in self.rows
         ]
         frame = pd.DataFrame(rows, columns=["condition", "seeds", *self.titles])
-        note = "; 95 % intervals in brackets"
+        note = "; 95% intervals in brackets"
         return in_latex(frame, "condition", f"lr{'r' * len(self.titles)}", note)
 
     def _repr_html_(self) -> str:
@@ -335,7 +335,7 @@ class Cell(NamedTuple):
     @classmethod
     def of(cls, estimate: Estimate) -> Cell:
         """Return the cell of an estimate."""
-        value, _, interval = bracketed(estimate).partition(" ")
+        value, _, interval = format_estimate(estimate).partition(" ")
         return cls(value, interval)
 
     def text(self, space: str = " ") -> str:

@@ -20,7 +20,7 @@ from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Analysis, identity_lines
 from ..results.contrasts import contrasts
-from ..results.notation import bracketed, whole
+from ..results.notation import format_estimate, whole
 from ..results.results import read
 from ..results.statistics import LEVEL
 from ..spec.controls import control_lines
@@ -183,7 +183,7 @@ def extremes(table: SummaryTable, title: str) -> tuple[str, ...]:
     if len(lines) < 2:
         return ()
     ends = (lines[0], lines[-1])
-    low, high = (f"{bracketed(line.estimates[title])} ({line.condition})" for line in ends)
+    low, high = (f"{format_estimate(line.estimates[title])} ({line.condition})" for line in ends)
     return (f"{title.capitalize()}: from {low} to {high}.",)
 
 

@@ -63,7 +63,7 @@ def probability_of_improvement(tasks: Tasks) -> Array:
 
 
 def stratified_bootstrap(tasks: Tasks, statistic: Callable[[Tasks], Array]) -> Estimate:
-    """Return a statistic of tasks with its 95 % percentiles, runs resampled within each task.
+    """Return a statistic of tasks with its 95% percentiles, runs resampled within each task.
 
     Parameters
     ----------

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.interface.measures import Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ..errors import WIDTH
-from .notation import bracketed, signed, wrapped
+from .notation import format_estimate, format_p, wrapped
 from .power import power_lines
-from .results import Results
-from .statistics import LEVEL, Array, Estimate, bootstrap, exactly, paired_tests, rate
+from .results import STEPS, Results
+from .statistics import LEVEL, NOT_NEGATIVE, Array, Estimate, bootstrap, exactly, paired_tests, rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,7 +61,23 @@ def estimate_of(
     values = results.values(condition, measure.name, phase)[:, part]
     if measure.is_rate:
         return rate(values)
+    if measure.name == STEPS.name:
+        return steps_estimate(values.mean(axis=1), results.steps(phase))
     return bootstrap(values.mean(axis=1), bounds=measure.bounds)
+
+
+def estimate_over_seeds(values: Array, measure: Measure) -> Estimate:
+    """Return the mean of values ``(n_seeds,)`` of whole trials with its interval."""
+    return rate(values[:, None]) if measure.is_rate else bootstrap(values, bounds=measure.bounds)
+
+
+def steps_estimate(means: Array, steps: Measure) -> Estimate:
+    """Return the mean length of episodes, whose interval ends at the longest allowed.
+
+    Unlike that of a share, the interval has no width where all episodes are equally long.
+    """
+    value, low, high = bootstrap(means, bounds=NOT_NEGATIVE)
+    return Estimate(value, low, np.minimum(high, steps.bounds[1]))
 
 
 @dataclass(frozen=True)
@@ -75,7 +91,7 @@ class Difference:
     seeds: int
     """How many seeds both have finished."""
     estimate: Estimate
-    """The mean difference with its 95 % bootstrap interval."""
+    """The mean difference with its 95% bootstrap interval."""
     raw: float
     """p of no difference, by permutation of signs."""
     p: float
@@ -87,13 +103,8 @@ class Difference:
     def shown(self) -> str:
         """Value, interval, p as it is and adjusted, as text."""
         raw = format_p(self.raw)
-        shown = f"{bracketed(self.estimate, signed)}, p {format_p(self.p)}"
+        shown = f"{format_estimate(self.estimate, signed=True)}, p {format_p(self.p)}"
         return f"{shown} ({raw.removeprefix('= ')} unadjusted)"
-
-
-def format_p(p: float) -> str:
-    """Return how p is shown, its sign before it."""
-    return "< .001" if p < 0.001 else f"= {p:.2g}"
 
 
 BySeed: TypeAlias = "pd.Series | pd.DataFrame"
@@ -103,7 +114,7 @@ Pair = tuple[str, str, BySeed, BySeed]
 
 
 def differences(
-    groups: Mapping[str, Iterable[Pair]], *, of_rates: bool = True
+    groups: Mapping[str, Iterable[Pair]], measure: Measure = SUCCESS
 ) -> dict[str, tuple[Difference, ...]]:
     """Compare conditions with their references; p is adjusted over all groups by Holm's method.
 
@@ -112,18 +123,18 @@ def differences(
     groups
         What is compared, by a name of what it has in common. Pairs that share fewer than two seeds
         are left out.
-    of_rates
-        Whether values are rates.
+    measure
+        What the values are means of: no interval leaves its range.
     """
     names = []
     compared = []
     for group, pairs in groups.items():
-        for condition, measure, *values in pairs:
+        for condition, title, *values in pairs:
             own, base = select_shared(values)
             if len(own) >= 2:
                 names.append(group)
-                estimate = paired_difference(own, base, of_rates=of_rates)
-                compared.append((condition, measure, own, base, estimate))
+                estimate = paired_difference(own, base, measure)
+                compared.append((condition, title, own, base, estimate))
     made = list(zip(names, adjust(compared), strict=True))
     return {g: tuple(d for name, d in made if name == g) for g in groups}
 
@@ -142,15 +153,17 @@ def adjust(
     )
 
 
-def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
-    """Return the mean difference of paired values ``(n_seeds,)`` with its 95 % interval.
+def paired_difference(own: Array, base: Array, measure: Measure) -> Estimate:
+    """Return the mean difference of paired values ``(n_seeds,)`` with its 95% interval.
 
-    By bootstrap over seeds; of rates that differ alike for every seed, as of independent ones: the
-    interval of a bootstrap would have no width.
+    The interval is by bootstrap over seeds. It stays within what the range of the measure allows.
+    Rates that differ alike for every seed are taken for independent, because the interval of a
+    bootstrap would have no width.
     """
-    if of_rates and np.ptp(own - base) == 0.0:
+    if measure.is_rate and np.ptp(own - base) == 0.0:
         return difference(own[:, None], base[:, None])
-    return bootstrap(own - base, bounds=(-1.0, 1.0) if of_rates else (-np.inf, np.inf))
+    least, greatest = measure.bounds
+    return bootstrap(own - base, bounds=(least - greatest, greatest - least))
 
 
 def select_shared(values: Sequence[BySeed]) -> list[Array]:
@@ -274,30 +287,26 @@ def verdict_lines(
 
 
 def verdicts(
-    groups: Mapping[str, Sequence[Difference]],
-    better: str | None = "higher",
-    measure: str = "",
-    *,
-    of_rates: bool = True,
+    groups: Mapping[str, Sequence[Difference]], measure: Measure = SUCCESS, title: str = ""
 ) -> list[str]:
     """Return the verdicts of groups below their heads, how p is adjusted, and `power_lines`.
 
-    No lines if nothing is compared. p must be adjusted over all groups. Of what the power is, a
-    `measure` says; without, those of the differences.
+    There are no lines if nothing is compared. p must be adjusted over all groups. The power is
+    that of a `title`, by default of what the differences are called.
     """
     compared = [d for group in groups.values() for d in group]
     lines = []
     for head, group in groups.items():
         if group:
             lines += wrapped(f"{head}:")
-            lines += verdict_lines(group, better)
+            lines += verdict_lines(group, measure.better)
     if compared:
         counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
         lines.append(f"p: permutation of signs over seeds, adjusted over {counted} (Holm).")
     if any(map(_seems_contradicted, compared)):
         lines += wrapped(TWO_TESTS)
-    measure = measure or " or ".join(dict.fromkeys(d.measure for d in compared))
-    return lines + power_lines([d.sample for d in compared], measure, of_rates=of_rates)
+    title = title or " or ".join(dict.fromkeys(d.measure for d in compared))
+    return lines + power_lines([d.sample for d in compared], title, of_rates=measure.is_rate)
 
 
 def _seems_contradicted(difference: Difference) -> bool:
@@ -308,16 +317,16 @@ def _seems_contradicted(difference: Difference) -> bool:
 
 
 def judged(
-    groups: Mapping[str, Iterable[Pair]], less: str, measure: str = "", *, of_rates: bool = True
+    groups: Mapping[str, Iterable[Pair]], less: str, measure: Measure = SUCCESS, title: str = ""
 ) -> tuple[dict[str, tuple[Difference, ...]], list[str]]:
     """Return the `differences` of groups, and their `verdicts`.
 
-    `less` is what the reference is, `measure` what is compared, unless the groups say so.
+    `less` is what the reference is, `title` what is compared, unless the groups say so.
     """
-    compared = differences(groups, of_rates=of_rates)
-    heads = {group: ": ".join(filter(None, (group, measure))) for group in groups}
+    compared = differences(groups, measure)
+    heads = {group: ": ".join(filter(None, (group, title))) for group in groups}
     by_head = {f"{heads[g]}, less that of {less}": compared[g] for g in groups}
-    return compared, verdicts(by_head, of_rates=of_rates)
+    return compared, verdicts(by_head, measure)
 
 
 def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:

@@ -15,17 +15,15 @@ from .analysis import (
     Summary,
     differences,
     estimate_of,
+    estimate_over_seeds,
     identity_lines,
     select_shared,
     verdicts,
 )
 from .power import power_lines
+from .recovery import RECOVERY, recovery_by_seed
 from .results import SECONDS, Results, describe_number
-from .statistics import Array, Estimate, bootstrap
-
-STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
-EPISODES = (STEPS, RETURN)
-"""What is known of every episode besides the measures of its scenario."""
+from .statistics import Array, Estimate
 
 
 class Group(NamedTuple):
@@ -79,8 +77,7 @@ class Contrasts(NamedTuple):
         for group in self.groups:
             head = ": ".join(filter(None, (group.setting, self.title)))
             groups[f"{head}, less that of {group.reference}"] = group.differences
-        is_rate = self.measure.is_rate
-        lines = verdicts(groups, self.measure.better, self.title, of_rates=is_rate)
+        lines = verdicts(groups, self.measure, self.title)
         return (*(lines or [NOTHING]), *identity_lines(self.identical))
 
 
@@ -118,13 +115,13 @@ def contrasts(
     SpecError
         If the results have no such measure, phase, key or reference.
     """
-    shown_as, values, phase = values_of(results, measure, phase or _usual_phase(results))
+    shown_as, values, phase = values_of(results, measure, phase)
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
     pairs = {
         setting: [(name, measure, values[c], values[members[0][1]]) for name, c in members[1:]]
         for setting, members in groups
     }
-    compared = differences(pairs, of_rates=shown_as.is_rate)
+    compared = differences(pairs, shown_as)
     compared_groups = []
     for setting, members in groups:
         less = {d.condition: {"difference": d.estimate} for d in compared[setting]}
@@ -155,7 +152,7 @@ def power_with_first(results: Results) -> tuple[str, ...]:
 
     As `contrasts` of the same say it, whose tests take seconds where seeds are thousands.
     """
-    measure, values, phase = values_of(results, results.main.name, _usual_phase(results))
+    measure, values, phase = values_of(results, results.main.name)
     base, *others = (values[c] for c in results.columns if c in values)
     pairs = [select_shared([own, base]) for own in others]
     samples = [own - reference for own, reference in pairs if len(own) >= 2]
@@ -175,22 +172,35 @@ def _estimate(
     """Return the mean over seeds of a measure, or of a number of trials, with its interval."""
     if phase:
         return estimate_of(results, condition, phase, measure)
-    return bootstrap(means.to_numpy().astype(float), bounds=measure.bounds)
+    return estimate_over_seeds(means.to_numpy().astype(float), measure)
 
 
 _Pairs = list[tuple[str, str]]
 """Names of the conditions of a group, and their labels; the reference first."""
 
 
-def values_of(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, BySeed], str]:
-    """Return a measure, its means of seeds by condition, and the phase that they are of."""
-    measures = {m.name: m for m in (*results.measures, *EPISODES)}
+def values_of(
+    results: Results, name: str, phase: str | None = None
+) -> tuple[Measure, dict[str, BySeed], str]:
+    """Return a measure, its means of seeds by condition, and the phase that they are of.
+
+    The phase is empty if the measure is one of whole trials, or of recovery from a failure.
+    """
+    has_failed = any("onset" in results.numbers(condition) for condition in results.conditions)
+    recovery = RECOVERY if has_failed else {}
+    name = next((m.name for m in recovery.values() if name in (m.heading, m.title)), name)
+    is_recovery = name in recovery
+    phase = phase or ("training" if is_recovery else _usual_phase(results))
+    measures = {m.name: m for m in (*results.measures, results.steps(phase), RETURN)}
     name = next((m.name for m in measures.values() if m.heading == name), name)
     if not results.phases:
         raise SpecError("no trial has finished")
+    if (name in measures or is_recovery) and phase not in results.phases:
+        raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
+    if is_recovery:
+        measure, values = recovery_by_seed(results, name, phase)
+        return measure, {**values}, ""
     if name in measures:
-        if phase not in results.phases:
-            raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
         of_phase = (c for c in results.of_phase(phase) if results.has(c, phase, name))
         return measures[name], {c: results.means(c, phase, name) for c in of_phase}, phase
     numbers = {c: results.numbers(c) for c in results.conditions}
@@ -198,7 +208,7 @@ def values_of(results: Results, name: str, phase: str) -> tuple[Measure, dict[st
     names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
     column = next((c for c in columns if name in names[c]), None)
     if column is None:
-        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *columns})}")
+        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *recovery, *columns})}")
     measure, factor = describe_number(column)
     of_trials = {c: factor * own[column] for c, own in numbers.items() if column in own}
     return measure, {c: pd.Series(own, results.seeds(c)) for c, own in of_trials.items()}, ""

@@ -31,7 +31,7 @@ from .drift import Drift, Mixture, drift
 from .statistics import Array, Estimate
 
 RESAMPLES = 400
-"""Resamples of seeds: of a standard error they leave 4 %."""
+"""Resamples of seeds: of a standard error they leave 4%."""
 FEW_RESAMPLES = 50
 """Of fits that only score a law."""
 MARGIN = 1.0
@@ -237,7 +237,7 @@ class Law(NamedTuple):
     scatter: float
     """Variance of a seed at a size, beyond what it has at all."""
     held_out: tuple[tuple[float, float, Estimate], ...] = ()
-    """Of each size that was left out: size, what was measured, its 90 % prediction."""
+    """Of each size that was left out: size, what was measured, its 90% prediction."""
 
     @property
     def seeds(self) -> int:

@@ -1,76 +1,110 @@
-"""Numbers and estimates as text: the one notation of intervals, ``.82 [.55, .95]``."""
+"""Numbers, intervals and p-values as text, for the terminal, pages, figures and LaTeX.
 
+Every number that a reader sees is rounded here: ``0.82 [0.55, 0.95]``, ``95%``, ``p = 0.004``.
+"""
+
+import math
 import re
-from collections.abc import Callable
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_UP, Decimal
 from textwrap import wrap
-
-import numpy as np
 
 from ..errors import WIDTH
 from .statistics import Estimate
 
-MANY = 1e6
-"""From here on a number in a table has a power of ten."""
+MAX_DECIMALS = 2
+MIN_SCIENTIFIC = 1e6
+"""Smallest magnitude that is shown with a power of ten."""
+SIGNIFICANT, EXACT_DECIMALS = 12, 9
+"""Digits that are not rounding errors: values that differ beyond them are shown alike."""
 
 
-def two_figures(value: float) -> str:
-    """Return a number in two figures and at most two decimals, without a leading zero.
+def format_number(value: float, *, signed: bool = False) -> str:
+    """Return a number in two significant figures, but all digits before the decimal point.
 
-    From a million on it has a power of ten.
+    It has at most two decimals, and a power of ten from a million on.
 
-    Examples
-    --------
-    >>> [two_figures(x) for x in (0.975, 0.998, -0.0312, 0.0021, 12.34, 240.0, 2.7e11)]
-    ['.97', '1.0', '-.03', '0', '12', '240', '2.7e11']
-    """
-    if np.isnan(value):
-        return "?"
-    if abs(value) < 0.005:
-        return "0"
-    value = float(f"{value:.2g}")
-    if abs(value) >= MANY:
-        mantissa, power = f"{value:.1e}".split("e")
-        return f"{mantissa}e{int(power)}"
-    digits = min(2, max(0, 1 - int(np.floor(np.log10(abs(value))))))
-    return _without_zero(f"{value:.{digits}f}")
-
-
-def two_decimals(value: float) -> str:
-    """Return a ratio in two decimals, as 1.04 and .96 lie on two sides of 1.
+    Parameters
+    ----------
+    value
+        The number.
+    signed
+        Whether a positive number has a plus sign, as differences do.
 
     Examples
     --------
-    >>> [two_decimals(x) for x in (0.961, 1.04, -0.05, 0.0)]
-    ['.96', '1.04', '-.05', '0']
+    >>> [format_number(x) for x in (0.975, 0.998, -0.0312, 0.0021, 12.34, 340, 2.7e11)]
+    ['0.98', '1.00', '-0.03', '0', '12', '340', '2.7e11']
+    >>> format_number(0.5, signed=True), format_number(12345.0)
+    ('+0.50', '12345')
     """
-    return "0" if abs(value) < 0.005 else _without_zero(f"{value:.2f}")
+    return _fixed(value, _decimals(value), signed=signed)
 
 
-def signed(value: float) -> str:
-    """Return a difference in two decimals and with its sign.
-
-    Examples
-    --------
-    >>> [signed(x) for x in (0.5, -1.25, 1e-9)]
-    ['+.50', '-1.25', '0']
-    """
-    return f"{'+' * (value >= 0.005)}{two_decimals(value)}"
-
-
-def bracketed(estimate: Estimate, form: Callable[[float], str] = two_figures) -> str:
+def format_estimate(estimate: Estimate, *, signed: bool = False) -> str:
     """Return an estimate with its interval, if that is known.
 
+    There are as many decimals, at most two, as give both the value and the width of the interval
+    two significant figures. Bounds are rounded outward, so the interval shown contains the exact
+    one.
+
     Examples
     --------
-    >>> bracketed(Estimate(*map(np.asarray, (0.82, 0.55, 0.95))))
-    '.82 [.55, .95]'
+    >>> format_estimate(Estimate(0.82, 0.551, 0.949))
+    '0.82 [0.55, 0.95]'
+    >>> format_estimate(Estimate(97.6, 78.2, 113.7)), format_estimate(Estimate(1.04, 0.96, 1.131))
+    ('98 [78, 114]', '1.04 [0.96, 1.14]')
     """
-    value, low, high = (form(float(part)) for part in estimate)
-    return value if np.isnan(estimate.low) else f"{value} [{low}, {high}]"
+    value, low, high = map(float, estimate)
+    if math.isnan(low):
+        return format_number(value, signed=signed)
+    decimals = _decimals(value, low, high)
+    shown = _fixed(value, decimals, signed=signed)
+    least = _fixed(low, decimals, ROUND_FLOOR, signed=signed)
+    return f"{shown} [{least}, {_fixed(high, decimals, ROUND_CEILING, signed=signed)}]"
 
 
-WHOLE = re.compile(r"[-+]?[.\d]\S* \[[^]]*\]|\w+ [=<] \S+|\d+ seeds?|last \d+")
-"""What stands in one line: an estimate and its interval, ``p = .03``, a count of seeds."""
+def format_p(p: float) -> str:
+    """Return a p-value with the sign before it: three decimals below 0.1, two from there on.
+
+    Examples
+    --------
+    >>> [format_p(p) for p in (0.00049, 0.0044, 0.0496, 0.35)]
+    ['< 0.001', '= 0.004', '= 0.050', '= 0.35']
+    """
+    return "< 0.001" if p < 0.001 else f"= {p:.{3 if p < 0.1 else 2}f}"
+
+
+def _decimals(value: float, low: float = math.nan, high: float = math.nan) -> int:
+    """Return how many decimals give a value and the width of its interval two figures, at most 2.
+
+    None if all are whole.
+    """
+    known = [part for part in (value, low, high) if math.isfinite(part)]
+    if all(part == int(part) for part in known):
+        return 0
+    sizes = [size for size in (abs(value), high - low) if math.isfinite(size) and size > 0.0]
+    smallest = min(sizes, default=0.1)
+    return min(MAX_DECIMALS, max(0, 1 - math.floor(math.log10(smallest))))
+
+
+def _fixed(value: float, decimals: int, rounding: str = ROUND_HALF_UP, *, signed: bool) -> str:
+    """Return a number with so many decimals, or with a power of ten; zero has neither."""
+    if not math.isfinite(value):
+        return "?" if math.isnan(value) else f"{value:+}" if signed else f"{value}"
+    exact = Decimal(f"{round(value, EXACT_DECIMALS):.{SIGNIFICANT}g}")
+    places = 1 - exact.adjusted() if abs(value) >= MIN_SCIENTIFIC else decimals
+    rounded = exact.quantize(Decimal(1).scaleb(-places), rounding)
+    if rounded == 0:
+        return "0"
+    sign = "+" if signed else "-"
+    if abs(value) < MIN_SCIENTIFIC:
+        return f"{rounded:{sign}f}"
+    mantissa, power = f"{rounded:{sign}.1e}".split("e")
+    return f"{mantissa}e{int(power)}"
+
+
+WHOLE = re.compile(r"[-+]?\d\S* \[[^]]*\]|\w+ [=<] \S+|\d+ seeds?|last \d+")
+"""What stands in one line: an estimate and its interval, ``p = 0.03``, a count of seeds."""
 
 
 def whole(text: str) -> str:
@@ -83,8 +117,8 @@ def wrapped(text: str, indent: str = "") -> list[str]:
 
     Examples
     --------
-    >>> wrapped(f"{'w' * 70} .82 [.55, .95]")[1]
-    '  .82 [.55, .95]'
+    >>> wrapped(f"{'w' * 70} 0.82 [0.55, 0.95]")[1]
+    '  0.82 [0.55, 0.95]'
     """
     lines = wrap(
         whole(text),
@@ -94,7 +128,3 @@ def wrapped(text: str, indent: str = "") -> list[str]:
         break_on_hyphens=False,
     )
     return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]
-
-
-def _without_zero(text: str) -> str:
-    return text.replace("0.", ".", 1) if text.lstrip("-").startswith("0.") else text

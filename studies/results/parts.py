@@ -4,6 +4,7 @@ Parts are of one study if their specs differ in their seeds alone, and no trial 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 
 from ...core.numerics import pd
@@ -36,6 +37,7 @@ def join_parts(parts: Sequence[Part]) -> Part | None:
     )
     seeds = tuple(dict.fromkeys(chain.from_iterable(outline.seeds for outline, _ in parts)))
     table = {**first.table, "seeds": list(seeds)}
+    joined = replace(joined, step_limits=results.step_limits)
     return first._replace(seeds=seeds, table=table), joined
 
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ...core.numerics import quadrature, special
 from ...core.plugins.words import expect
 from ..errors import WIDTH
-from .notation import two_figures, wrapped
+from .notation import format_number, wrapped
 from .statistics import EXACT, LEVEL, Array
 
 WANTED = 0.8
@@ -40,8 +40,8 @@ SUPPOSED = 4.0
 """Seeds of `USUAL_DEVIATION` that are supposed beside those seen: a few that agree tell little."""
 RATES = 1.07
 """By how much more success rates seem to deviate: they have ties and bounds, which cost a test some
-power. Without it studies of ten episodes find up to .04 less than is promised, with it up to .03,
-see `benchmarks.power`."""
+power. Without it studies of ten episodes find up to 0.04 less than is promised, with it up to 0.03,
+see `research.power`."""
 FEW_PATTERNS = 32
 """If fewer patterns of signs are extreme enough to be significant, the power is simulated."""
 SIMULATED = 4000
@@ -196,7 +196,7 @@ def power_of_t(freedom: int, shift: float, beyond: float) -> float:
 
     The variable is ``(z + shift) / s``, z standard normal, s the root of a chi square over its
     degrees of freedom. It is integrated over s: SciPy's noncentral t is not a number for a power
-    near 1, and where p is adjusted over many comparisons already for a power of .5.
+    near 1, and where p is adjusted over many comparisons already for a power of 0.5.
 
     Parameters
     ----------
@@ -266,21 +266,21 @@ def power_text(
     Examples
     --------
     >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
-    Power: 5 seeds and 2 comparisons cannot give an adjusted p below .05, whatever
-      the outcome. It needs at least 7 seeds; for a difference of .20, about 18.
+    Power: 5 seeds and 2 comparisons cannot give an adjusted p below 0.05, whatever
+      the outcome. It needs at least 7 seeds; for a difference of 0.20, about 18.
     >>> print(*power_text(20, 1, 0.25, 0.2, "evaluation success"), sep="\n")
-    Power: with 20 seeds, a difference of .17 is found with probability .80 in
-      evaluation success. For a difference of .20 it takes about 15 seeds.
+    Power: with 20 seeds, a difference of 0.17 is found with probability 0.80 in
+      evaluation success. For a difference of 0.20 it takes about 15 seeds.
     """
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
     among = f" and {comparisons} comparisons" if comparisons > 1 else ""
     needed = seeds_needed(comparisons)
     enough = seeds_for(smallest, deviation, comparisons) if smallest and deviation else None
-    goal = two_figures(smallest or 0.0)
+    goal = format_number(smallest or 0.0)
     within = f" in {measure}" if measure else ""
     if seeds < needed:
         text = (
-            f"{counted}{among} cannot give an adjusted p below .05{within}, whatever the outcome. "
+            f"{counted}{among} cannot give an adjusted p below 0.05{within}, whatever the outcome. "
             f"It needs at least {needed} seeds"
         )
         text += f"; for a difference of {goal}, about {enough}." if enough else "."
@@ -288,9 +288,9 @@ def power_text(
         text = f"{counted}{among} that deviate by nothing{within}: how small a difference they "
         text += "would find cannot be determined."
     else:
-        least = two_figures(detectable(deviation, seeds, comparisons))
+        least = format_number(detectable(deviation, seeds, comparisons))
         text = f"with {counted}{among}, a difference of {least}{unit} is found with "
-        text += f"probability {two_figures(WANTED)}{within}."
+        text += f"probability {format_number(WANTED)}{within}."
         if enough and goal != least:
             text += f" For a difference of {goal} it takes about {enough} seeds."
     return wrapped(f"Power: {text}")
@@ -346,11 +346,11 @@ def exponent_text(
     Examples
     --------
     >>> print(*exponent_text([2, 4, 8, 16], 20), sep="\n")
-    Exponents: with 20 seeds of sizes 2 to 16, those that differ by .21 are
-      significantly different with probability .80. A difference of .20 takes about
+    Exponents: with 20 seeds of sizes 2 to 16, those that differ by 0.21 are
+      significantly different with probability 0.80. A difference of 0.20 takes about
       23 seeds, or sizes to 32.
     """
-    goal = two_figures(APART)
+    goal = format_number(APART)
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
     enough = seeds_for(APART, deviation / _reach(sizes), comparisons)
     larger = list(sizes)
@@ -363,9 +363,9 @@ def exponent_text(
         text = f"{counted} are too few for a significant difference, "
         text += f"at least {seeds_needed(comparisons)} are needed. {takes}."
     else:
-        least = two_figures(detectable(deviation / _reach(sizes), seeds, comparisons))
+        least = format_number(detectable(deviation / _reach(sizes), seeds, comparisons))
         text = f"with {counted} of sizes {sizes[0]:g} to {sizes[-1]:g}, those that differ by "
-        text += f"{least} are significantly different with probability {two_figures(WANTED)}."
+        text += f"{least} are significantly different with probability {format_number(WANTED)}."
         if len(larger) > len(sizes) and takes:
             up_to = f", or sizes to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
             text += f" {takes}{up_to}."

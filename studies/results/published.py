@@ -8,7 +8,7 @@ that the run gave.
 import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -22,7 +22,7 @@ from ..store.database import SECONDS as PARTS
 from ..store.durable import read_text
 from . import marl_eval
 from .json_values import JsonValue, parse
-from .results import SECONDS, Array, Results, from_arrays
+from .results import SECONDS, Array, Results, StepLimits, from_arrays
 
 GATHERINGS = get_args(Measure.__annotations__["gathering"])
 """How the steps of an episode make one number."""
@@ -98,8 +98,10 @@ def loads(text: str) -> Published:
     }
     numbers = _numbers(file.child("numbers"), seeds, (), room)
     usage = _numbers(file.child("usage"), seeds, PARTS, room)
+    outline = _outline(file.child("spec"), columns)
     results = from_arrays(phases, seeds, numbers, usage, columns, measures)
-    return Published(_outline(file.child("spec"), columns), results, version)
+    results = replace(results, step_limits=StepLimits.of(outline.table))
+    return Published(outline, results, version)
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:
@@ -200,6 +202,8 @@ def _outline(spec: JsonValue, columns: Mapping[str, Mapping[str, object]]) -> St
     for name in ("episodes", "steps", "evaluation"):
         spec.child(name).whole(0, MOST_EPISODES)
     own = spec.table()
+    if "evaluation_steps" in own:
+        own["evaluation_steps"].whole(1, MOST_EPISODES)
     overrides = own["overrides"].items() if "overrides" in own else []
     for part in (spec, *overrides):
         if "curriculum" in part.table():

@@ -10,7 +10,7 @@ from __future__ import annotations
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,9 +28,37 @@ from ..trials.episodes import join_measures
 Array = NDArray[Any]
 
 SECONDS = "seconds."
-"""With what the columns of the seconds of a trial's parts begin."""
+"""Prefix of the columns that hold the seconds of a trial's parts."""
+CPU = "cpu."
+"""Prefix of CPU seconds of training; the number of episodes or decisions until then follows."""
 DONE = "done"
 """State of a trial that has finished."""
+
+
+KEPT = "weights kept"
+"""Phase of a copied team that keeps the weights it had when the failure began."""
+STEPS = Measure("steps", "steps", better="lower", least=0.0)
+"""Length of an episode [decisions]."""
+
+
+class StepLimits(NamedTuple):
+    """Longest episode that is allowed [steps]; None where it is not known."""
+
+    training: int | None = None
+    evaluation: int | None = None
+
+    @classmethod
+    def of(cls, spec: SpecTable) -> StepLimits:
+        """Return the limits that a spec sets.
+
+        >>> StepLimits.of({"steps": 450}), StepLimits.of({"steps": 90, "evaluation_steps": 150})
+        (StepLimits(training=450, evaluation=450), StepLimits(training=90, evaluation=150))
+        """
+        steps = spec.get("steps")
+        return cls(steps, spec.get("evaluation_steps") or steps)
+
+
+UNLIMITED = StepLimits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +80,14 @@ class Results:
     """What is measured of an episode, of any condition; success first."""
     usage: tuple[str, ...] = ()
     """Names of the numbers that differ from run to run, times first."""
+    step_limits: StepLimits = UNLIMITED
+    """Longest episode that the spec allows."""
+
+    def steps(self, phase: str) -> Measure:
+        """Return the measure of the length of episodes, which ends at the longest allowed."""
+        limit = self.step_limits
+        is_training = phase.partition(":")[0] in ("training", KEPT)
+        return replace(STEPS, greatest=limit.training if is_training else limit.evaluation)
 
     @cached_property
     def conditions(self) -> tuple[str, ...]:
@@ -216,9 +252,10 @@ def read(store: Store) -> Results:
     )
     seconds = [name for name in trials.columns if name.startswith(SECONDS)]
     usage = [row[2] for row in store.numbers() if not row[4]]
-    return assemble(
+    results = assemble(
         [episodes], [trials], store.phases(), store.columns(), store.measures(), seconds + usage
     )
+    return replace(results, step_limits=StepLimits.of(store.spec()))
 
 
 def assemble(
@@ -319,6 +356,8 @@ EPISODE_COLUMNS, TRIAL_COLUMNS, NUMBERS = tomllib.loads(
 """Unit and meaning by name: of the columns of episodes that every scenario has, of those of trials,
 and of numbers of whole trials."""
 
+SHARES = ("least_touching", "all_touching")
+"""Numbers of whole trials that are shares."""
 _TITLES = {"decision_median": "decision", "decision_99": "99th percentile of decisions"}
 """Headings of numbers that are shown in milliseconds."""
 
@@ -336,8 +375,10 @@ def describe_number(name: str) -> tuple[Measure, float]:
     """
     if name in _TITLES:
         return Measure(name, _TITLES[name], "ms", better="lower", least=0.0), 1e3
-    unit = "s" if name.startswith("seconds.") else "1"
-    return Measure(name, name, NUMBERS[name][0] if name in NUMBERS else unit), 1.0
+    is_time = name.startswith((SECONDS, CPU))
+    unit, *_ = NUMBERS.get(name, ("s" if is_time else "1",))
+    least = 0.0 if is_time or name in NUMBERS else None  # numbers of other studies may be negative
+    return Measure(name, name, unit, least=least, greatest=1.0 if name in SHARES else None), 1.0
 
 
 DIRECTORY = "directory"
@@ -402,4 +443,11 @@ def combine(
     phases = dict.fromkeys(phase for part in parts for phase in part.phases)
     usage = (name for part in parts for name in part.usage)
     measures = join_measures(part.measures for part in parts)
-    return assemble(episodes, trials, phases, columns, measures, usage), labels
+    results = assemble(episodes, trials, phases, columns, measures, usage)
+    return replace(results, step_limits=_loosest(part.step_limits for part in parts)), labels
+
+
+def _loosest(limits: Iterable[StepLimits]) -> StepLimits:
+    """Return the limits of all studies together, which are known if each study's are."""
+    training, evaluation = zip(*limits, strict=True)
+    return StepLimits(*(None if None in own else max(own) for own in (training, evaluation)))

@@ -14,9 +14,9 @@ from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import label_but
 from . import laws
-from .analysis import Summary, format_p
+from .analysis import Summary
 from .contrasts import title_of, values_of
-from .notation import bracketed, two_figures, wrapped
+from .notation import format_estimate, format_number, format_p, wrapped
 from .power import APART, seeds_for
 from .results import Results
 from .statistics import LEVEL, Array, bootstrap, holm
@@ -57,7 +57,7 @@ class ScalingLaw(NamedTuple):
         for group, law, *_ in self.fits:
             if law is not None:
                 estimates = {**law.exponents()}
-                estimates |= {f"at {n} (90 %)": law.predict(n) for n in self.predicted}
+                estimates |= {f"at {n} (90%)": law.predict(n) for n in self.predicted}
                 lines.append(Summary(group or "all", law.seeds, estimates))
         return tuple(lines)
 
@@ -66,7 +66,7 @@ class ScalingLaw(NamedTuple):
         """How the table's intervals are made, in lines."""
         return tuple(
             wrapped(
-                "Intervals of parameters: 95 %, seeds resampled, Student's. Predictions: of the "
+                "Intervals of parameters: 95%, seeds resampled, Student's. Predictions: of the "
                 "mean of as many seeds."
             )
         )
@@ -93,14 +93,14 @@ class ScalingLaw(NamedTuple):
         ps = holm([contrast.p for _, contrast in pairs]).tolist()
         for (group, contrast), p in zip(pairs, ps, strict=True):
             word = "differs" if p < LEVEL else "no significant difference"
-            shown = bracketed(contrast.difference)
+            shown = format_estimate(contrast.difference)
             lines += wrapped(f"{word}: {group}, {shown}, p {format_p(p)}", "  ")
         spread = max(contrast.deviation for _, contrast in pairs)
         seeds = seeds_for(APART, spread, len(pairs)) if spread > 0.0 else None
         if seeds is not None:
             lines += wrapped(
-                f"Power: exponents that differ by {two_figures(APART)} are significantly different "
-                f"with probability .80 by about {seeds} seeds at these sizes."
+                f"Power: exponents that differ by {format_number(APART)} are significantly "
+                f"different with probability 0.80 by about {seeds} seeds at these sizes."
             )
         return lines
 
@@ -126,8 +126,8 @@ def _sentence(fitted: Fitted, size: str) -> str:
     text = f"{head}{law.curve.name} ({counted}{unreached})"
     for n, measured, e in law.held_out:
         inside = "inside" if e.low <= measured <= e.high else "outside"
-        text += f"; {n:g} left out: predicted {bracketed(e)}, measured {two_figures(measured)}, "
-        text += inside
+        text += f"; {n:g} left out: predicted {format_estimate(e)}, "
+        text += f"measured {format_number(measured)}, {inside}"
     if law.noise <= laws.FLAT:
         text += "; all seeds agree, so that intervals of parameters tell nothing of the law"
     return f"{text}."
@@ -177,7 +177,7 @@ def scaling_law(
         title = title_of(shown_as, own)
     else:
         samples = _decisions(results, measure, criterion)
-        title = f"decisions to {two_figures(criterion)} of {measure}"
+        title = f"decisions to {format_number(criterion)} of {measure}"
         shown_as, own = SUCCESS, ""
     counts = _episodes(results, shown_as, own) if shown_as.is_rate and criterion is None else {}
     groups: dict[str, list[str]] = {}
@@ -271,7 +271,7 @@ def _fit(
         if marked is not None:
             censored[:, k] = marked.loc[frame.index].to_numpy()
     if values.size and not censored.any() and np.ptp(values) == 0.0:
-        return Fitted(group, None, f"every run has {two_figures(values[0, 0])}")
+        return Fitted(group, None, f"every run has {format_number(values[0, 0])}")
     try:
         if episodes is not None:
             sample = laws.of_rates(sizes, values * episodes, episodes)
@@ -284,4 +284,4 @@ def _fit(
             return Fitted(group, None, str(error))
         most = np.inf if episodes is None else 1.0
         less = bootstrap(values[:, 1] - values[:, 0], bounds=(-most, most))
-        return Fitted(group, None, f"{error}; the larger less the smaller: {bracketed(less)}")
+        return Fitted(group, None, f"{error}; the larger less the smaller: {format_estimate(less)}")

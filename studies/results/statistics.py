@@ -25,8 +25,8 @@ from ...core.plugins.words import expect_each, show
 Array = NDArray[np.float64]
 
 FEW = 8
-"""Below so many seeds a bootstrap interval covers too seldom: of normal values a 95 % interval from
-2, 3, 4, 5 seeds would cover 51, 74, 87, 92 %."""
+"""Below so many seeds a bootstrap interval covers too seldom: of normal values a 95% interval from
+2, 3, 4, 5 seeds would cover 51, 74, 87, 92%."""
 
 AT_ONCE = 2**20
 """Values that are resampled at a time, so that memory does not grow with the study; 8 MB."""
@@ -36,8 +36,8 @@ NOT_NEGATIVE = (0.0, np.inf)
 
 ALIKE = 2.0
 """Failures that `rate` supposes beside those seen. With seeds of which one in twenty never learns,
-and .99 succeed of the others' episodes, intervals of 10 to 30 seeds and 10 episodes then cover the
-truth in 94 to 97 % of simulations, without it in 69 to 75 %."""
+and 0.99 succeed of the others' episodes, intervals of 10 to 30 seeds and 10 episodes then cover the
+truth in 94 to 97% of simulations, without it in 69 to 75%."""
 
 
 class Estimate(NamedTuple):
@@ -225,32 +225,6 @@ def rates(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
 def stack_estimates(estimates: Sequence[Estimate]) -> Estimate:
     """Return estimates of no dimension as one ``(n,)``."""
     return Estimate(*np.array(estimates, dtype=float).T)
-
-
-BLOCK = 5
-"""Episodes that a level is measured over."""
-REGAINED = 0.9
-"""Share of what a fault has cost that counts as recovered when it is back."""
-
-
-def recovery(short: ArrayLike, allowed: ArrayLike) -> tuple[Array, Array]:
-    """Return per seed whether it recovered from a fault, and after how many episodes.
-
-    It has at the first episode from which on `BLOCK` of them fall short by no more than is allowed.
-    A seed that never does counts with all the episodes that were run: a lower bound.
-
-    Parameters
-    ----------
-    short
-        What each episode from the fault on falls short of one without ``(n_seeds, n_episodes)``.
-    allowed
-        What a recovered one may fall short by: a number, or ``(n_seeds, 1)``.
-    """
-    blocks = np.lib.stride_tricks.sliding_window_view(np.asarray(short), BLOCK, axis=1)
-    regained = blocks.mean(axis=2) <= np.asarray(allowed) + 1e-12
-    recovered = regained.any(axis=1)
-    episodes = np.where(recovered, regained.argmax(axis=1), np.shape(short)[1])
-    return recovered.astype(float), episodes.astype(float)
 
 
 LEVEL = 0.05

@@ -22,7 +22,13 @@ from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.learners.written import WrittenSettings
 from ...core.plugins.registry import Plugged
-from ...core.plugins.settings import ScenarioSettings, Settings, check_team, unwritten
+from ...core.plugins.settings import (
+    FailureSpan,
+    ScenarioSettings,
+    Settings,
+    check_team,
+    unwritten,
+)
 from ...scenarios import DEFAULT, SCENARIOS
 from ...scenarios.faults.perception import perceived
 from ...topologies import build
@@ -107,15 +113,15 @@ class ConditionSettings(Settings):
         return scenario, build(self.topology, scenario.agents, scenario.groups, pairs)
 
     @property
-    def onsets(self) -> tuple[int, ...]:
-        """Episodes in which failures of the scenario begin, or agents leave."""
-        left = [f.episode for f in self.topology.failures if isinstance(f, LeftAgents)]
-        return (*self.scenario.onsets, *left)
+    def failure_spans(self) -> tuple[FailureSpan, ...]:
+        """When failures of the scenario begin and end, or agents leave and return."""
+        left = [f for f in self.topology.failures if isinstance(f, LeftAgents)]
+        return (*self.scenario.failure_spans, *((f.episode, f.end_episode) for f in left))
 
     @property
     def onset(self) -> int | None:
-        """Episode in which the first of them begins; none: never."""
-        return min(self.onsets, default=None)
+        """Episode in which the first failure begins, if any does."""
+        return min((begin for begin, _ in self.failure_spans), default=None)
 
     def acts_as(self, other: ConditionSettings) -> bool:
         """Return whether topology, learner and perception are those of `other`."""

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ...core.isolation import python_command
 from .runner import Outcome, RunTrial, attempt, begin, storable
 from .warmth import Warmth, measure_warmth, warm_up
 
@@ -98,15 +99,10 @@ def run_apart(task: bytes, seed: int) -> Answer:
 def _begin(parent: int) -> tuple[subprocess.Popen[bytes], Connection]:
     """Start the nursery of the process `parent`, this one; it ends with the connection to it."""
     ours, theirs = Pipe()
-    program = (
-        f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; "
-        f"serve({theirs.fileno()})"
-    )
+    command = python_command(f"from {__name__} import serve; serve({theirs.fileno()})")
     # Sets of text are in the same order in every trial.
     environment = {"PYTHONHASHSEED": "0", **os.environ}
-    process = subprocess.Popen(
-        [sys.executable, "-c", program], env=environment, pass_fds=[theirs.fileno()]
-    )
+    process = subprocess.Popen(command, env=environment, pass_fds=[theirs.fileno()])
     theirs.close()
     return process, ours
 

@@ -18,6 +18,7 @@ from typing import Any, get_args
 from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+from ...core.isolation import safe_path
 from ...core.plugins.words import closest, command_line
 from ..errors import SpecError
 from ..trials.trial import Trial
@@ -46,7 +47,8 @@ def check_workers(backend: Backend, jobs: int | None, address: str | None) -> No
 def _check_semaphores() -> None:
     """Refuse a machine whose processes cannot wait for each other, as all local workers do."""
     try:
-        get_context("spawn").Semaphore()
+        with safe_path():  # it starts a process that frees shared memory
+            get_context("spawn").Semaphore()
     except (ImportError, OSError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise SpecError(
@@ -79,19 +81,20 @@ def start_workers(
     """
     check_workers(backend, jobs, address)
     wanted = max(1, min(jobs or cores(), trials))
-    if backend == "loky":
-        yield LokyWorkers(wanted)
-        return
-    try:
-        from .dask import DaskWorkers
-    except ModuleNotFoundError as error:
-        if error.name not in ("dask", "distributed"):
-            raise
-        install = command_line("install", "dask", "distributed", program="pip")
-        raise SpecError(f"--backend dask: {error.name} is not installed; {install}") from None
-    cluster = DaskWorkers.local(wanted) if address is None else DaskWorkers.at(address, jobs)
-    with cluster as workers:
-        yield workers
+    with safe_path():
+        if backend == "loky":
+            yield LokyWorkers(wanted)
+            return
+        try:
+            from .dask import DaskWorkers
+        except ModuleNotFoundError as error:
+            if error.name not in ("dask", "distributed"):
+                raise
+            install = command_line("install", "dask", "distributed", program="pip")
+            raise SpecError(f"--backend dask: {error.name} is not installed; {install}") from None
+        cluster = DaskWorkers.local(wanted) if address is None else DaskWorkers.at(address, jobs)
+        with cluster as workers:
+            yield workers
 
 
 QUIET = "ignore:resource_tracker:UserWarning"

@@ -62,7 +62,7 @@ def test_the_smallest_benchmark_of_worlds_runs(run: Run, tmp_path: Path) -> None
 @pytest.mark.slow
 def test_errors_of_few_states_are_told(run: Run) -> None:
     few = ["--robots", "2", "5", "--seeds", "1", "--steps", "9", "--times", "2"]
-    said = run("benchmarks.errors", *few)
+    said = run("research.errors", *few)
     lines = said.splitlines()
     assert all(len(line) <= 80 for line in lines)
     for kind in ("sampling", "reference", "exact"):
@@ -73,7 +73,7 @@ def test_errors_of_few_states_are_told(run: Run) -> None:
 def test_a_small_crowd_is_drawn(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "crowd.png"
     sizes = ["--robots", "8", "--steps", "2"]
-    said = run("benchmarks.crowd", str(path), *sizes)
+    said = run("research.crowd", str(path), *sizes)
     assert said.startswith("16 agents, 2 decisions of 512 ms each")
     assert path.stat().st_size > 5000
 
@@ -98,15 +98,15 @@ def test_boxes_decide_at_once_as_one_by_one(run: Run) -> None:
 @pytest.mark.slow
 def test_what_can_be_solved_at_a_size_is_told(run: Run) -> None:
     few = ["--robots", "3", "--seeds", "2", "--scalings", "similar", "--grows", "width"]
-    said = run("benchmarks.sizes", *few)
+    said = run("research.sizes", *few)
     assert all(len(line) <= 80 for line in said.splitlines())
     assert "scaling similar, box grows: width" in said
     assert "│ 3 " in said
 
 
 def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
-    said = run("benchmarks.steering", "--scripted", "3", "--seeds", "1", "--episodes", "2")
-    assert said.startswith("3 robots, scripted: 1.0 [.34, 1.0], ")
+    said = run("research.steering", "--scripted", "3", "--seeds", "1", "--episodes", "2")
+    assert said.startswith("3 robots, scripted: 1.00 [0.34, 1.00], ")
     lines = [line for line in said.splitlines() if "3, scripted" not in line]
     rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in lines]
     page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
@@ -120,7 +120,7 @@ def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
 
 def test_values_and_predictors_are_crossed(run: Run) -> None:
     short = "scenario.robots=3", "episodes=1", "evaluation=1", "steps=12"
-    told = run("benchmarks.learned_decisions", "--seeds", "0", "--set", *short).splitlines()
+    told = run("research.learned_decisions", "--seeds", "0", "--set", *short).splitlines()
     assert told[0].split() == ["0", "mean"]
     assert told[7].split() == ["values", "learned,", "robots", "given", "0.0", "0.0"]
     assert told[8].split() == ["learned", "as", "it", "is"]
@@ -137,5 +137,5 @@ def test_a_batch_of_mujoco_is_timed(run: Run) -> None:
 
 @pytest.mark.slow
 def test_rules_can_hold_the_pole(run: Run) -> None:
-    (line,) = run("benchmarks.cartpole", "--orders", "3", "--held", "5").splitlines()
+    (line,) = run("research.cartpole", "--orders", "3", "--held", "5").splitlines()
     assert line == "order 3, held for 5: 500 steps, least 500"

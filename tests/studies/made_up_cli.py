@@ -16,7 +16,7 @@ from io import TextIOWrapper
 import made_up
 import matplotlib.pyplot  # noqa: F401
 
-from nested_agents.results import commands
+from nested_agents.research import commands
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.commands import reading, running  # noqa: F401

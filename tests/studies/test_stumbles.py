@@ -16,6 +16,7 @@ from nested_agents.studies.catalogue.wheel_failure import analyse as analyse_fai
 from nested_agents.studies.catalogue.wheel_failure import draw as draw_failures
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.figures import log_axis
+from nested_agents.studies.results.results import STEPS
 from nested_agents.topologies.drawing import draw
 
 
@@ -30,10 +31,10 @@ def test_every_failure_is_marked() -> None:
 
 
 def test_short_training_has_no_identical_columns() -> None:
-    assert [title for title, *_ in metrics_of((SUCCESS,), SUCCESS, 4)][:2] == [
+    assert [title for title, *_ in metrics_of((SUCCESS,), SUCCESS, STEPS, 4)][:2] == [
         "success last 5", "evaluation success",
     ]  # fmt: skip
-    assert metrics_of((SUCCESS,), SUCCESS, 6)[0][0] == "success first 5"
+    assert metrics_of((SUCCESS,), SUCCESS, STEPS, 6)[0][0] == "success first 5"
 
 
 @pytest.mark.parametrize("values", [[0.6, 0.7], [0.3, 4.0], [1.0, 2e5]])

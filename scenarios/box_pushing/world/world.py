@@ -12,7 +12,7 @@ off, so that the future depends on poses and velocities alone and a saved world 
 
 The box rubs on the ground by one friction joint at each of its friction points. Such a joint cuts
 its force to the limit after weighting it with the box's mass as seen from the joint, which leaves
-force not quite against the motion: sliding along its axes, a square meets 4 % less than its
+force not quite against the motion: sliding along its axes, a square meets 4% less than its
 `friction_force`; along its diagonals and in turning, all of it.
 
 A wheel that fails as free has no drive at all: it resists sideways motion only. All other kinds of

@@ -19,7 +19,7 @@ PUBLISHED = ("success",)
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     return compared_with_first(results, results.of_phase("training"))
 
 
@@ -32,7 +32,7 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
     for title, phase in phases.items() if len(conditions) > 1 else ():
         means = {name: results.means(c, phase, main.name) for name, c in conditions.items()}
         pairs[title] = [(name, title, own, means[names[0]]) for name, own in means.items()][1:]
-    compared, notes = judged(pairs, "".join(names[:1]), of_rates=main.is_rate)
+    compared, notes = judged(pairs, "".join(names[:1]), main)
     by_place = {(d.condition, d.measure): d.estimate for ds in compared.values() for d in ds}
     table = []
     for name, condition in conditions.items():

@@ -11,23 +11,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.interface.measures import SUCCESS
+from ....core.interface.measures import RETURN, SUCCESS
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, differences, verdicts
-from ...results.results import Results
-from ...results.statistics import Array, Estimate, bootstrap, rate, stack_estimates
+from ...results.results import CPU, Results
+from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stack_estimates
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..peers import AFTER, CPU, evaluated_after
 from ..study import check_evaluated
 
+AFTER = "after "
+"""With what the phase of such an evaluation begins; how much came before follows."""
 FIRST = 1000
 """Decisions before the first evaluation."""
 DECISIONS = "decisions"
 """Name of the number of decisions that a trial was trained for."""
 NUMBERS = (DECISIONS,)
-RETURN = "evaluation return"
 
 
 def stops(decisions: int) -> list[int]:
@@ -76,6 +76,16 @@ def measure(trial: Trial) -> TrialResult:
     return session.finish({DECISIONS: float(done)}, session.usage)
 
 
+def evaluated_after(results: Results, condition: str) -> dict[int, str]:
+    """Return the phases in which a condition was evaluated on its way, by how much came before."""
+    phases = {
+        int(phase.removeprefix(AFTER)): phase
+        for phase in results.phases
+        if phase.startswith(AFTER) and results.has(condition, phase)
+    }
+    return dict(sorted(phases.items()))
+
+
 class ReturnCourse(NamedTuple):
     """How one condition fares with experience."""
 
@@ -88,12 +98,13 @@ class ReturnCourse(NamedTuple):
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("evaluation")
     is_rate = all(results.has(condition, "evaluation", SUCCESS.name) for condition in conditions)
     is_rate = is_rate and any(results.success(c, "evaluation").any() for c in conditions)
-    name = SUCCESS.name if is_rate else "return"
-    title = EVALUATED if is_rate else RETURN
+    measure = SUCCESS if is_rate else RETURN
+    name = measure.name
+    title = EVALUATED if is_rate else "evaluation return"
     unknown = next((c for c in conditions if not results.has(c, "evaluation", name)), None)
     if unknown is not None:  # published results keep no returns
         raise SpecError(f"study = 'experience': results of {unknown!r} have no {name}")
@@ -112,7 +123,7 @@ def analyse(results: Results) -> Analysis:
         seconds = [key for key in numbers if key.startswith(CPU)]
         if seconds:
             last = max(seconds, key=lambda key: int(key.removeprefix(CPU)))
-            estimates["CPU [s]"] = bootstrap(numbers[last])
+            estimates["CPU [s]"] = bootstrap(numbers[last], bounds=NOT_NEGATIVE)
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
         stacked = stack_estimates([*values.values()])
         courses.append(ReturnCourse(condition, np.array([*values], float), stacked))
@@ -120,17 +131,17 @@ def analyse(results: Results) -> Analysis:
         return Analysis(())
     means = [results.means(condition, "evaluation", name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
-    compared = differences({title: pairs[1:]}, of_rates=is_rate)
+    compared = differences({title: pairs[1:]}, measure)
     heads = {f"{title}, less that of {conditions[0]}": compared[title]}
     notes = (
         "after N: when evaluated after N joint decisions of training, of all environments.",
-        *verdicts(heads, of_rates=is_rate),
+        *verdicts(heads, measure),
     )
     return Analysis(tuple(table), notes, courses, compared)
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: evaluations against decisions experienced, bands 95 % intervals."""
+    """Return the figure: evaluations against decisions experienced, bands 95% intervals."""
     from matplotlib.ticker import LogLocator
 
     from ...presentation import figures as f  # matplotlib takes its time
@@ -143,7 +154,7 @@ def draw(analysis: Analysis) -> Figures:
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     axes.set_xlabel("joint decisions of training")
     is_rate = EVALUATED in analysis.differences
-    axes.set_ylabel(EVALUATED if is_rate else RETURN)
+    axes.set_ylabel(EVALUATED if is_rate else "evaluation return")
     axes.grid(axis="y", alpha=0.25)
     if is_rate:
         f.as_rates(axes)

@@ -28,6 +28,7 @@ from ...results.analysis import (
     Summary,
     estimate_of,
     judged,
+    steps_estimate,
 )
 from ...results.results import Results, Sizes
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exactly
@@ -64,7 +65,7 @@ def check(spec: Spec) -> None:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling.
 
     Cases are sorted by number of robots, whose value decides, and hierarchy. Times are of one
     decision of the whole team.
@@ -104,7 +105,7 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
     for case, own in zip(cases, means, strict=True):
         if case.setting in bases and case.hierarchy != reference:
             pairs[case.setting].append((case.hierarchy, title, own, bases[case.setting]))
-    judgement, lines = judged(pairs, reference, title, of_rates=main.is_rate)
+    judgement, lines = judged(pairs, reference, main, title)
     compared = {setting: own for setting, own in judgement.items() if own}
     notes = ["Rows: what else is swept, hierarchy."] * any(case.value_of for case in cases)
     return Analysis(tuple(table), (*notes, MESSAGES, "", *(lines or [NOTHING])), cases, compared)
@@ -119,7 +120,7 @@ def estimates(
     values = {f"evaluation {main.heading}": estimate_of(results, condition, phase, main)}
     decisions = to_the_goal(success, results.values(condition, "steps", phase))
     if len(decisions):
-        values["decisions to goal"] = bootstrap(decisions, bounds=NOT_NEGATIVE)
+        values["decisions to goal"] = steps_estimate(decisions, results.steps(phase))
     values[DECIDING] = bootstrap(1e3 * deciding, bounds=NOT_NEGATIVE)
     values["messages"] = exactly(messages[0])
     return values
@@ -161,7 +162,7 @@ def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
     figures.name_rows(panels[0, 0], rows)
     if len(whose) > 1:
         names = [f"value of: {value_of}" for value_of in whose]
-        figures.name_points(figure, names, "means over seeds, bars: 95 % intervals")
+        figures.name_points(figure, names, "means over seeds, bars: 95% intervals")
     return figure
 
 
@@ -170,7 +171,7 @@ def draw(analysis: Analysis) -> Figures:
 
     Of one size it is a chart of success and messages, with a row for each hierarchy. Otherwise
     there is a column of panels for each choice of whose value decides. Points are means over seeds,
-    bars their 95 % intervals; hierarchies differ by colour and marker, and stand a little beside
+    bars their 95% intervals; hierarchies differ by colour and marker, and stand a little beside
     each other.
     """
     from ...presentation import figures  # matplotlib takes its time
@@ -200,7 +201,7 @@ def draw(analysis: Analysis) -> Figures:
     figures.log_axis(panels[1, 0])
     for axes, title in zip(panels[:, 0], (main, "deciding [ms]"), strict=True):
         axes.set_ylabel(title)
-    figures.name_lines(figure, hierarchies, "means over seeds, bars: 95 % intervals")
+    figures.name_lines(figure, hierarchies, "means over seeds, bars: 95% intervals")
     return {"hierarchies": figure}
 
 

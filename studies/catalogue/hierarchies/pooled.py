@@ -5,7 +5,7 @@ small difference that is the same everywhere is found. Success saturates near 1,
 the goal do not: both count alike. That a difference is not significant does not make it none:
 hierarchies are *equal* if the whole interval lies within a margin, `MARGIN` of success and `SLOWER`
 of decisions, which were named before the comparisons that rest on them (two one-sided tests at
-.025, Schuirmann 1987).
+0.025, Schuirmann 1987).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics import pd
-from ...results.analysis import format_p, select_shared
-from ...results.notation import bracketed, signed, two_decimals, two_figures, wrapped
+from ...results.analysis import select_shared
+from ...results.notation import format_estimate, format_number, format_p, wrapped
 from ...results.results import Results
 from ...results.statistics import LEVEL, Array, Estimate, bootstrap, paired_tests
 from .cases import HierarchyCase
@@ -56,7 +56,7 @@ class Effect(NamedTuple):
     def shown(self) -> str:
         """Estimate, interval, p and verdict, as text."""
         what = "decisions x" if self.is_ratio else "success "
-        shown = bracketed(self.estimate, two_decimals if self.is_ratio else signed)
+        shown = format_estimate(self.estimate, signed=not self.is_ratio)
         return f"{what}{shown}, p {format_p(self.p)}: {self.verdict}"
 
 
@@ -116,7 +116,7 @@ def lines_of(compared: Mapping[str, tuple[Effect, Effect]], reference: str) -> I
         return
     head = (
         f"All settings together, seed by seed, beside {reference}; equal: the interval lies within "
-        f"{two_figures(MARGIN)} of success, {SLOWER:.0%} of decisions to the goal:"
+        f"{format_number(MARGIN)} of success, {SLOWER:.0%} of decisions to the goal:"
     )
     yield from wrapped(head)
     for hierarchy, both in compared.items():

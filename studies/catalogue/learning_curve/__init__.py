@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ....core.interface.measures import SUCCESS, Measure
+from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
-from ...results.contrasts import EPISODES, STEPS
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rates
 from ..study import measure as measure
@@ -31,7 +30,7 @@ COLUMNS = 3
 def check(spec: Spec) -> None:
     """Raise `SpecError` if something is to fail after the last episode of training."""
     for condition in spec.conditions():
-        for onset in condition.settings.scenario.onsets:
+        for onset, _ in condition.settings.scenario.failure_spans:
             if onset >= spec.episodes:
                 raise SpecError(
                     f"scenario.failures: one begins in episode {onset}, allowed 0 to "
@@ -44,8 +43,10 @@ Metric = tuple[str, Measure, str]
 """Heading of a column of the table, which measurement it is, and of which of `BLOCKS`."""
 
 
-def metrics_of(measures: Sequence[Measure], main: Measure, episodes: int) -> tuple[Metric, ...]:
-    """Return the columns of the table, given what is measured of an episode, and their number.
+def metrics_of(
+    measures: Sequence[Measure], main: Measure, steps: Measure, episodes: int
+) -> tuple[Metric, ...]:
+    """Return the columns of the table, given the measures of an episode, and their number.
 
     The main measure as it begins, as it ends and when evaluated; how the evaluation fares by other
     rates and how many steps it takes; and every other measure at the end of training. Where
@@ -58,7 +59,7 @@ def metrics_of(measures: Sequence[Measure], main: Measure, episodes: int) -> tup
         (f"{title} last {BLOCK}", main, "last"),
         (f"evaluation {title}", main, "evaluation"),
         *((f"{m.title}, evaluation", m, "evaluation") for m in others if m.is_rate),
-        ("evaluation steps", STEPS, "evaluation"),
+        ("evaluation steps", steps, "evaluation"),
         *((m.heading, m, "last") for m in others if not m.is_rate),
     )
 
@@ -79,12 +80,12 @@ def analyse(results: Results) -> Analysis:
     if not conditions:
         return _of_evaluations(results)
     table = []
-    measures = results.measures or EPISODES[1:]  # foreign ones may have the return alone
+    measures = results.measures or (RETURN,)  # foreign ones may have the return alone
     main = results.main
     for condition in conditions:
         estimates: dict[str, Estimate] = {}
         episodes = results.values(condition, measures[0].name).shape[1]
-        for title, m, block in metrics_of(measures, main, episodes):
+        for title, m, block in metrics_of(measures, main, results.steps("evaluation"), episodes):
             phase = "evaluation" if block == "evaluation" else "training"
             if results.has(condition, phase, m.name):  # published results keep a part
                 estimates[title] = estimate_of(results, condition, phase, m, BLOCKS[block])
@@ -126,7 +127,7 @@ def _of_evaluations(results: Results) -> Analysis:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure, a panel for every measure that is followed.
 
-    Lines are means over seeds, bands their 95 % intervals. A condition has a colour and a style of
+    Lines are means over seeds, bands their 95% intervals. A condition has a colour and a style of
     line of its own, so that lines upon each other are distinguished.
     """
     from ...presentation import figures as f  # matplotlib takes its time
@@ -155,5 +156,5 @@ def draw(analysis: Analysis) -> Figures:
     same = len(set(seeds.values())) == 1
     labels = [c if same else f"{c} ({n} seeds)" for c, n in seeds.items()]
     note = f"mean over {next(iter(seeds.values()))} seeds" if same else "mean over seeds"
-    f.name_curves(figure, labels, f"{note}, band: 95 % interval")
+    f.name_curves(figure, labels, f"{note}, band: 95% interval")
     return {"learning-curves": figure}

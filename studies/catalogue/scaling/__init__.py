@@ -27,7 +27,7 @@ from ...results.analysis import (
     evaluated,
     select_shared,
 )
-from ...results.notation import bracketed, two_decimals
+from ...results.notation import format_estimate
 from ...results.results import Results, Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly
 from ...spec.tables import label_but
@@ -127,7 +127,7 @@ class Point(NamedTuple):
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate; 95 % intervals, seeds as the unit of sampling. Times are per step."""
+    """Estimate; 95% intervals, seeds as the unit of sampling. Times are per step."""
     conditions = results.of_phase("training")
     sizes = Sizes.of(results, conditions)
     points = [_point(results, c, sizes) for c in conditions]
@@ -138,7 +138,7 @@ def analyse(results: Results) -> Analysis:
         table.append(Summary(label, len(results.seeds(condition)), point.values))
     notes = [
         f"\n{evaluator}, time with n agents:\n  "
-        + "\n  ".join(f"{what} n^{bracketed(e, two_decimals)}" for what, e in by_what.items())
+        + "\n  ".join(f"{what} n^{format_estimate(e)}" for what, e in by_what.items())
         for evaluator, by_what in exponents_of(points).items()
     ]
     return Analysis(tuple(table), tuple(notes), points)
@@ -194,7 +194,7 @@ def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure.
 
-    Points are means over seeds, bars their 95 % intervals; evaluators differ by colour and marker,
+    Points are means over seeds, bars their 95% intervals; evaluators differ by colour and marker,
     and stand a little beside each other.
     """
     from ...presentation import figures  # matplotlib takes its time
@@ -227,6 +227,6 @@ def draw(analysis: Analysis) -> Figures:
         figures.scale_axis(axes, sorted({p.robots for p in points}))
     for axes in panels[-1]:
         axes.set_xlabel(points[0].bodies)
-    title = "means over seeds, bars: 95 % intervals; dotted: the decision period"
+    title = "means over seeds, bars: 95% intervals; dotted: the decision period"
     figures.name_lines(figure, evaluators, title)
     return {"scaling": figure}

@@ -7,16 +7,17 @@ worlds under the same exploration with its weights kept as they are. Conditions 
 ``learner.self_model.enabled`` give all four cases, by what adapts: nothing, the weights, the
 self-model (by which predictions know the wheel has changed), or both.
 
-Levels are success rates over `BLOCK` episodes: before the failure, just after it, and at the end
-of training. A seed has recovered at the first episode from which on `BLOCK` episodes reach
-`REGAINED` of the level before (its mean over seeds); seeds that never do count with the episodes
-and steps that were run, so that those columns are lower bounds. The cumulative loss is the sum of
-what the episodes after the onset fall short of the level before, in episodes.
+Levels are success rates over `BLOCK` episodes: before the failure, just after it, after its end if
+it ends, and at the end of training. Recovery and loss are measured against the level of each seed,
+see `nested_agents.studies.results.recovery`.
 """
 
-from collections.abc import Iterator, Sequence
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -24,10 +25,20 @@ from ....core.agents.team import Team
 from ....core.learners.learner import LearnerSettings
 from ....core.learners.td import FrozenSettings
 from ....core.numerics import pd
+from ....core.plugins.settings import FailureSpan
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures, Pair, Summary, judged
-from ...results.results import Results
-from ...results.statistics import BLOCK, NOT_NEGATIVE, REGAINED, Array, bootstrap, rate, recovery
+from ...results.analysis import (
+    Analysis,
+    Figures,
+    Pair,
+    Summary,
+    estimate_over_seeds,
+    judged,
+)
+from ...results.notation import wrapped
+from ...results.recovery import BLOCK, FailureCourse, bounded, failure_course
+from ...results.results import KEPT, Results
+from ...results.statistics import Array, bootstrap, exactly, rate
 from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ...trials.arrangement import arrange
@@ -35,14 +46,15 @@ from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases, distinct
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
 AT_END = "success at the end"
 """What is compared."""
-KEPT = "weights kept"
-"""The phase of the copied team."""
 SWEPT = "learner.self_model.enabled"
 """What is swept to have every condition with a self-model and without."""
 ADAPTS = {
@@ -54,6 +66,10 @@ ADAPTS = {
 """What adapts, by whether the self-model is enabled, and phase."""
 COLUMNS = 3
 """Panels of the figure that stand beside each other."""
+FAILING = "#888888"
+"""Color of failures in the figure."""
+SHADE = 0.18
+"""Opacity of the area of a transient failure."""
 SMOOTHED = 3
 """Episodes that a point of a curve averages over."""
 
@@ -67,9 +83,7 @@ def measure(trial: Trial) -> TrialResult:
     kept = _keeping_weights(session)
     session.train(trial.episodes - onset, onset)
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
-    begun = sorted(set(trial.settings.onsets) - {onset})
-    later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
-    return session.finish({"onset": float(onset), **later})
+    return session.finish(_numbers_of(set(trial.settings.failure_spans)))
 
 
 def check(spec: Spec) -> None:
@@ -109,112 +123,115 @@ def _keeping_weights(session: Session) -> Team:
 
 
 class Course(NamedTuple):
-    """One case: the course of a fault, given what adapts."""
+    """Course of a fault with what adapts to it."""
 
     fault: str
-    """Label of the condition but for `SWEPT`."""
+    """Label of the condition without `SWEPT`."""
     adapts: str
-    """What does, see `ADAPTS`; `training` or `weights kept` if self-models were not swept."""
-    onset: int
-    """Episode in which the first wheel fails."""
-    onsets: tuple[int, ...]
-    """Episodes in which any does."""
-    success: Array
-    """``(n_seeds, n_episodes)`` from the start of training."""
-    steps: Array
-    seeds: tuple[int, ...]
-    """The seeds, in that order."""
+    """What adapts, see `ADAPTS`; `training` or `KEPT` if self-models were not swept."""
+    spans: tuple[FailureSpan, ...]
+    """Episodes in which failures begin and end, the first failure first."""
+    measured: FailureCourse
+    """Outcomes of the episodes."""
+    longest: int | None
+    """Longest episode that is allowed [decisions]."""
 
     @property
-    def before(self) -> Array:
-        """Outcomes ``(n_seeds, BLOCK)`` of the last episodes before the failure."""
-        return self.success[:, self.onset - BLOCK : self.onset]
+    def end(self) -> int | None:
+        """Episode from which on nothing fails any more, before training ends; None: never."""
+        ends = [math.inf if end is None else end for _, end in self.spans]
+        return int(max(ends)) if max(ends) < self.measured.success.shape[1] else None
 
     @property
-    def end(self) -> Array:
-        """Outcomes of the last episodes."""
-        return self.success[:, -BLOCK:]
-
-    @property
-    def short(self) -> Array:
-        """What the episodes from the failure on fall short of the level before."""
-        return np.asarray(self.before.mean() - self.success[:, self.onset :])
-
-    @property
-    def possible_loss(self) -> tuple[float, float]:
-        """The least and the greatest cumulative loss that there can be."""
-        before = float(self.before.mean())
-        episodes = self.short.shape[1]
-        return (before - 1.0) * episodes, before * episodes
-
-    def recovery(self) -> tuple[Array, Array, Array]:
-        """Return per seed whether it recovered, after how many episodes and steps."""
-        recovered, episodes = recovery(self.short, (1.0 - REGAINED) * self.before.mean())
-        steps = [
-            run[self.onset : self.onset + int(count)].sum()
-            for run, count in zip(self.steps, episodes, strict=True)
-        ]
-        return recovered, episodes, np.array(steps, dtype=float)
+    def summary(self) -> Summary:
+        """Line of the table."""
+        course = self.measured
+        estimates = {
+            "before": rate(course.before),
+            "just after": rate(course.from_episode(course.onset)),
+        }
+        if self.end is not None:
+            estimates["failure ends [episode]"] = exactly(self.end)
+            estimates["after its end"] = rate(course.from_episode(self.end))
+        estimates["end"] = rate(course.end)
+        if course.before.any():  # else there is nothing to lose or to regain
+            for name, values in course.measured.items():
+                measure = bounded(name, [course], self.longest)
+                estimates[measure.heading] = estimate_over_seeds(values, measure)
+        return Summary(f"{self.fault}: {self.adapts}", len(course.success), estimates)
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
+    """Estimate and compare; 95% intervals, seeds as the unit of sampling.
 
-    Differences are success at the end of every case over that of the same fault when nothing
+    Differences are success at the end of every case minus that of the same fault when nothing
     adapts.
     """
     courses = courses_of(results)
     gains, lines = judged({AT_END: _gains(courses)}, "nothing adapting")
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
-    if not all(course.before.any() for course in courses):
-        notes += ["No recovery is measured where no episode before the failure succeeded."]
-    return Analysis(tuple(map(_summary, courses)), (*notes, *lines), courses, gains)
+    if not all(course.measured.before.any() for course in courses):
+        notes.append("No recovery is measured where no episode before the failure succeeded.")
+    idle = max((int((~c.measured.before.any(axis=1)).sum()) for c in courses), default=0)
+    if idle:
+        notes += wrapped(
+            f"Seeds without a success in the {BLOCK} episodes before the failure have nothing to "
+            f"regain and count as recovered at once. Here there are {idle} at most in a line."
+        )
+    if any(course.end is not None for course in courses):
+        notes.append("A failure that has ended is over: what comes back then is no adaptation.")
+    table = tuple(course.summary for course in courses)
+    return Analysis(table, (*notes, *lines), courses, gains)
 
 
 def courses_of(results: Results) -> list[Course]:
     """Return the cases of all conditions, fault by fault."""
     courses = []
     for condition in results.of_phase(KEPT):
-        numbers = results.numbers(condition)
-        onset = int(numbers["onset"][0])
-        onsets = tuple(int(v[0]) for name, v in numbers.items() if name.startswith("onset"))
         columns = results.columns.get(condition, {})
         enabled = str(columns.get(SWEPT, ""))
         fault = (label_but(columns, [SWEPT]) or "the failure") if enabled else condition
         for phase in (KEPT, "training"):
-            values = {}
-            for measured in ("success", "steps"):
-                values[measured] = results.values(condition, measured).astype(float)
-                if phase == KEPT:
-                    values[measured][:, onset:] = results.values(condition, measured, KEPT)
+            course = failure_course(results, condition, phase)
             adapts = ADAPTS.get((enabled, phase), phase)
-            seeds = results.seeds(condition)
-            courses.append(Course(fault, adapts, onset, onsets, seeds=seeds, **values))
+            spans = _spans(results.numbers(condition))
+            courses.append(Course(fault, adapts, spans, course, results.step_limits.training))
     order = {adapts: i for i, adapts in enumerate(ADAPTS.values())}
     faults = distinct(course.fault for course in courses)
     return sorted(courses, key=lambda c: (faults.index(c.fault), order.get(c.adapts, 0)))
 
 
-def _summary(course: Course) -> Summary:
-    recovered, episodes, steps = course.recovery()
-    estimates = {
-        "before": rate(course.before),
-        "just after": rate(course.success[:, course.onset : course.onset + BLOCK]),
-        "end": rate(course.end),
-    }
-    if course.before.any():  # else there is nothing to lose or to come back to
-        estimates |= {
-            "recovered": rate(recovered[:, None]),
-            "episodes": bootstrap(episodes, bounds=(0.0, course.short.shape[1])),
-            "steps": bootstrap(steps, bounds=NOT_NEGATIVE),
-            "cumulative loss": bootstrap(course.short.sum(axis=1), bounds=course.possible_loss),
-        }
-    return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
+def _numbers_of(spans: Iterable[FailureSpan]) -> dict[str, float]:
+    """Return when failures begin and end as numbers of a trial, see `_spans`.
+
+    >>> _numbers_of([(20, None), (5, 9)])
+    {'onset': 5.0, 'failure_end': 9.0, 'onset.2': 20.0}
+    """
+    numbers = {}
+    for k, (begin, end) in enumerate(sorted(spans, key=lambda span: span[0]), 1):
+        suffix = "" if k == 1 else f".{k}"
+        numbers[f"onset{suffix}"] = float(begin)
+        if end is not None:
+            numbers[f"failure_end{suffix}"] = float(end)
+    return numbers
+
+
+def _spans(numbers: Mapping[str, Array]) -> tuple[FailureSpan, ...]:
+    """Return when failures begin and end, of numbers that `_numbers_of` made."""
+    spans = []
+    for name, values in numbers.items():
+        if name.startswith("onset"):
+            end = numbers.get(name.replace("onset", "failure_end"))
+            spans.append((int(values[0]), None if end is None else int(end[0])))
+    return tuple(spans)
 
 
 def _gains(courses: Sequence[Course]) -> Iterator[Pair]:
     """Yield every case with that of the same fault in which nothing adapts."""
-    ends = {(c.fault, c.adapts): pd.Series(c.end.mean(axis=1), c.seeds) for c in courses}
+    ends = {
+        (c.fault, c.adapts): pd.Series(c.measured.end.mean(axis=1), c.measured.seeds)
+        for c in courses
+    }
     for (fault, adapts), end in ends.items():
         if adapts != "nothing" and (fault, "nothing") in ends:
             yield f"{fault}, {adapts}", AT_END, end, ends[fault, "nothing"]
@@ -223,8 +240,9 @@ def _gains(courses: Sequence[Course]) -> Iterator[Pair]:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: success from episode to episode, fault by fault.
 
-    A panel for every fault, a line for what adapts; running means over seeds and episodes, bands
-    their 95 % intervals. Wheels fail at grey lines.
+    There is a panel for every fault and a line for what adapts: running means over seeds and
+    episodes with bands for their 95% intervals. Gray lines are where failures begin; gray areas
+    end where transient failures end.
     """
     from ...presentation import figures as f  # matplotlib takes its time
 
@@ -237,11 +255,12 @@ def draw(analysis: Analysis) -> Figures:
     columns = panels.shape[1]
     for axes, fault in zip(panels.flat, faults, strict=False):
         for course in (c for c in courses if c.fault == fault):
-            for onset in course.onsets:
-                axes.axvline(onset - 0.5, color="#888888", linewidth=0.8)
-            curve = bootstrap(_smoothed(course.success, course.onset), bounds=(0, 1))
+            success = course.measured.success
+            cuts = {episode for span in course.spans for episode in span if episode is not None}
+            curve = bootstrap(_smoothed(success, sorted(cuts)), bounds=(0, 1))
             episodes = range(len(curve.value))  # counted from 0, as in rows and specs
             f.draw_curve(axes, episodes, curve, cases.index(course.adapts), alpha=0.1)
+        _mark_failures(axes, next(c for c in courses if c.fault == fault))
         axes.set_title("\n".join(wrap(fault, round(60 / columns))), loc="left")
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
@@ -250,16 +269,27 @@ def draw(analysis: Analysis) -> Figures:
     for axes in list(panels.flat)[max(0, len(faults) - columns) : len(faults)]:
         f.as_episodes(axes)
     handles = [f.handle(case, **f.look(i)) for i, case in enumerate(cases)]
-    seeds = f.count_seeds(len(course.success) for course in courses)
-    title = f"what adapts\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95 % bands"
-    f.add_legend(figure, handles, title, ncols=len(cases))
+    if any(course.end is not None for course in courses):
+        handles.append(f.handle("transient failure", color=FAILING, alpha=SHADE, linewidth=8))
+    seeds = f.count_seeds(len(course.measured.success) for course in courses)
+    title = f"what adapts\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95% bands"
+    f.add_legend(figure, handles, title, ncols=len(handles))
     return {"wheel-failure": figure}
 
 
-def _smoothed(success: np.ndarray, onset: int) -> np.ndarray:
-    """Return means over the episode and those before it, but not across the onset."""
-    means = [
-        success[:, max(0 if e < onset else onset, e - SMOOTHED + 1) : e + 1].mean(axis=1)
-        for e in range(success.shape[1])
-    ]
+def _mark_failures(axes: Axes, course: Course) -> None:
+    """Draw a line where a failure begins, and an area from there to its end if it ends."""
+    for begin, end in course.spans:
+        axes.axvline(begin - 0.5, color=FAILING, linewidth=0.8)
+        if end is not None:
+            axes.axvspan(begin - 0.5, end - 0.5, color=FAILING, alpha=SHADE, linewidth=0)
+
+
+def _smoothed(success: Array, cuts: Sequence[int]) -> Array:
+    """Return means over the episode and those before it, but not across the `cuts`."""
+    means = []
+    for episode in range(success.shape[1]):
+        earliest = max((cut for cut in cuts if cut <= episode), default=0)
+        first = max(earliest, episode - SMOOTHED + 1)
+        means.append(success[:, first : episode + 1].mean(axis=1))
     return np.stack(means, axis=1)

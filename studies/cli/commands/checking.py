@@ -183,4 +183,5 @@ def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCa
             check_prediction(condition.settings.learner, as_scenario(settings.build()))
         if settings not in checked:
             checked.add(settings)
-            yield ScenarioCase(condition.label, settings.build, sorted({0, *settings.onsets}))
+            episodes = sorted({0, *(begin for begin, _ in settings.failure_spans)})
+            yield ScenarioCase(condition.label, settings.build, episodes)

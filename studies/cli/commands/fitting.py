@@ -31,7 +31,7 @@ from ..loading import load_results
     type=click.IntRange(1),
     multiple=True,
     metavar="N...",
-    help="Sizes that were not run: the mean of as many seeds, with its 90 % interval.",
+    help="Sizes that were not run: the mean of as many seeds, with its 90% interval.",
 )
 @options.plot
 @options.where

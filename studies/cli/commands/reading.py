@@ -91,7 +91,7 @@ def table(
     form: Form,
     trust: bool,
 ) -> int:
-    """Print conditions against estimates with their 95 % intervals, as at the end of a run.
+    """Print conditions against estimates with their 95% intervals, as at the end of a run.
 
     DIR is where a study is kept; several are analysed together, as the first one says. FILE.json is
     a file of results that `export --format json` has written.

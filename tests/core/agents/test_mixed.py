@@ -153,7 +153,7 @@ def test_a_team_of_equal_parts_decides_as_one_of_one_kind(world) -> None:
         world.reset(1)
         joints.append([])
         world.step(np.zeros(4, dtype=int))
-        for _ in range(2):  # at .6 and .9 of the greatest speed no two actions come to the same
+        for _ in range(2):  # at 0.6 and 0.9 of the greatest speed no two actions come to the same
             states = world.step(np.zeros(4, dtype=int)).states
             joints[-1].append(team.act(look(world, states), explore=False).joint_action.tolist())
     assert joints[0] == joints[1]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from nested_agents_spread import SpreadSettings
 
 from nested_agents.core.agents.loop import policy_seed
 from nested_agents.core.agents.many_environments import ManyEnvironmentsLoop
@@ -16,7 +17,6 @@ from nested_agents.core.networks.settings import (
     IPPOSettings,
     MAPPOSettings,
 )
-from nested_agents.scenarios.spread import SpreadSettings
 
 SMALL = {"environments": 4, "rollout": 10, "batch_size": 30, "epochs": 2, "hidden": (8,)}
 AGENTS = ("agent1", "agent2", "agent3")
@@ -68,7 +68,7 @@ def test_advantages_by_hand():
     values = np.array([1.0, 1.0, 2.0])[:, None, None]
     last = np.array([False, True, False])[:, None]
     got = estimate(rewards, values, np.array([[8.0]]), last, settings).ravel()
-    # 4 + .5 8 - 2; an end: 2 - 1; 1 + .5 1 - 1 + .25 1
+    # 4 + 0.5 8 - 2; an end: 2 - 1; 1 + 0.5 1 - 1 + 0.25 1
     assert got.tolist() == [0.75, 1.0, 6.0]
 
 

@@ -174,7 +174,7 @@ def test_dqn_needs_one_agent() -> None:
 def test_what_needs_rule_bases_says_so() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     (trial,) = trials_of(spec_of("ppo", study="related"))
-    from nested_agents.studies.catalogue.related import measure
+    from nested_agents.research.studies.related import measure
 
     with pytest.raises(ValueError, match="needs FuzzyAgents, the team is of CentralPPO") as raised:
         measure(trial)

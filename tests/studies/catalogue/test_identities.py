@@ -25,7 +25,7 @@ def specs() -> Iterator[tuple[str, Spec]]:
 
     The meaning of these differs between versions of Python.
     """
-    for folder in ("studies", "results", "examples"):
+    for folder in ("studies", "research", "examples"):
         for path in sorted((ROOT / folder).rglob("*.toml")):
             try:
                 spec = Spec.load(path)

@@ -10,7 +10,8 @@ from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.learning_curve import analyse, curves_of, draw, metrics_of
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import Cell, write_rows
-from nested_agents.studies.results.notation import two_figures
+from nested_agents.studies.results.notation import format_number
+from nested_agents.studies.results.results import STEPS
 from nested_agents.studies.results.statistics import Estimate
 
 
@@ -92,9 +93,9 @@ def test_every_condition_is_in_the_legend(tmp_path):
 
 def test_the_interval_of_a_cell():
     assert Cell.of(Estimate(*map(np.asarray, (0.5, np.nan, np.nan)))).interval == ""
-    assert Cell.of(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))).interval == "[.25, 1.0]"
-    assert Cell.of(Estimate(*map(np.asarray, (-0.6, -0.72, -0.53)))).interval == "[-.72, -.53]"
-    assert two_figures(float("nan")) == "?"
+    assert Cell.of(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))).interval == "[0.25, 1.0]"
+    assert Cell.of(Estimate(*map(np.asarray, (-0.6, -0.72, -0.53)))).interval == "[-0.72, -0.53]"
+    assert format_number(float("nan")) == "?"
 
 
 @pytest.mark.parametrize("form", ["table", "csv", "json"])
@@ -124,6 +125,6 @@ def test_there_is_a_panel_for_every_number(further, tmp_path):
 
 
 def test_success_alone_makes_a_table():
-    assert [title for title, *_ in metrics_of((SUCCESS,), SUCCESS, 20)] == [
+    assert [title for title, *_ in metrics_of((SUCCESS,), SUCCESS, STEPS, 20)] == [
         "success first 5", "success last 5", "evaluation success", "evaluation steps",
     ]  # fmt: skip

@@ -39,7 +39,7 @@ def test_effects_are_means_over_settings() -> None:
     assert float(decisions.estimate.value) == pytest.approx(1.5)
     assert decisions.p == pytest.approx(2 * 2.0 ** (1 - SEEDS))  # two tests, all signs agree
     text = " ".join(" ".join(lines_of({"star": (success, decisions)}, "chain")).split())
-    assert "star (2 settings): success -.25 [-.25, -.25]" in text
+    assert "star (2 settings): success -0.25 [-0.25, -0.25]" in text
     assert "decisions x1.50 [1.50, 1.50], p = 0.0039: different" in text
     assert any(note.startswith("All settings together") for note in analysis.notes)
 

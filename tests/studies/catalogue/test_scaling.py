@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 from made_up_results import NOTHING, Arrays, scaling
 
-from nested_agents.results import SPECS
+from nested_agents.research import SPECS
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
 from nested_agents.studies.catalogue.study import draw_figures, load_study
@@ -160,7 +160,7 @@ def test_weights_of_networks_by_hand() -> None:
 
 def test_the_spec_reaches_from_2_to_64_robots() -> None:
     own = Path(module.__file__).parent / "scaling.toml"
-    paths = (SPECS / "scaling" / "costs.toml", own, SPECS / "scaling" / "crowds.toml")
+    paths = (SPECS / "costs.toml", own, SPECS / "crowds.toml")
     specs = list(map(Spec.load, paths))
     for reached, sizes in ((specs[:1], {2, 4, 8, 16}), (specs[1:], {2, 4, 8, 16, 32, 64})):
         conditions = [condition for spec in reached for condition in spec.conditions()]

@@ -4,14 +4,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from acting import fuzzy
-from made_up_results import NOTHING, wheel_failure
+from made_up_results import NOTHING, ablation, wheel_failure
+from matplotlib.patches import Rectangle
 
-from nested_agents.results import SPECS
+from nested_agents.research import SPECS
 from nested_agents.studies.catalogue import wheel_failure as module
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.catalogue.wheel_failure import (
     AT_END,
-    KEPT,
     Course,
     analyse,
     check,
@@ -20,6 +20,9 @@ from nested_agents.studies.catalogue.wheel_failure import (
 )
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.recovery import RECOVERY, FailureCourse, failure_course
+from nested_agents.studies.results.results import KEPT
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
@@ -38,14 +41,80 @@ SHORT = {
 def test_levels_recovery_and_area_by_hand() -> None:
     success = np.array([[1] * 6 + [0, 0, 1, 1, 1, 1, 1, 1], [1] * 6 + [0] * 8], dtype=float)
     steps = np.full(success.shape, 10.0)
-    course = Course("fault", "both", 6, (6,), success, steps, (0, 1))
-    recovered, episodes, spent = course.recovery()
-    assert recovered.tolist() == [1.0, 0.0]
-    assert episodes.tolist() == [2.0, 8.0]
-    assert spent.tolist() == [20.0, 80.0]
-    assert course.short.sum(axis=1).tolist() == [2.0, 8.0]
+    course = FailureCourse(6, success, steps, (0, 1))
+    assert {name: values.tolist() for name, values in course.measured.items()} == {
+        "recovered": [1.0, 0.0],
+        "cumulative_loss": [2.0, 8.0],
+        "recovery_time": [2.0, 8.0],
+        "recovery_decisions": [20.0, 80.0],
+    }
     assert (course.before.mean(), course.end.mean()) == (1.0, 0.5)
-    assert course.possible_loss == (0.0, 8.0)
+
+
+def test_loss_is_against_the_level_of_each_seed() -> None:
+    """A seed at 0.4 before and after loses nothing; the mean level of both would be 0.7."""
+    before = [[1, 1, 1, 1, 1], [0, 1, 0, 1, 0]]
+    after = [[0, 0, 0, 0, 0, 1, 1, 1, 1, 1], [0, 1, 0, 1, 0] * 2]
+    success = np.hstack([before, after]).astype(float)
+    course = FailureCourse(5, success, np.full(success.shape, 3.0), (4, 9))
+    assert course.measured["cumulative_loss"].tolist() == [5.0, pytest.approx(0.0)]
+    assert course.measured["recovered"].tolist() == [1.0, 1.0]
+    assert course.measured["recovery_time"].tolist() == [5.0, 0.0]
+    line = Course("fault", "both", ((5, None),), course, 3).summary
+    low, high = (float(end) for end in line.estimates["cumulative loss [episodes]"][1:])
+    spread = 12.706 * 2.5  # Student's t of one degree of freedom, standard error of 5 and 0
+    assert (low, high) == (-10.0, 10.0), f"2.5 +- {spread:.1f}, within what 10 episodes can lose"
+
+
+def test_recovery_is_compared_from_the_failure_on() -> None:
+    results = wheel_failure(ENDS).frames()
+    course = failure_course(results, "4 wheels, seized, enabled=false")
+    for name in RECOVERY:
+        compared = contrasts(results, name)
+        own = compared.groups[0].values["4 wheels, seized, enabled=false"]
+        assert own.tolist() == course.measured[name].tolist()
+    compared = contrasts(results, "recovery time [episodes]", by="enabled")
+    assert {d.condition for d in compared.differences} == {"true"}
+    kept = contrasts(results, "recovered", "weights kept")
+    assert kept.title == "recovered, weights kept"
+    assert kept.differences[0].estimate.value > 0.5, "the self-model adapts, nothing does not"
+    with pytest.raises(SpecError, match=r"'recoverd': did you mean 'recovered'"):
+        contrasts(results, "recoverd")
+    with pytest.raises(SpecError, match="phase = 'evaluation'"):
+        contrasts(results, "recovered", "evaluation")
+
+
+def test_recovery_is_no_measure_where_nothing_fails() -> None:
+    results = ablation({"a": 0.5, "b": 0.5}).frames()
+    with pytest.raises(SpecError, match="measure = 'recovered'"):
+        contrasts(results, "recovered")
+
+
+def test_the_end_of_a_transient_failure_is_marked(tmp_path: Path) -> None:
+    made = wheel_failure(ENDS, onset=20, episodes=40)
+    for condition in made.numbers:
+        made.numbers[condition]["failure_end"] = np.full_like(
+            made.numbers[condition]["onset"], 30.0
+        )
+    analysis = analyse(made.frames())
+    for line in analysis.table:
+        assert float(line.estimates["failure ends [episode]"].value) == 30.0
+        assert "after its end" in line.estimates
+    assert any("no adaptation" in note for note in analysis.notes)
+    figure = draw(analysis)["wheel-failure"]
+    (area,) = [p for p in figure.axes[0].patches if isinstance(p, Rectangle)]
+    assert (area.get_x(), area.get_x() + area.get_width()) == (19.5, 29.5)
+    lasting = draw(analyse(wheel_failure(ENDS).frames()))["wheel-failure"]
+    assert not lasting.axes[0].patches
+    assert not any(
+        "ends" in t for line in analyse(wheel_failure(ENDS).frames()).table for t in line.estimates
+    )
+
+
+def test_spans_of_failures_survive_as_numbers() -> None:
+    spans = [(9, 12), (5, None), (7, 8)]
+    numbers = {name: np.array([value]) for name, value in module._numbers_of(spans).items()}
+    assert module._spans(numbers) == ((5, None), (7, 8), (9, 12))
 
 
 def test_cases_are_told_apart_by_what_adapts() -> None:
@@ -171,13 +240,13 @@ def test_the_spec_can_be_run_and_crosses_faults_with_self_models() -> None:
     labels = [condition.label for condition in spec.conditions()]
     assert len(spec.seeds) >= 20
     assert "4 wheels, seized, enabled=true" in labels
-    others = Spec.load(SPECS / "wheel_failure" / "wheel_faults.toml")
+    others = Spec.load(SPECS / "wheel-faults.toml")
     check(others)
     assert "2 wheels, seized, enabled=false" in [c.label for c in others.conditions()]
 
 
 def test_large_teams_lose_more_and_more_wheels_of_different_robots() -> None:
-    spec = Spec.load(SPECS / "wheel_failure" / "failures_of_large_teams.toml")
+    spec = Spec.load(SPECS / "large-failures.toml")
     check(spec)
     lost = []
     for condition in spec.conditions():

@@ -83,7 +83,7 @@ def test_a_study_from_spec_to_figures(study):
     directory, (status, out, err) = study
     assert (status, err.splitlines()[-1].split(",")[0]) == (0, "6 of 6 trials")
     assert "default" in out
-    assert "95 % intervals" in out
+    assert "95% intervals" in out
     for name in ("learning-curves.png", "learning-curves.svg"):
         assert str(directory / "figures" / name) in out
         assert (directory / "figures" / name).stat().st_size > 1000

@@ -37,7 +37,7 @@ def test_a_table_of_any_width_breaks_no_word(width, monkeypatch, capsys):
     words = " ".join(lines)
     for title in TITLES:
         assert all(word in words.split() for word in title.split())
-    assert words.count(".50 [.25, .75]") == 7
+    assert words.count("0.50 [0.25, 0.75]") == 7
 
 
 def test_columns_without_room_follow_below(monkeypatch, capsys):
@@ -59,8 +59,8 @@ def test_lines_are_broken_on_a_terminal_only(monkeypatch, capsys):
     print_lines(lines)
     broken = ["training success: 24 orders do not", "  differ significantly"]
     assert capsys.readouterr().out.splitlines() == ["short", "", *broken]
-    print_lines(["time with n agents of default:\n  deciding n^1.15 [.90, 1.40]"])  # a note
-    assert capsys.readouterr().out.splitlines()[1] == "  deciding n^1.15 [.90, 1.40]"
+    print_lines(["time with n agents of default:\n  deciding n^1.15 [0.90, 1.40]"])  # a note
+    assert capsys.readouterr().out.splitlines()[1] == "  deciding n^1.15 [0.90, 1.40]"
 
 
 def test_what_learns_nothing_is_named(tmp_path, capsys):
@@ -82,7 +82,7 @@ def test_what_learns_nothing_is_named(tmp_path, capsys):
 ORDERS = "\x1b]0;owned\x07\x1b[31m[red]x\u202e\x9b31m"
 """A label that would name the window, colour the text and reverse it."""
 WRITTEN = r"\x1b]0;owned\x07\x1b[31m[red]x\u202e\x9b31m"
-PUBLISHED = Path(na.__file__).parents[1] / "results/rows/from-eight-128.json"
+PUBLISHED = Path(na.__file__).parents[1] / "research/results/from-eight-128.json"
 
 
 @pytest.fixture

@@ -258,7 +258,7 @@ def test_repeats_have_an_interval_in_every_form() -> None:
     repeated = [replace(row, measured=replace(row.measured, repeats=(0.001, 0.002, 0.003)))]
     table = format_rows(repeated, "table")
     assert "2.0 [0, 4.5]" in table  # Student's t of two degrees of freedom: 4.303 x 1 ms / sqrt(3)
-    assert "95 % interval of the mean of 3 repeats" in table
+    assert "95% interval of the mean of 3 repeats" in table
     assert "[" not in format_rows([row], "table")
     assert "2.0 [0, 4.5]" in format_rows(repeated, "latex")
     (record,) = json.loads(format_rows(repeated, "json"))

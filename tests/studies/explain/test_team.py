@@ -194,10 +194,10 @@ def test_folders_of_conditions_differ(tmp_path):
 
 
 def test_percents_stay_with_their_numbers():
-    sentence = "x" * 76 + " 3 %, y"
+    sentence = "x" * 76 + " 3%, y"
     assert [line.strip() for line in explain_text._wrapped(sentence).splitlines()] == [
         "x" * 76,
-        "3 %, y",
+        "3%, y",
     ]
 
 

@@ -24,9 +24,9 @@ def lines_of(rates: dict[str, int], seeds: int = 8) -> str:
 
 def test_a_team_has_learned_if_it_is_better_than_its_untrained_weights() -> None:
     text = lines_of(RATES)
-    assert text.startswith("default learned (8 seeds): evaluation success .90 [")
-    assert "untrained (frozen) 0 [0, .32];" in text
-    assert "planner 1.0 [.68, 1.0], better." in text
+    assert text.startswith("default learned (8 seeds): evaluation success 0.90 [")
+    assert "untrained (frozen) 0 [0, 0.33];" in text
+    assert "planner 1.00 [0.67, 1.00], better." in text
     assert "random" not in text, "it is the control by ties"
 
 

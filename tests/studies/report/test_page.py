@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents import studies
-from nested_agents.results import SPECS
+from nested_agents.research import SPECS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.page import extremes, page, rate_of, unfolded
@@ -49,8 +49,15 @@ def test_a_finished_study_has_everything(html):
 
 
 def test_lines_are_joined_to_what_they_continue():
-    lines = ["success, less than a:", "  worse: b, -.50 [-.70,", "    -.30]", "", "p: one", "  two"]
-    joined = [(0, "success, less than a:"), (2, "worse: b, -.50 [-.70, -.30]"), (0, "")]
+    lines = [
+        "success, less than a:",
+        "  worse: b, -0.50 [-0.70,",
+        "    -0.30]",
+        "",
+        "p: one",
+        "  two",
+    ]
+    joined = [(0, "success, less than a:"), (2, "worse: b, -0.50 [-0.70, -0.30]"), (0, "")]
     assert unfolded(lines) == [*joined, (0, "p: one two")]
 
 
@@ -59,7 +66,7 @@ def test_the_lowest_and_the_highest_success_are_a_sentence():
     lines = [Summary(c, 8, {"success": exactly(rate)}) for c, rate in rates.items()]
     table = tabulate(lines)
     assert rate_of(table) == "success"
-    assert extremes(table, "success") == ("Success: from .10 (a) to .90 (b).",)
+    assert extremes(table, "success") == ("Success: from 0.10 (a) to 0.90 (b).",)
     assert extremes(tabulate(lines[:1]), "success") == ()
 
 

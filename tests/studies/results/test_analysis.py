@@ -29,7 +29,7 @@ def test_a_difference_is_found_and_none_is_not() -> None:
     assert worse.p < 0.001
     assert worse.estimate.high < -0.4
     assert worse.seeds == 20
-    assert "p < .001" in worse.shown
+    assert "p < 0.001" in worse.shown
 
 
 def test_only_seeds_that_both_have_are_compared() -> None:
@@ -96,4 +96,4 @@ def test_an_interval_that_seems_to_contradict_p_is_explained_once(
     found = Difference("a", "evaluation success", 8, estimate, p, p, sample)
     text = " ".join(" ".join(verdicts({"all": [found, found]})).split())
     assert text.count("where they seem to disagree about 0, p decides.") == is_explained
-    assert "probability .80 in evaluation success." in text
+    assert "probability 0.80 in evaluation success." in text

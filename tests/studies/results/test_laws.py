@@ -111,8 +111,8 @@ def test_intervals_of_exponents_and_predictions_cover_what_they_promise() -> Non
         p = law.predict(64.0)
         new = 5.0 * 64.0**0.4 * np.exp(rng.normal(0.0, np.hypot(0.15, 0.3), size=9).mean())
         covered += [e.low <= 0.4 <= e.high, p.low <= new <= p.high]
-    assert 0.91 <= covered[0] / times <= 0.99, "95 %"
-    assert covered[1] / times >= 0.85, "90 %, of more laws than one that does not wander"
+    assert 0.91 <= covered[0] / times <= 0.99, "95%"
+    assert covered[1] / times >= 0.85, "90%, of more laws than one that does not wander"
 
 
 def test_rates_follow_a_logistic_curve() -> None:

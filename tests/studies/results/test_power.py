@@ -4,7 +4,7 @@ from scipy import special, stats
 
 from nested_agents.studies.results import laws
 from nested_agents.studies.results.analysis import Difference, adjust, verdict_lines
-from nested_agents.studies.results.notation import two_figures
+from nested_agents.studies.results.notation import format_number
 from nested_agents.studies.results.power import (
     detectable,
     deviation_of,
@@ -90,10 +90,10 @@ def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
     found = compared([1.0] * 5, [0.0] * 5, "other", "third")
     assert [round(d.raw, 4) for d in found] == [0.0625, 0.0625]
     text = " ".join(" ".join(verdict_lines(found)).split())
-    assert "+1.00 [+.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
+    assert "+1.00 [+0.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
     said = " ".join(line.strip() for line in power_lines([d.sample for d in found]))
-    assert "5 seeds and 2 comparisons cannot give an adjusted p below .05" in said
-    assert "It needs at least 7 seeds; for a difference of .20, about" in said
+    assert "5 seeds and 2 comparisons cannot give an adjusted p below 0.05" in said
+    assert "It needs at least 7 seeds; for a difference of 0.20, about" in said
 
 
 def test_without_deviation_nothing_is_promised() -> None:
@@ -156,7 +156,9 @@ def test_exponents_are_told_apart_by_more_seeds_or_larger_sizes() -> None:
     said = " ".join(" ".join(exponent_text([2.0, 4.0, 8.0, 16.0], 20)).split())
     # Logarithms of sizes lie log 2 apart: their squares about the mean sum up to 5 (log 2) ** 2.
     deviation = 0.5 / (5.0**0.5 * np.log(2.0))
-    assert f"differ by {two_figures(detectable(deviation, 20))} are significantly different" in said
+    assert (
+        f"differ by {format_number(detectable(deviation, 20))} are significantly different" in said
+    )
     assert f"takes about {seeds_for(0.2, deviation)} seeds, or sizes to 32." in said
     few = " ".join(" ".join(exponent_text([2.0, 3.0, 4.0], 5, comparisons=3)).split())
     assert few.startswith(

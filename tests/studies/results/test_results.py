@@ -17,7 +17,7 @@ import nested_agents as na
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results.choices import choose_trials
 from nested_agents.studies.results.results import NUMBERS, combine, read
-from nested_agents.studies.spec.studies import STUDIES
+from nested_agents.studies.spec.studies import NAMES
 from nested_agents.studies.workers.runner import save
 
 
@@ -146,7 +146,7 @@ def test_studies_together_are_told_apart_by_what_differs() -> None:
     assert whole.conditions == (f"{label} (one)", f"{label} (other)")
 
 
-@pytest.mark.parametrize("study", list(STUDIES.built_in))
+@pytest.mark.parametrize("study", NAMES)
 def test_every_number_of_a_study_is_told(study: str) -> None:
     module = import_module(f"nested_agents.studies.catalogue.{study.replace('-', '_')}")
     assert set(getattr(module, "NUMBERS", ())) <= set(NUMBERS)

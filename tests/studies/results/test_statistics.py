@@ -82,7 +82,7 @@ def test_rates_are_covered_however_few_the_runs(runs, success):
 
 
 def test_few_runs_have_students_interval_by_hand():
-    # t(.975, 2) = 4.3027; the standard error of the mean of 1, 2, 3 is 1 / sqrt(3).
+    # t(0.975, 2) = 4.3027; the standard error of the mean of 1, 2, 3 is 1 / sqrt(3).
     estimate = bootstrap([1.0, 2.0, 3.0])
     assert estimate.low == pytest.approx(2.0 - 4.302653 / np.sqrt(3.0), abs=1e-6)
     bounded = bootstrap([0.9, 1.0, 1.0], bounds=(0.0, 1.0))

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[3]
 EXAMPLES = sorted((ROOT / "examples").rglob("*.toml"))
 SPECS = [
     path
-    for folder in ("results/specs", "studies/catalogue")
+    for folder in ("research/specs", "studies/catalogue")
     for path in sorted((ROOT / folder).rglob("*.toml"))
 ]
 

@@ -71,7 +71,7 @@ def test_the_second_trial_need_not_import_what_the_first_did() -> None:
         apart(measure, trial[0])
     begin = time.perf_counter()
     seconds = apart(measure, trial[0]).seconds
-    assert time.perf_counter() - begin - seconds < 2.0  # of a busy machine; usually .03
+    assert time.perf_counter() - begin - seconds < 2.0  # of a busy machine; usually 0.03
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import pytest
 from acting import fuzzy, look
 from pydantic import ValidationError
 
-from benchmarks.scripted.controller import ScriptedController
 from nested_agents.core.adaptation.calibration import CalibrationSettings
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
@@ -25,6 +24,7 @@ from nested_agents.scenarios.box_pushing.prediction.push import (
 )
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build
+from research.scripted.controller import ScriptedController
 
 SOFT = {"stiffness": 0.5, "load": 2.0, "contact_friction": 0.5}
 STIFF = {"stiffness": 2.0, "load": 0.5, "contact_friction": 2.0}

@@ -62,7 +62,7 @@ def test_relational_variables_by_hand() -> None:
 
 
 def test_variables_of_crowds_by_hand() -> None:
-    # A square of 20 cm, turned by .3; robot 1 touches its back, low on it, robot 2 is far away.
+    # A square of 20 cm, turned by 0.3; robot 1 touches its back, low on it, robot 2 is far away.
     turn = np.array([np.cos(0.3), np.sin(0.3)])
     left = np.array([-turn[1], turn[0]])
     low = -0.1 * turn - 0.08 * left

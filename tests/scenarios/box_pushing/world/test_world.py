@@ -54,7 +54,7 @@ def test_pushing_speed_is_that_of_servo_against_friction(
     offsets = (0.0,) if n == 1 else (0.05, -0.05)
     world.place(np.array([[-0.1375, y, 0.0] for y in offsets]), np.zeros(3))
     world.advance(np.full(2 * n, FULL), 40)
-    # Box2D's friction joints let 4 % of the friction point sideways, see World.
+    # Box2D's friction joints let 4% of the friction point sideways, see World.
     slip = compliance(E_PUCK)[0, 0] * 0.956 * BOXES["square"].friction_force / n
     np.testing.assert_allclose(world.twists[1:, 0], FULL - slip, rtol=3e-3)
     assert world.twists[0, 0] == pytest.approx(FULL - slip, rel=3e-3)

@@ -1,0 +1,51 @@
+"""Origin of classes and functions that a text names: the file or package that defines them."""
+
+import sys
+from collections.abc import Callable
+from inspect import isfunction
+from typing import Any
+
+from .trust import module_named
+
+
+def checked_origin(
+    reference: str, thing: object, kind: str, *bases: type
+) -> Callable[..., Any] | type:
+    """Return the function or class that a reference finds, if it may be called.
+
+    A trusted file may import ``subprocess``, which must not make ``mine.py:subprocess.run`` a
+    topology.
+
+    Parameters
+    ----------
+    reference
+        ``"file.py:Name"``, ``"package.module:Name"``, or the name of an entry point, which may
+        refer to any function or class.
+    thing
+        What it refers to.
+    kind
+        Word for what it should be, for the message.
+    bases
+        Classes whose subclasses are allowed wherever they are defined.
+
+    Raises
+    ------
+    ValueError
+        If it is no function or class, or is defined elsewhere and no subclass of the bases.
+    """
+    if not (isinstance(thing, type) or isfunction(thing)):
+        raise ValueError(f"is no {kind}, but a {type(thing).__name__}")
+    if ":" not in reference or (isinstance(thing, type) and issubclass(thing, bases)):
+        return thing
+    module = module_named(reference)
+    if module:
+        is_own = thing.__module__.partition(".")[0] == module.partition(".")[0]
+    else:
+        source = getattr(sys.modules.get(thing.__module__), "__source_name__", None)
+        is_own = source == reference.rpartition(":")[0]
+    if not is_own:
+        raise ValueError(
+            f"is no {kind}, but something that {thing.__module__} defines; allowed is what the "
+            "named file or package defines itself"
+        )
+    return thing

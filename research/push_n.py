@@ -1,0 +1,223 @@
+"""The benchmark push-n: teams of 2 to 64 robots push a box to its goal, in worlds that are fixed.
+
+World k of a seed is that of evaluation episode k in every study, so that published rows of studies
+are entries, too. What an entry may choose of its world is how it is perceived, predicted and paid,
+see `FREE`. Entries of others are files of JSON in the form of `Entry`.
+
+Examples
+--------
+>>> from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
+>>> env = BoxPushingEnv({"robots": 2}, steps=STEPS)
+>>> evaluate(lambda observation: [2, 2, 2, 2], env, seed=0)[0]
+'0000000000'
+"""
+
+import json
+import tomllib
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, Self, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import ConfigDict, Field, model_validator
+
+from ..core.agents.loop import world_seed
+from ..core.numerics import FloatArray
+from ..core.plugins.settings import Settings, tuples
+from ..scenarios.box_pushing.config import BoxPushingSettings
+from ..studies.api.running import run
+from ..studies.errors import SpecError
+from ..studies.results import published
+from ..studies.results.analysis import Summary
+from ..studies.results.results import Results
+from ..studies.results.statistics import NOT_NEGATIVE, bootstrap, rate
+from ..studies.spec.spec import Spec
+from ..studies.store import durable
+from ..studies.trials.session import EVALUATION_WORLDS
+from . import ROWS
+
+if TYPE_CHECKING:
+    from ..scenarios.box_pushing.environments import BoxPushingEnv
+
+Size = Literal[2, 4, 8, 16, 32, 64]
+SIZES: tuple[int, ...] = get_args(Size)
+"""Numbers of robots."""
+EPISODES = 10
+"""Episodes of evaluation."""
+STEPS = 450
+"""The most decisions of an episode."""
+LEAST_SEEDS = 5
+"""The fewest seeds."""
+FREE = ("state_space", "predictor", "belief", "prediction_horizon", "reward", "speed_increment")
+"""Keys of the scenario that an entry may choose."""
+
+Given = Literal["nothing", "predictor", "predictor and reward"]
+Outcomes = Annotated[str, Field(pattern=f"^[01]{{{EPISODES}}}$")]
+Steps = Annotated[int, Field(ge=1, le=STEPS)]
+
+EXPLAINED = ConfigDict(use_attribute_docstrings=True)
+"""For models whose schema is printed, with the text beside their fields."""
+
+
+class TeamScores(Settings):
+    """What teams of one size did, by seed; seeds count from 0."""
+
+    model_config = EXPLAINED
+
+    robots: Size
+    """How many there are."""
+    success: Annotated[tuple[Outcomes, ...], Field(min_length=LEAST_SEEDS)]
+    """The episodes of evaluation: 1 where the box was brought to its goal, else 0."""
+    steps: tuple[tuple[Steps, ...], ...]
+    """The decisions of these episodes."""
+    decisions: tuple[Annotated[int, Field(ge=0)], ...]
+    """The joint decisions experienced in training, in all its stages."""
+
+    @model_validator(mode="after")
+    def _of_equal_seeds(self) -> Self:
+        seeds = len(self.success), len(self.steps), len(self.decisions)
+        if len(set(seeds)) > 1 or {len(row) for row in self.steps} != {EPISODES}:
+            raise ValueError(
+                f"success, steps, decisions: of {seeds} seeds, must be equally many, and steps of "
+                f"{EPISODES} episodes"
+            )
+        return self
+
+
+class Entry(Settings):
+    """What one learner did."""
+
+    model_config = EXPLAINED
+
+    benchmark: Literal["push-n"] = "push-n"
+    version: Literal[1] = 1
+    name: Annotated[str, Field(min_length=1)]
+    """What tables call it."""
+    about: Annotated[str, Field(min_length=1)]
+    """How it learns, in a line."""
+    given: Given
+    """What it is given of the world, beside what its agents perceive."""
+    teams: Annotated[tuple[TeamScores, ...], Field(min_length=1)]
+    """Its results, by number of robots."""
+
+
+def load_entry(path: Path) -> Entry:
+    """Return the entry of a file.
+
+    Raises
+    ------
+    SpecError
+        If it cannot be read or breaks a rule; one line.
+    """
+    try:
+        return Entry(**tuples(json.loads(durable.read_text(path))))
+    except TypeError:  # it is a list
+        raise SpecError(f"{path}: must be one table with the keys of an entry") from None
+    except (ValueError, RecursionError) as error:  # of JSON, or of a rule
+        raise SpecError(f"{path}: {error}") from None
+
+
+def committed_entries() -> list[Entry]:
+    """Return the entries whose rows are committed, see ``push_n.toml``."""
+    table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    for entry in table["entries"]:
+        entry["teams"] = tuple(
+            team_of(published.load(ROWS / row.pop("file")).results, **row) for row in entry["teams"]
+        )
+    return [Entry(**entry) for entry in table["entries"]]
+
+
+def team_of(results: Results, robots: int, condition: str, phase: str = "evaluation") -> TeamScores:
+    """Return the trials of a condition as the part of an entry, by an evaluation of them."""
+    outcomes = results.success(condition, phase).astype(int)
+    stages = [p for p in results.phases if p.startswith("training") and results.has(condition, p)]
+    training = np.hstack([results.values(condition, "steps", stage) for stage in stages])
+    return TeamScores(
+        robots=robots,
+        success=tuple("".join(map(str, row)) for row in outcomes),
+        steps=tuples(results.values(condition, "steps", phase).tolist()),
+        decisions=tuple(training.sum(axis=1).tolist()),
+    )
+
+
+def run_spec(
+    path: Path, out: Path, robots: Sequence[int], seeds: int, jobs: int | None
+) -> tuple[TeamScores, ...]:
+    """Return what the one condition of a spec does, trained anew with each number of robots.
+
+    Raises
+    ------
+    SpecError
+        If it has more conditions, or the world is not that of the benchmark; one line.
+    """
+    rules = {"seeds": seeds, "steps": STEPS, "evaluation": EPISODES}
+    changes = [f"{key}={value}" for key, value in rules.items()]
+    spec = Spec.load(path, [*changes, f"sweep.scenario.robots={list(robots)}"], study=out)
+    conditions = spec.conditions()
+    if len(conditions) != len(robots) or spec.evaluation_steps is not None:
+        raise SpecError(f"{path}: must have one condition, and no evaluation_steps")
+    for condition, number in zip(conditions, robots, strict=True):
+        fixed = BoxPushingSettings(robots=number).model_dump(exclude={*FREE})
+        for key, value in condition.settings.scenario.model_dump(exclude={*FREE}).items():
+            if value != fixed.get(key):
+                allowed = f"push-n has {fixed.get(key)!r}, an entry may choose {', '.join(FREE)}"
+                raise SpecError(f"scenario.{key} = {value!r}: {allowed}")
+    results = run(spec, out, jobs=jobs).results
+    return tuple(
+        team_of(results, number, condition.label)
+        for condition, number in zip(conditions, robots, strict=True)
+    )
+
+
+def evaluate(
+    policy: Callable[[FloatArray], ArrayLike], env: "BoxPushingEnv", seed: int
+) -> tuple[str, tuple[int, ...]]:
+    """Return success and steps of a seed, as `TeamScores` has them.
+
+    Parameters
+    ----------
+    policy
+        Returns an action for an observation.
+    env
+        A `BoxPushingEnv`, whose scenario differs from that of the benchmark in `FREE` alone.
+    seed
+        Whose worlds they are.
+    """
+    success = ""
+    steps: list[int] = []
+    for k in range(EPISODES):
+        world = world_seed(seed, EVALUATION_WORLDS + k)
+        observation, _ = env.reset(options={"world": world})
+        reached = False
+        truncated = False
+        count = 0
+        while not (reached or truncated):
+            observation, _, reached, truncated, _ = env.step(policy(observation))
+            count += 1
+        steps.append(count)
+        success += str(int(reached))
+    return success, tuple(steps)
+
+
+def table_of(entries: Iterable[Entry], measure: str) -> list[Summary]:
+    """Return a line for each entry, a column for each number of robots; 95% intervals.
+
+    Parameters
+    ----------
+    entries
+        The entries.
+    measure
+        ``success`` in evaluation, or the ``decisions`` of training.
+    """
+    lines = []
+    for entry in entries:
+        cells = {}
+        for team in entry.teams:
+            if measure == "success":
+                value = rate([list(map(int, row)) for row in team.success])
+            else:
+                value = bootstrap(team.decisions, bounds=NOT_NEGATIVE)
+            cells[f"{team.robots} robots"] = value
+        lines.append(Summary(entry.name, min(len(team.success) for team in entry.teams), cells))
+    return lines

@@ -1,0 +1,141 @@
+"""Recovery from failures, seed by seed: what is lost, and after how long it is back.
+
+The level of a seed is its mean over the last `BLOCK` episodes before the first failure. All
+measures count from that failure on.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.numerics import pd
+from .results import STEPS, Results
+from .statistics import Array
+
+BLOCK = 5
+"""Episodes over which a level is measured."""
+REGAINED = 0.9
+"""Share of the level, or of what a fault has cost, that counts as recovered."""
+RECOVERED = Measure("recovered", "recovered", better="higher", is_rate=True)
+LOSS = Measure("cumulative_loss", "cumulative loss", "episodes", better="lower")
+TIME = Measure("recovery_time", "recovery time", "episodes", better="lower", least=0.0)
+DECISIONS = Measure("recovery_decisions", "decisions to recovery", better="lower", least=0.0)
+RECOVERY = {measure.name: measure for measure in (RECOVERED, LOSS, TIME, DECISIONS)}
+"""Measures of a trial with a failure, by name."""
+
+
+def recovery(shortfall: ArrayLike, allowed: ArrayLike) -> tuple[Array, Array]:
+    """Return per seed whether it recovered from a fault, and after how many episodes.
+
+    A seed recovers at the first episode from which on `BLOCK` episodes fall short by no more than
+    is allowed, in the mean. A seed that never recovers counts with all its episodes, which is a
+    lower bound.
+
+    Parameters
+    ----------
+    shortfall
+        Loss of each episode from the fault on ``(n_seeds, n_episodes)``.
+    allowed
+        Loss at which a seed counts as recovered: a number, or ``(n_seeds, 1)``.
+    """
+    blocks = np.lib.stride_tricks.sliding_window_view(np.asarray(shortfall), BLOCK, axis=1)
+    regained = blocks.mean(axis=2) <= np.asarray(allowed) + 1e-12
+    recovered = regained.any(axis=1)
+    episodes = np.where(recovered, regained.argmax(axis=1), np.shape(shortfall)[1])
+    return recovered.astype(float), episodes.astype(float)
+
+
+class FailureCourse(NamedTuple):
+    """Training of one condition through a failure."""
+
+    onset: int
+    """Episode in which the first failure begins."""
+    success: Array
+    """``(n_seeds, n_episodes)`` from the first episode of training on."""
+    steps: Array
+    """``(n_seeds, n_episodes)``"""
+    seeds: tuple[int, ...]
+    """Seeds of the rows."""
+
+    @property
+    def before(self) -> Array:
+        """Success ``(n_seeds, BLOCK)`` in the last episodes before the failure."""
+        return self.success[:, self.onset - BLOCK : self.onset]
+
+    @property
+    def end(self) -> Array:
+        """Success ``(n_seeds, BLOCK)`` in the last episodes."""
+        return self.success[:, -BLOCK:]
+
+    def from_episode(self, episode: int) -> Array:
+        """Return the success ``(n_seeds, BLOCK)`` in the episodes from a given one on."""
+        return self.success[:, episode : episode + BLOCK]
+
+    @property
+    def measured(self) -> dict[str, Array]:
+        """Values ``(n_seeds,)`` of the measures `RECOVERY`, by name."""
+        level = self.before.mean(axis=1, keepdims=True)
+        shortfall = level - self.success[:, self.onset :]
+        recovered, episodes = recovery(shortfall, (1.0 - REGAINED) * level)
+        decisions = [
+            run[self.onset : self.onset + int(count)].sum()
+            for run, count in zip(self.steps, episodes, strict=True)
+        ]
+        values = (recovered, shortfall.sum(axis=1), episodes, np.array(decisions, dtype=float))
+        return dict(zip(RECOVERY, values, strict=True))
+
+
+def failure_course(results: Results, condition: str, phase: str = "training") -> FailureCourse:
+    """Return the course of a condition; in the phase `KEPT` that of the copied team."""
+    onset = int(results.numbers(condition)["onset"][0])
+    success, steps = (
+        results.values(condition, name).astype(float) for name in (SUCCESS.name, STEPS.name)
+    )
+    if phase != "training":
+        success[:, onset:] = results.values(condition, SUCCESS.name, phase)
+        steps[:, onset:] = results.values(condition, STEPS.name, phase)
+    return FailureCourse(onset, success, steps, results.seeds(condition))
+
+
+def bounded(name: str, courses: Iterable[FailureCourse], longest: int | None) -> Measure:
+    """Return the measure of `RECOVERY` of a name with the range that it has for some courses.
+
+    `longest` is the longest episode that is allowed [decisions].
+    """
+    episodes = max((own.success.shape[1] - own.onset for own in courses), default=0)
+    if name == LOSS.name:
+        return replace(LOSS, least=-episodes, greatest=episodes)
+    if name == TIME.name:
+        return replace(TIME, greatest=episodes)
+    if name == DECISIONS.name and longest is not None:
+        return replace(DECISIONS, greatest=episodes * longest)
+    return RECOVERY[name]
+
+
+def recovery_by_seed(
+    results: Results, name: str, phase: str
+) -> tuple[Measure, Mapping[str, pd.Series]]:
+    """Return a measure of `RECOVERY` and its values by condition, of those in which failures began.
+
+    Parameters
+    ----------
+    results
+        Results of a study.
+    name
+        Name of the measure.
+    phase
+        ``training``, or `KEPT`.
+    """
+    courses = {
+        condition: failure_course(results, condition, phase)
+        for condition in results.of_phase(phase)
+        if "onset" in results.numbers(condition)
+    }
+    measure = bounded(name, courses.values(), results.step_limits.training)
+    if phase != "training":
+        measure = replace(measure, title=f"{measure.title}, {phase}")
+    return measure, {c: pd.Series(own.measured[name], own.seeds) for c, own in courses.items()}

@@ -1,0 +1,59 @@
+"""docs/reproduce.md names every published table, and the spec that it came from."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from nested_agents.research import ROWS
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.results import published
+from nested_agents.studies.spec.spec import Spec
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "docs" / "reproduce.md").read_text(encoding="utf-8")
+LINES = re.findall(
+    r"^\| `([\w-]+)` \| `([\w/-]+\.toml)` \| ([\d,]+) \| ([\d,]*) ?\|", TEXT, re.MULTILINE
+)
+
+
+def test_every_published_table_has_its_row() -> None:
+    committed = sorted(path.stem for path in ROWS.glob("*.json"))
+    assert sorted(name for name, *_ in LINES) == committed
+
+
+@pytest.fixture(scope="module", params=LINES, ids=lambda row: row[0])
+def row(request: pytest.FixtureRequest) -> tuple[Path, published.Published, str, str, str]:
+    """A published file, what it holds, and what the page says of it."""
+    name, *said = request.param
+    path = ROWS / f"{name}.json"
+    return path, published.load(path), *said
+
+
+def test_the_spec_gives_the_table(row: tuple[Path, published.Published, str, str, str]) -> None:
+    _, rows, spec, trials, minutes = row
+    source = Spec.load(ROOT / spec)
+    assert source.study == rows.outline.study
+    table = source.table()
+    same = ("episodes", "steps", "evaluation")
+    assert all(rows.outline.table.get(k) == table.get(k) for k in same)
+    assert set(rows.results.conditions) <= {c.label for c in source.conditions()}
+    seeds = [rows.results.seeds(c) for c in rows.results.conditions]
+    assert all(set(some) <= set(source.seeds) for some in seeds)
+    assert int(trials.replace(",", "")) == sum(map(len, seeds))
+    total = rows.results.trials.get("seconds.total")
+    if total is not None and total.notna().any():
+        assert float(minutes.replace(",", "")) == pytest.approx(total.sum() / 60, abs=0.51)
+
+
+def test_every_committed_file_is_of_this_version_and_has_a_table(
+    row: tuple[Path, published.Published, str, str, str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path, rows, *_ = row
+    monkeypatch.setattr(published, "load", {path: rows}.__getitem__)  # it is read once
+    assert main(["table", str(path), "--format", "markdown"]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("\n") > 2
+    assert err == ""
