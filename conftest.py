@@ -10,7 +10,6 @@ from pathlib import Path
 ROOT = Path(__file__).parent
 FOLDERS = ("core", "topologies", "scenarios", "studies")
 NEEDED = {
-    "torch": "core/networks/*.py",
     "mujoco": "plugins/swimmers/nested_agents_swimmers/*.py",
 }
 """Modules that need an extra."""

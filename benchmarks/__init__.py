@@ -1,6 +1,7 @@
-"""Benchmarks: what a control step costs, as ratios of paired rounds in one process.
+"""Benchmarks of the speed and the reliability of the toolkit.
 
-``python -m benchmarks`` (or ``./dev bench``) prints tables, ``--json FILE`` writes them.
+``python -m benchmarks`` (or ``./dev bench``) prints speeds, ``python -m benchmarks.adversary`` and
+``python -m benchmarks.crashes`` damage studies.
 """
 
 import os

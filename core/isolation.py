@@ -1,4 +1,6 @@
-"""Isolation from the current folder: nothing in it is imported, or read as settings of a library.
+"""Isolation of processes from where they start: from the current folder and from closed streams.
+
+Nothing in the current folder is imported, or read as settings of a library.
 
 A study may lie in a folder that somebody else has filled, beside a ``joblib.py`` or a
 ``matplotlibrc``. Python puts the current folder on `sys.path` for ``-c`` and ``-m``, which is how
@@ -94,3 +96,17 @@ def drop_empty_entries() -> None:
     with contextlib.suppress(OSError, ValueError):  # the folder is gone, or not on the path
         if os.getcwd() not in map(os.path.abspath, entries):
             sys.path.remove(os.getcwd())
+
+
+def open_standard_streams() -> None:
+    """Connect standard streams that are closed, as by ``>&-``, to the null device.
+
+    Otherwise the next file that is opened, such as a database, gets the number of the closed stream
+    and receives what libraries print.
+    """
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(descriptor, True)
+    os.close(descriptor)
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115 - to the end

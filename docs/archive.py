@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-import nested_agents as na
-from nested_agents.research import ROWS
+from research import RESULTS, load
 
 ABOUT = """---
 orphan: true
@@ -19,7 +18,7 @@ Each file of `research/results` as `nested-agents table` prints it, without time
 
 def write(page: Path) -> None:
     """Write the page, unless it is newer than all rows."""
-    files = sorted(ROWS.glob("*.json"))
+    files = sorted(RESULTS.glob("*.json"))
     changed = max(path.stat().st_mtime for path in [*files, Path(__file__)])
     if not page.exists() or page.stat().st_mtime < changed:
         page.write_text("\n".join([ABOUT, *sections(files)]), encoding="utf-8")
@@ -28,6 +27,6 @@ def write(page: Path) -> None:
 def sections(files: list[Path]) -> Iterator[str]:
     """Yield a heading and a table for each file of rows."""
     for path in files:
-        study = na.load(path)
+        study = load(path.stem)
         titles = [t for t in study.table().titles if not t.endswith(("[s]", "[ms]"))]
         yield f"## {path.stem}\n\n{study.table(titles).markdown}"

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import BuiltinFunctionType, GenericAlias
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import archive  # noqa: E402
 import diagrams  # noqa: E402

@@ -15,11 +15,11 @@ from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 
 from nested_agents.core.agents.cost import Problem
 from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.research import ROWS
 from nested_agents.studies.presentation import figures
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
 from nested_agents.studies.results import published
 from nested_agents.studies.results.statistics import Estimate, rate
+from research import RESULTS
 
 BLUE, ORANGE, GREEN = COLOURS[:3]
 GREY = "#777777"
@@ -240,7 +240,7 @@ def scale() -> Figure:
 def published_rate(table: str, condition: str) -> Estimate:
     """Return the success in evaluation of a published table, of `wide` that with 64 robots."""
     phase = "evaluation:sixty-four" if table == "wide" else "evaluation"
-    results = published.load(ROWS / f"{table}.json").results
+    results = published.load(RESULTS / f"{table}.json").results
     return rate(results.success(condition, phase))
 
 

@@ -56,7 +56,7 @@ MODULES = {
         "interface.spaces", "interface.scenario", "interface.prediction", "interface.measures",
         "interface.experience", "interface.agents", "interface.plain", "hierarchy.hierarchy",
         "hierarchy.turns", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
-        "functions.settings", "functions.plain", "functions.recorded", "agents.mixed",
+        "functions.settings", "functions.agents", "agents.mixed",
         "agents.team", "agents.fuzzy", "agents.peer",
         "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
         "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
@@ -89,9 +89,6 @@ MODULES = {
         "store.store", "results.results", "results.analysis", "results.statistics",
         "results.power", "results.contrasts", "results.aggregates", "results.published",
         "catalogue.study", "cost.cost", "cost.profile", "cost.table",
-    )),
-    "results": ("What has been published, and what is said of it.", (
-        "claims", "measures", "push_n",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""

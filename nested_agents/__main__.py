@@ -13,7 +13,7 @@ import signal
 from functools import partial
 from types import FrameType
 
-from .core.isolation import drop_empty_entries
+from .core.isolation import drop_empty_entries, open_standard_streams
 
 
 def main() -> int:
@@ -26,6 +26,7 @@ def main() -> int:
         signal.signal(signal.SIGINT, partial(_interrupt, pressed))
         # What is done cannot be interrupted; other handlers Python puts away before it has ended.
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+    open_standard_streams()
     drop_empty_entries()
     from .studies.cli.main import main as run
 

@@ -1,196 +1,94 @@
-"""The atlas: tasks, hierarchies, learners, faults, sizes; and what small teams tell of large ones.
+"""Predictions of large teams by small ones, over tasks, hierarchies, learners and faults.
 
-Each spec in ``specs/atlas`` is a task. Its conditions are called *hierarchy, learner* or
-*hierarchy, learner, fault*. Of every trial a row is kept, in a file of Parquet for each task; the
-file ``published`` has trials of studies that have been published already, see `PUBLISHED`. From
-these rows all numbers and figures are made again.
+``python -m research.atlas`` prints them from the committed results: laws are fitted to teams of at
+most 16 agents, and of at most 8, and predict the larger ones. ``--out DIR`` runs the tasks first,
+``--figures DIR`` draws the figures of docs/atlas.md.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+import argparse
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
-from ..core.numerics import pd
-from ..core.plugins.words import closest, command_line
-from ..studies.api.loading import load
-from ..studies.api.running import run
-from ..studies.errors import SpecError
-from ..studies.presentation.progress import Terminal
-from ..studies.results import laws
-from ..studies.results.foreign import read_table
-from ..studies.results.results import Results
-from ..studies.spec.controls import LEARN_NOTHING
-from ..studies.spec.tables import label_but
-from ..studies.store import durable
-from . import ROWS, SPECS
+from nested_agents import SpecError
+from nested_agents.figures import apply_style, write
+from nested_agents.terminal import print_lines, print_text, run_to_status
 
-COMMITTED = ROWS / "atlas"
-"""Where the rows are that have been published."""
-NO_FAULT = "none"
+from .atlas_choices import choices, shares_right
+from .atlas_faults import fault_costs, thresholds
+from .atlas_figures import FIGURES
+from .atlas_predictions import SMALL, checks, coverage
+from .atlas_rows import ALREADY, COMMITTED, SEEN, UNSEEN, pd, read_rows, run_tasks
 
-MEASURES = {
-    "success": "success",
-    "right": "share right",
-    "share_of_best": "share of the best",
-    "steps": "decisions of an episode",
-    "final_distance_m": "final distance",
-    "final_spread_m": "spread at the end",
-    "loss": "loss",
-    "messages": "messages",
-    "decision_median": "time of a decision",
-    "team_bytes": "memory",
-}
-"""What laws are fitted to, and what it is called. Loss is the return with the sign turned."""
-RATES = ("success", "right")
-"""Those that are a share of an episode's plays or of episodes."""
-COSTS = ("messages", "decision_median", "team_bytes")
-"""Those that are not of what a team achieves."""
-SIZES = ("scenario.robots", "scenario.joints", "scenario.players", "scenario.carts")
-"""Keys that are sizes of teams."""
-PUBLISHED = {
-    "arms": ("arms", "chain", "batch-td"),
-    "long-arms": ("arms", "chain", "batch-td"),
-    "fit-arms": ("arms", "", "fitted-q"),
-    "scaling": ("boxes", "chain", "batch-td"),
-    "controls": ("boxes", "chain", ""),
-    "costs": ("boxes", "chain", ""),
-    "fit-rings": ("rings", "", "fitted-q"),
-    "fit-landmarks": ("landmarks", "", "fitted-q"),
-}
-"""Published studies whose rows are taken over: task, hierarchy and learner, where the name of a
-condition is not one of them."""
-CONTROLS = (*LEARN_NOTHING, "random")
-ALREADY = "published"
-"""The task whose rows are those."""
-SEEN = (ALREADY, "signals")
-"""Tasks on whose rows the way of predicting was chosen."""
-UNSEEN = ("permutation", "small_boxes", "votes")
-"""Tasks that were opened after the rule of the best hierarchy was committed."""
-QUALITIES = {
-    "signals": "right",
-    "signals_learned": "right",
-    "games": "share_of_best",
-    "rings": "share_of_best",
-}
-"""By what hierarchies of a task are ranked; of other tasks by success."""
+TEAM_AND_SIZE = ["source", "task", "hierarchy", "learner", "fault", "size"]
 
 
-class TeamKind(NamedTuple):
-    """A team of any size."""
+def print_predictions(frame: pd.DataFrame) -> None:
+    """Print how often larger teams lie in the intervals predicted by smaller ones."""
+    print_text(f"{len(frame):,} trials of {frame.groupby(TEAM_AND_SIZE).ngroups} conditions")
+    seen = frame["source"].isin(SEEN)
+    groups = {
+        "Tasks looked at after the rule": (frame[~seen], SMALL),
+        "Signals, on which it was chosen": (frame[seen & (frame["source"] != ALREADY)], SMALL),
+        "Published studies, on which it was chosen": (frame[frame["source"] == ALREADY], SMALL),
+        "Published studies, of half the size": (frame[frame["source"] == ALREADY], SMALL // 2),
+    }
+    for title, (own, most) in groups.items():
+        if own.empty:
+            continue
+        print_text("", f"{title}: teams larger than {most} in 90% intervals")
+        print_lines(coverage(checks(own, most)))
 
-    task: str
-    hierarchy: str
-    learner: str
-    fault: str = NO_FAULT
+
+def print_hierarchies(of_tasks: pd.DataFrame) -> None:
+    """Print the best hierarchy of the largest teams, and the cost of faults."""
+    chosen = choices(of_tasks)
+    for title, is_unseen in {"not seen before": True, "seen": False}.items():
+        cases = [choice for choice in chosen if (choice.case[0] in UNSEEN) == is_unseen]
+        print_text("", f"Best hierarchy of the largest teams, tasks {title}")
+        print_lines([*shares_right(cases), *map(str, cases)])
+    print_text("", "Best hierarchy of the largest teams, all tasks")
+    print_lines(shares_right(chosen))
+    costs = fault_costs(of_tasks)
+    if costs:
+        print_text("", "What faults cost")
+        print_lines([*map(str, costs), *thresholds(costs)])
 
 
-def run_tasks(out: Path, jobs: int | None, tasks: Sequence[str] = ()) -> Path:
-    """Run what is left of tasks below `out`, by default of all; return the folder of rows.
-
-    Raises
-    ------
-    SpecError
-        If there is no such task, or trials failed.
-    """
-    folder = out / "rows"
+def draw_figures(frame: pd.DataFrame, folder: Path) -> None:
+    """Draw the figures into a folder."""
+    before = frame["source"] == ALREADY  # a task of both has two sets of seeds
+    frame["task"] = frame["task"].mask(before, frame["task"] + ", published")
     folder.mkdir(parents=True, exist_ok=True)
-    specs = {path.stem: path for path in sorted((SPECS / "atlas").glob("*.toml"))}
-    for task in tasks or (ALREADY, *specs):
-        if task == ALREADY:
-            rows = published_rows()
-        elif task in specs:
-            rows = _run(task, specs[task], out / task, jobs)
-        else:
-            raise SpecError(f"--task = {task!r}: {closest(task, (ALREADY, *specs))}")
-        durable.write(folder / f"{task}.parquet", rows.to_parquet(index=False))
-    return folder
+    for name, draw in FIGURES.items():
+        with apply_style():
+            write(draw(frame), folder / f"{name}.png")
 
 
-def _run(task: str, spec: Path, out: Path, jobs: int | None) -> pd.DataFrame:
-    study = run(spec, out, jobs=jobs, observer=Terminal())
-    if study.failed:
-        raise SpecError(f"{out}: {len(study.failed)} trials failed: {command_line('status', out)}")
-    names = {c: str(own["name"]).split(", ") for c, own in study.results.columns.items()}
-    teams = {c: TeamKind(task, *parts) for c, parts in names.items()}
-    return trial_rows(study.results, teams)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the atlas and return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m research.atlas", description=__doc__)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="run the tasks below it")
+    parser.add_argument(
+        "--task", nargs="+", default=[], metavar="NAME",
+        help="tasks to run; needs --out",
+    )  # fmt: skip
+    parser.add_argument("--rows", type=Path, metavar="DIR", help="other than the committed rows")
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw the figures into it")
+    parser.add_argument("--jobs", type=int, metavar="N", help="worker processes; needs --out")
+    options = parser.parse_args(arguments)
+    if options.out is None and (options.task or options.jobs is not None):
+        name = "--task" if options.task else "--jobs"
+        raise SpecError(f"{name}: needs --out, where to run the tasks")
+    folder = options.rows or COMMITTED
+    if options.out is not None:
+        folder = run_tasks(options.out, options.jobs, options.task)
+    frame = read_rows(folder)
+    print_predictions(frame)
+    print_hierarchies(frame[frame["source"] != ALREADY])
+    if options.figures is not None:
+        draw_figures(frame, options.figures)
+    return 0
 
 
-def published_rows() -> pd.DataFrame:
-    """Return the rows of `PUBLISHED`: a condition's name stands where that has none."""
-    frames = []
-    for name, (task, hierarchy, learner) in PUBLISHED.items():
-        results = load(ROWS / f"{name}.json").results
-        teams = {}
-        for condition, own in results.columns.items():
-            label = label_but(own, SIZES)
-            is_control = label in CONTROLS
-            teams[condition] = TeamKind(
-                task,
-                hierarchy or ("none" if is_control else label),
-                label if is_control else learner or label,
-            )
-        frames.append(trial_rows(results, teams))
-    return pd.concat(frames, ignore_index=True)
-
-
-def trial_rows(results: Results, teams: Mapping[str, TeamKind]) -> pd.DataFrame:
-    """Return a row for each trial with an evaluation: team, size, seed, and what was measured."""
-    names = ["steps", "return", *(m.name for m in results.measures if m.name in MEASURES)]
-    frames = []
-    for condition in results.of_phase("evaluation"):
-        size = next(
-            results.columns[condition][key] for key in SIZES if key in results.columns[condition]
-        )
-        own = {
-            name: results.means(condition, "evaluation", name).to_numpy()
-            for name in names
-            if results.has(condition, "evaluation", name)
-        }
-        numbers = results.numbers(condition)
-        own |= {name: numbers[name] for name in MEASURES if name in numbers}
-        episodes = results.values(condition, "success", "evaluation").shape[1]
-        where = {"size": size, "seed": results.seeds(condition), "episodes": episodes}
-        frames.append(pd.DataFrame({**teams[condition]._asdict(), **where, **own}))
-    return pd.concat(frames, ignore_index=True)
-
-
-def read_rows(folder: Path = COMMITTED) -> pd.DataFrame:
-    """Return the rows of all tasks in a folder, with the file as their source.
-
-    Raises
-    ------
-    SpecError
-        If there are none, or pyarrow is not installed.
-    """
-    files = sorted(folder.glob("*.parquet"))
-    if not files:
-        raise SpecError(f"{folder}: holds no rows of the atlas, TASK.parquet")
-    frames = [read_table(path).assign(source=path.stem) for path in files]
-    rows = pd.concat(frames, ignore_index=True)
-    return rows.assign(loss=-rows["return"]) if "return" in rows else rows
-
-
-def sample_of(rows: pd.DataFrame, measure: str) -> laws.Sample | None:
-    """Return what one team's rows have of a measure; None if no law can be of it.
-
-    Those are values that are not positive.
-    """
-    if measure not in rows:
-        return None
-    values = rows.pivot(index="seed", columns="size", values=measure).dropna(axis=1, how="all")
-    values = values.dropna()
-    array = values.to_numpy(dtype=float)
-    if not array.size:
-        return None
-    sizes = values.columns.to_numpy(dtype=float)
-    if measure in RATES:
-        episodes = int(rows["episodes"].iloc[0])
-        return laws.of_rates(sizes, array * episodes, episodes)
-    return laws.of_numbers(sizes, array) if (array > 0.0).all() else None
-
-
-def quality(task: str) -> str:
-    """Return by which measure, the more the better, hierarchies of a task are ranked."""
-    return QUALITIES.get(task, "success")
+if __name__ == "__main__":
+    raise SystemExit(run_to_status("research.atlas", main))

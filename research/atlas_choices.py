@@ -13,13 +13,13 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from ..core.numerics import pd
-from ..studies.results import laws
-from ..studies.results.notation import format_estimate, format_p
-from ..studies.results.statistics import LEVEL, paired_tests, rate
-from .atlas import MEASURES, NO_FAULT, quality, sample_of
+from nested_agents import rate
+from nested_agents.analysis import LEVEL, format_estimate, format_p, laws, paired_tests
+
 from .atlas_predictions import largest_small
+from .atlas_rows import MEASURES, NO_FAULT, quality, sample_of
 
 CASE = ["task", "learner", "fault"]
 """Columns of which every combination is a case."""

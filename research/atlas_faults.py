@@ -6,11 +6,13 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
+from scipy import stats
 
-from ..core.numerics import pd, stats
-from ..studies.results.notation import format_estimate, format_number, format_p
-from ..studies.results.statistics import LEVEL, Estimate, bootstrap, holm
-from .atlas import MEASURES, NO_FAULT, TeamKind, quality
+from nested_agents import bootstrap
+from nested_agents.analysis import LEVEL, Estimate, format_estimate, format_number, format_p, holm
+
+from .atlas_rows import MEASURES, NO_FAULT, TeamKind, quality
 
 DOSES = {"lost": "messages lost", "left": "members gone"}
 """With what the name of a fault begins that is a share of something."""

@@ -6,13 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
-from ..core.numerics import pd
-from ..studies.presentation import figures
-from ..studies.results.statistics import Estimate, bootstrap, stack_estimates
-from .atlas import ALREADY, MEASURES, NO_FAULT, TeamKind, quality
+from nested_agents import bootstrap, figures
+from nested_agents.analysis import Estimate, stack_estimates
+
 from .atlas_predictions import SMALL, Check, checks, exponents
+from .atlas_rows import ALREADY, MEASURES, NO_FAULT, TeamKind, quality
 
 PANEL = (5.0, 2.4)
 """Width and height of a panel [inch]."""

@@ -7,12 +7,12 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from ..core.numerics import pd
-from ..studies.results import laws
-from ..studies.results.notation import format_estimate, format_number
-from ..studies.results.statistics import Estimate, bootstrap
-from .atlas import COSTS, MEASURES, TeamKind, sample_of
+from nested_agents import bootstrap
+from nested_agents.analysis import Estimate, format_estimate, format_number, laws
+
+from .atlas_rows import COSTS, MEASURES, TeamKind, sample_of
 
 SMALL = 16
 """Agents of the largest teams that laws are fitted to."""

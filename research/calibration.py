@@ -11,17 +11,24 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.core.adaptation.calibration import CalibrationSettings
-from nested_agents.core.adaptation.self_model import SelfModelSettings
-from nested_agents.core.agents.fuzzy import FuzzyAgents
-from nested_agents.core.agents.loop import policy_seed, world_seed
-from nested_agents.core.agents.team import Team
-from nested_agents.core.interface.experience import Experience, Observation
-from nested_agents.core.interface.prediction import EmbodiedPrediction
-from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.topologies import build, parse
+from nested_agents import (
+    BatchTDSettings,
+    BoxPushing,
+    BoxPushingSettings,
+    FuzzyAgents,
+    Observation,
+    Team,
+    policy_seed,
+)
+from nested_agents import build_hierarchy as build
+from nested_agents import parse_topology as parse
+from nested_agents.parts import (
+    CalibrationSettings,
+    EmbodiedPrediction,
+    Experience,
+    SelfModelSettings,
+)
+from nested_agents.study import world_seed
 
 BELIEFS = {
     "right": {"stiffness": 1.0, "load": 1.0, "contact_friction": 1.0},

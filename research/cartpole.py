@@ -15,8 +15,7 @@ from itertools import combinations
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents import Partition, RuleBase
 
 LIMITS = np.array([2.4, 3.0, 0.21, 3.0])
 """Of position [m], its speed, angle [rad] and its speed: ends of the membership functions."""

@@ -1,4 +1,8 @@
-"""The claims of papers, each with what is measured and the criterion that decides it.
+"""The claims of papers: measures, criteria and verdicts.
+
+``python -m research.claims`` prints a table of each claim of the paper with its measure, the
+result and the verdict, from the committed results. ``--out DIR`` runs the studies instead, in a
+directory of their own each, and reads what has been run before.
 
 No verdict is given by hand: claims, measures and criteria stand in ``claims.toml``, and what a
 measure computes in `measures`. A criterion looks at the interval of the estimate. A claim *holds*
@@ -6,7 +10,9 @@ if all of it meets the criterion, *does not hold* if none of it does, and is *no
 between, or by fewer than `LEAST_SEEDS`.
 """
 
+import argparse
 import json
+import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -14,16 +20,24 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..studies.cli.display import print_text, print_wrapped
-from ..studies.results.notation import format_estimate, format_number, format_p
-from ..studies.results.results import NOTHING, Results
-from ..studies.results.statistics import LEVEL
+import nested_agents as na
+from nested_agents.analysis import (
+    LEVEL,
+    NOTHING,
+    Results,
+    format_estimate,
+    format_number,
+    format_p,
+)
+from nested_agents.terminal import closest, print_text, print_wrapped, run_to_status
+
+from . import FOLDER, QUICK, RESULTS, SPECS
 from .measures import MEASURES, Measured
 
 Verdict = Literal["holds", "does not hold", "not decided", "helps", "harms", "equal"]
@@ -271,3 +285,108 @@ def _record(finding: Finding) -> dict[str, object]:
         record |= {"value": value, "low": low, "high": high, "seeds": measured.seeds}
         record |= {"p": measured.p, "note": measured.note}
     return record
+
+
+CATALOG = FOLDER.parent / "studies" / "catalogue"
+"""Specs of the installed studies, one folder for each."""
+NETWORKS = "networks"
+"""Name of the claims that the tables of docs/peers.md decide."""
+
+
+def spec_of_study(study: str) -> Path:
+    """Return the spec of a study, of this folder or of the catalog."""
+    name = study.replace("-", "_")
+    own = SPECS / f"{study}.toml"
+    return own if own.exists() else CATALOG / name / f"{name}.toml"
+
+
+def committed(paper: str) -> dict[str, Results]:
+    """Return the committed results of the studies of a paper's claims, by study."""
+    paths = {study: RESULTS / f"{study}.json" for study in studies_of(paper)}
+    results = {}
+    for study, path in paths.items():
+        if path.exists():
+            loaded = na.load(path)
+            results[study] = loaded.results
+            for remark in loaded.remarks:
+                print(remark, file=sys.stderr)
+    return results
+
+
+def run_studies(out: Path, paper: str, *, quick: bool, jobs: int | None) -> dict[str, Results]:
+    """Run what is left of the studies of a paper's claims; return the results by study."""
+    results = {}
+    for study in studies_of(paper):
+        path = QUICK / f"{study.replace('-', '_')}.toml" if quick else spec_of_study(study)
+        results[study] = run_study(path, out / study, jobs).results
+    return results
+
+
+def run_study(spec: Path, folder: Path, jobs: int | None) -> na.StudyResults:
+    """Run what is left of a study.
+
+    Raises
+    ------
+    SpecError
+        If a trial has failed.
+    """
+    ran = na.run(spec, folder, jobs=jobs)
+    if ran.failed:
+        raise na.SpecError(
+            f"{folder}: {len(ran.failed)} trials failed: nested-agents status {folder}"
+        )
+    return ran
+
+
+def _of_networks(out: Path | None, jobs: int | None) -> list[Finding]:
+    """Decide whether edges help networks, by committed results or by studies run for it."""
+    from .experience import TASKS, edge, edges, read, rows_of, spec_of
+
+    if out is None:
+        return [worth.finding for worth in edges()]
+    findings = []
+    for name, task in TASKS.items():
+        ran = run_study(spec_of(name), out / f"{name}-experience", jobs)
+        rows = rows_of(ran.results, task.shown[-1], read(name).columns[-1])
+        findings.append(edge(name, rows).finding)
+    return findings
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the claims and return the exit status."""
+    papers = (*PAPERS, NETWORKS)
+    parser = argparse.ArgumentParser(
+        prog="python -m research.claims", description="Print the verdict on each claim of a paper."
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="run the studies below this directory"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="small versions of 5 or 6 seeds; needs --out"
+    )
+    parser.add_argument("--of", default=OWN, metavar="PAPER", help=f"one of {', '.join(papers)}")
+    parser.add_argument("--jobs", type=int, metavar="N", help="worker processes; needs --out")
+    parser.add_argument("--format", default="table", choices=get_args(Format))
+    options = parser.parse_args(arguments)
+    out, of = options.out, options.of
+    if of not in papers:
+        raise na.SpecError(f"--of = {of!r}: {closest(of, papers)}")
+    if out is None and (options.quick or options.jobs is not None):
+        name = "--quick" if options.quick else "--jobs"
+        raise na.SpecError(f"{name}: needs --out, where to run the studies")
+    if of == NETWORKS and options.quick:
+        raise na.SpecError(f"--quick: --of {NETWORKS} has no small versions")
+    if of == NETWORKS:
+        print_claims(_of_networks(out, options.jobs), options.format)
+        return 0
+    results = (
+        committed(of)
+        if out is None
+        else run_studies(out, of, quick=options.quick, jobs=options.jobs)
+    )
+    print_claims(judge(results, of), options.format)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_to_status("research.claims", main))

@@ -1,6 +1,6 @@
 """How much agents must disagree before a message is worth sending.
 
-``python -m nested_agents.research.disagreement [FIGURE]`` prints the table of docs/edges.md
+``python -m research.disagreement [FIGURE]`` prints the table of docs/edges.md
 from the committed rows, and draws it. Teams were trained once and judged under errors of each
 agent's own, told what those above them decided, or silent. The threshold was named before the runs:
 where the line through the differences of success, told less silent, crosses zero; its interval is
@@ -15,17 +15,26 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..core.interface.measures import RETURN
-from ..studies.cli.display import print_text
-from ..studies.presentation import figures
-from ..studies.results import published
-from ..studies.results.analysis import Difference, differences
-from ..studies.results.notation import format_estimate, format_number, format_p
-from ..studies.results.results import Results
-from ..studies.results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate
-from ..studies.store.database import EVALUATION
-from . import ROWS
+import nested_agents as na
+from nested_agents import bootstrap, figures, rate
+from nested_agents.analysis import (
+    NOT_NEGATIVE,
+    RETURN,
+    Array,
+    Difference,
+    Estimate,
+    Results,
+    differences,
+    format_estimate,
+    format_number,
+    format_p,
+)
+from nested_agents.terminal import print_text
 
+from . import RESULTS
+
+EVALUATION = "evaluation:"
+"""Prefix of the phase of an evaluation by another name."""
 SHOWN = "s = "
 """Before the size of errors in the name of an evaluation."""
 RESAMPLES = 4000
@@ -126,8 +135,8 @@ def _brief(threshold: Estimate, greatest: float) -> str:
 
 def rows() -> list[Disagreement]:
     """Return what is known of every size that has been run."""
-    known = sorted(ROWS.glob("disagreement-*.json"), key=lambda path: int(path.stem[13:]))
-    return [disagreement(published.load(path).results, int(path.stem[13:])) for path in known]
+    known = sorted(RESULTS.glob("disagreement-*.json"), key=lambda path: int(path.stem[13:]))
+    return [disagreement(na.load(path).results, int(path.stem[13:])) for path in known]
 
 
 def lines(every: list[Disagreement]) -> list[str]:

@@ -1,6 +1,6 @@
 """Edges with equal treatment: plans for the unseen, whichever relations agents have.
 
-``python -m nested_agents.research.equal_treatment`` prints the tables of docs/edges.md from rows
+``python -m research.equal_treatment`` prints the tables of docs/edges.md from rows
 of `BOXES` and `OTHERS` that are there: success with plans, and how success and decisions compare
 with the chain, in each setting and over all boxes. Measures and margins were named in
 ``edges-again.toml``.
@@ -8,15 +8,12 @@ with the chain, in each setting and over all boxes. Measures and margins were na
 
 from collections.abc import Iterator, Mapping
 
-from ..studies.api.loading import load
-from ..studies.catalogue.hierarchies.cases import HierarchyCase
-from ..studies.catalogue.hierarchies.pooled import Effect, effects
-from ..studies.cli.display import print_text
-from ..studies.results.analysis import EVALUATED
-from ..studies.results.notation import format_estimate
-from ..studies.results.results import Results
-from . import ROWS
-from .studies.edges import TRAINED, analyse
+from nested_agents import load
+from nested_agents.analysis import EVALUATED, HierarchyCase, Results, format_estimate
+from nested_agents.terminal import print_text
+
+from . import RESULTS
+from .studies.edges import TRAINED, Effect, analyse, effects
 
 BOXES = {
     "2 robots, own": "edges-again",
@@ -36,7 +33,7 @@ Cases = list[HierarchyCase]
 def settings() -> Iterator[tuple[str, Results, Cases]]:
     """Yield every setting that has been run: its name, its rows and what is compared in it."""
     for setting, name in (BOXES | OTHERS).items():
-        path = ROWS / f"{name}.json"
+        path = RESULTS / f"{name}.json"
         if path.is_file():
             results = load(path).results
             cases = analyse(results).cases
@@ -59,7 +56,7 @@ def lines() -> list[str]:
         table.append(f"| {setting} | {n_seeds} | {cells} |")
         if setting in BOXES:
             beside += _compared(setting, effects(results, cases, TRAINED))
-    paths = [ROWS / f"{name}.json" for name in BOXES.values()]
+    paths = [RESULTS / f"{name}.json" for name in BOXES.values()]
     boxes = load(*(path for path in paths if path.is_file())).results
     if len(boxes.conditions) > 1:
         over_all = effects(boxes, analyse(boxes).cases, TRAINED)

@@ -1,10 +1,10 @@
 """Networks at the field's budgets: tables by decisions, what an edge and foresight are worth.
 
-``python -m nested_agents.research.experience`` prints the tables of docs/peers.md from the rows
+``python -m research.experience`` prints the tables of docs/peers.md from the rows
 of `TASKS` that are there; with directories of kept studies ``experience`` it prints their rows, as
 they are committed (returns if the last word is ``return``). A comparison is of the condition with
-edges, less that without, and is judged as ``nested-agents claims --of networks`` does, see
-`nested_agents.research.claims.Benefit`.
+edges, less that without, and is judged as ``python -m research.claims --of networks`` does, see
+`research.claims.Benefit`.
 """
 
 import sys
@@ -13,18 +13,23 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from ..core.interface import measures as interface
-from ..core.interface.measures import SUCCESS
-from ..core.numerics import FloatArray, pd
-from ..studies.api.loading import load
-from ..studies.catalogue.experience import evaluated_after
-from ..studies.cli.display import print_text
-from ..studies.results.analysis import Difference, differences
-from ..studies.results.notation import format_estimate, format_number, format_p
-from ..studies.results.results import Results
-from ..studies.results.statistics import Estimate, bootstrap, rate
-from . import FOLDER, ROWS, SPECS
+from nested_agents import SUCCESS, bootstrap, load, rate
+from nested_agents.analysis import RETURN as RETURN_MEASURE
+from nested_agents.analysis import (
+    Difference,
+    Estimate,
+    Results,
+    differences,
+    evaluated_after,
+    format_estimate,
+    format_number,
+    format_p,
+)
+from nested_agents.terminal import print_text
+
+from . import RESULTS, SPECS, FloatArray
 from .claims import Benefit, Claim, Finding
 from .measures import Measured
 
@@ -85,12 +90,12 @@ TASKS = {
 
 def read(name: str) -> pd.DataFrame:
     """Return the rows of a task: condition, decisions, seed, and success or return."""
-    return pd.read_csv(ROWS / f"{name}-experience.csv").sort_values("seed", kind="stable")
+    return pd.read_csv(RESULTS / f"{name}-experience.csv").sort_values("seed", kind="stable")
 
 
 def committed() -> list[str]:
     """Return the tasks whose rows are there."""
-    return [name for name in TASKS if (ROWS / f"{name}-experience.csv").is_file()]
+    return [name for name in TASKS if (RESULTS / f"{name}-experience.csv").is_file()]
 
 
 def rows_of(results: Results, budget: int, measure: str = SUCCESS.name) -> pd.DataFrame:
@@ -136,8 +141,6 @@ def _estimate(means: FloatArray, measure: str, task: PublishedCourse) -> Estimat
 
 def spec_of(name: str) -> Path:
     """Return where the spec of a task's networks is."""
-    if name == "spread":
-        return FOLDER.parent / "studies" / "catalogue" / "experience" / "experience.toml"
     return SPECS / f"{name}-experience.toml"
 
 
@@ -176,7 +179,7 @@ def edge(name: str, rows: pd.DataFrame) -> EdgeWorth:
     last = of_networks[of_networks["decisions"] == task.shown[-1]]
     ends = last.pivot_table(index="seed", columns="condition", values=measure)
     pairs = [(c, measure, ends[task.edges], ends[c]) for c in ends if c != task.edges]
-    compared = differences({name: pairs}, SUCCESS if measure == SUCCESS.name else interface.RETURN)[
+    compared = differences({name: pairs}, SUCCESS if measure == SUCCESS.name else RETURN_MEASURE)[
         name
     ]
     (worth,) = [d for d in compared if d.condition == task.without]

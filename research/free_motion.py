@@ -13,14 +13,16 @@ import numpy as np
 from pydantic import TypeAdapter
 from scipy.linalg import expm
 
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
-from nested_agents.scenarios.box_pushing.world.settings import (
+from nested_agents.boxes import (
+    BOXES,
     CONTROL_PERIOD,
+    ROBOTS,
     Failure,
     RobotSettings,
+    WheelFailures,
+    World,
+    nominal_effect,
 )
-from nested_agents.scenarios.box_pushing.world.world import WheelFailures, World
 
 PERIODS, SPEED = 40, 0.04
 COLUMN = {"none": 1.0, "seized": 0.0, "weak": 0.3, "reversed": -1.0, "stuck": 0.0}

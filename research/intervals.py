@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy import special, stats
 
-from nested_agents.studies.results.statistics import bootstrap
+from nested_agents import bootstrap
 
 SEEDS = (5, 8, 12, 20, 40)
 DRAWS: dict[str, tuple[Callable[[np.random.Generator, int], np.ndarray], float]] = {

@@ -9,22 +9,26 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
-from ..core.agents.cost import Problem
-from ..core.interface.measures import SUCCESS
-from ..core.numerics import pd
-from ..studies.catalogue.wheel_failure import courses_of
-from ..studies.results.analysis import (
+from nested_agents import bootstrap, rate
+from nested_agents.analysis import (
     EVALUATED,
+    NOT_NEGATIVE,
+    SUCCESS,
+    Array,
     BySeed,
+    Estimate,
+    Results,
+    Sizes,
+    courses_of,
     difference,
     paired_difference,
     ratio,
     select_shared,
 )
-from ..studies.results.results import Results, Sizes
-from ..studies.results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate
-from ..studies.store.database import EVALUATION
+from nested_agents.parts import Problem
+
 from .studies.chain_order import order_tests
 from .studies.shapes import ratios_of
 
@@ -192,7 +196,7 @@ def lost_without(results: Results, evaluation: str) -> Measured | None:
 
     Of the conditions in which every agent seeks its own value, as in the paper, all sizes alike.
     """
-    other = EVALUATION + evaluation
+    other = f"evaluation:{evaluation}"
     cases = [
         condition
         for condition in results.conditions

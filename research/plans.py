@@ -20,8 +20,13 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.spec.tables import dumps
+from tomli_w import dumps
+
+from nested_agents import Spec
+
+from . import FOLDER
+
+GAMES = f"{FOLDER}/studies/games.py:GamesStudy"
 
 PENDULUM = {
     "kind": "gymnasium", "id": "Pendulum-v1", "hold": 2, "horizon": 2, "predictor": "copy",
@@ -86,7 +91,7 @@ STUDIES: dict[str, tuple[int, Mapping[str, Any]]] = {
             "scenario": {"kind": "kinematic-chain", "joints": 32}},
     ),
     "games": (
-        1, {"study": "games", "seeds": 10, "episodes": 100, "steps": 10, "preset": "fitted-q",
+        1, {"study": GAMES, "seeds": 10, "episodes": 100, "steps": 10, "preset": "fitted-q",
             "scenario": {"kind": "matrix-game", "game": "climbing"}},
     ),
     "a pendulum, copied": (
@@ -98,8 +103,8 @@ STUDIES: dict[str, tuple[int, Mapping[str, Any]]] = {
     ),
 }  # fmt: skip
 PLAN = (
-    "import sys; from nested_agents.studies.api.planning import plan; "
-    "print(*plan(sys.argv[1], jobs=int(sys.argv[2])).seconds)"
+    "import sys; import nested_agents as na; "
+    "print(*na.plan(sys.argv[1], jobs=int(sys.argv[2])).seconds)"
 )
 
 

@@ -18,8 +18,8 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.studies.results.power import RATES, deviation_of, power
-from nested_agents.studies.results.statistics import LEVEL, paired_permutation
+from nested_agents import power
+from nested_agents.analysis import LEVEL, deviation_of, paired_permutation
 
 Draw = Callable[[np.random.Generator, int, int], np.ndarray]
 """Draws differences ``(n_studies, n_seeds)``."""
@@ -30,7 +30,9 @@ CASES = (
     (30, 10, 0.7),
 )  # fmt: skip
 SUCCESS_RATES = ((8, 1, 0.3, 0.8), (12, 2, 0.4, 0.8), (20, 1, 0.6, 0.8), (30, 10, 0.6, 0.85))
-"""Seeds, comparisons, mean success rates that are compared; `RATES` was chosen on these."""
+"""Seeds, comparisons and compared success rates, on which `SPREAD_OF_RATES` was chosen."""
+SPREAD_OF_RATES = 1.07
+"""Factor by which `na.power` inflates deviations of rates."""
 EPISODES, SPREAD = 10, 6.0
 """Of each seed, and of the Beta distribution of success over seeds: the sum of its parameters."""
 OTHERS = (
@@ -87,7 +89,8 @@ def main() -> None:
     for name, seeds, comparisons, draw, of_rates in cases:
         rng = np.random.default_rng([seeds, comparisons])
         many = draw(rng, 100_000, 1)
-        effect, deviation = float(many.mean()), float(many.std()) * (RATES if of_rates else 1.0)
+        effect, deviation = float(many.mean()), float(many.std())
+        deviation *= SPREAD_OF_RATES if of_rates else 1.0
         differences = draw(rng, options.studies, seeds)
         share = share_of_significant(differences, comparisons)
         promises = {"": power(effect, deviation, seeds, comparisons)}

@@ -10,11 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.prediction import BoxPrediction
-from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
-from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents import BoxPushing, BoxPushingSettings
+from nested_agents.boxes import BOXES, BoxPrediction, push_model
 
 from .scripted.controller import ScriptedController
 

@@ -4,41 +4,44 @@ World k of a seed is that of evaluation episode k in every study, so that publis
 are entries, too. What an entry may choose of its world is how it is perceived, predicted and paid,
 see `FREE`. Entries of others are files of JSON in the form of `Entry`.
 
+``python -m research.push_n table [ENTRY.json ...]`` prints entries by number of robots,
+``check [ENTRY.json ...]`` checks the rules that a file can show, and ``run SPEC.toml --out DIR``
+trains and evaluates a spec by the rules and writes ``DIR/entry.json``.
+
 Examples
 --------
->>> from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
 >>> env = BoxPushingEnv({"robots": 2}, steps=STEPS)
 >>> evaluate(lambda observation: [2, 2, 2, 2], env, seed=0)[0]
 '0000000000'
 """
 
+import argparse
 import json
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Self, get_args
+from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import ConfigDict, Field, model_validator
 
-from ..core.agents.loop import world_seed
-from ..core.numerics import FloatArray
-from ..core.plugins.settings import Settings, tuples
-from ..scenarios.box_pushing.config import BoxPushingSettings
-from ..studies.api.running import run
-from ..studies.errors import SpecError
-from ..studies.results import published
-from ..studies.results.analysis import Summary
-from ..studies.results.results import Results
-from ..studies.results.statistics import NOT_NEGATIVE, bootstrap, rate
-from ..studies.spec.spec import Spec
-from ..studies.store import durable
-from ..studies.trials.session import EVALUATION_WORLDS
-from . import ROWS
+import nested_agents as na
+from nested_agents import BoxPushingSettings, Settings, Spec, SpecError, Summary, bootstrap, rate
+from nested_agents.analysis import NOT_NEGATIVE, Results
+from nested_agents.boxes import BoxPushingEnv
+from nested_agents.study import EVALUATION_WORLDS, world_seed
+from nested_agents.terminal import (
+    in_form,
+    print_data,
+    print_table,
+    print_text,
+    print_wrapped,
+    run_to_status,
+    tabulate,
+)
 
-if TYPE_CHECKING:
-    from ..scenarios.box_pushing.environments import BoxPushingEnv
+from . import RESULTS, FloatArray
 
 Size = Literal[2, 4, 8, 16, 32, 64]
 SIZES: tuple[int, ...] = get_args(Size)
@@ -102,6 +105,13 @@ class Entry(Settings):
     """Its results, by number of robots."""
 
 
+def tuples(value: object) -> object:
+    """Return a value of JSON with tuples for its lists, which strict validation requires."""
+    if isinstance(value, dict):
+        return {key: tuples(inner) for key, inner in value.items()}
+    return tuple(map(tuples, value)) if isinstance(value, list) else value
+
+
 def load_entry(path: Path) -> Entry:
     """Return the entry of a file.
 
@@ -111,7 +121,7 @@ def load_entry(path: Path) -> Entry:
         If it cannot be read or breaks a rule; one line.
     """
     try:
-        return Entry(**tuples(json.loads(durable.read_text(path))))
+        return Entry(**tuples(json.loads(path.read_text(encoding="utf-8"))))
     except TypeError:  # it is a list
         raise SpecError(f"{path}: must be one table with the keys of an entry") from None
     except (ValueError, RecursionError) as error:  # of JSON, or of a rule
@@ -123,7 +133,7 @@ def committed_entries() -> list[Entry]:
     table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     for entry in table["entries"]:
         entry["teams"] = tuple(
-            team_of(published.load(ROWS / row.pop("file")).results, **row) for row in entry["teams"]
+            team_of(na.load(RESULTS / row.pop("file")).results, **row) for row in entry["teams"]
         )
     return [Entry(**entry) for entry in table["entries"]]
 
@@ -163,7 +173,7 @@ def run_spec(
             if value != fixed.get(key):
                 allowed = f"push-n has {fixed.get(key)!r}, an entry may choose {', '.join(FREE)}"
                 raise SpecError(f"scenario.{key} = {value!r}: {allowed}")
-    results = run(spec, out, jobs=jobs).results
+    results = na.run(spec, out, jobs=jobs).results
     return tuple(
         team_of(results, number, condition.label)
         for condition, number in zip(conditions, robots, strict=True)
@@ -171,7 +181,7 @@ def run_spec(
 
 
 def evaluate(
-    policy: Callable[[FloatArray], ArrayLike], env: "BoxPushingEnv", seed: int
+    policy: Callable[[FloatArray], ArrayLike], env: BoxPushingEnv, seed: int
 ) -> tuple[str, tuple[int, ...]]:
     """Return success and steps of a seed, as `TeamScores` has them.
 
@@ -221,3 +231,74 @@ def table_of(entries: Iterable[Entry], measure: str) -> list[Summary]:
             cells[f"{team.robots} robots"] = value
         lines.append(Summary(entry.name, min(len(team.success) for team in entry.teams), cells))
     return lines
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Train and evaluate a spec by the rules; the same command again resumes it."""
+    robots = list(dict.fromkeys(options.robots or SIZES[:3]))
+    teams = run_spec(options.spec, options.out, robots, options.seeds, options.jobs)
+    entry = Entry(name=options.name, about=options.about, given=options.given, teams=teams)
+    path = options.out / "entry.json"
+    path.write_text(f"{entry.model_dump_json(indent=1)}\n", encoding="utf-8")
+    print_text(path)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    """Check the rules that a file can show."""
+    if options.schema:
+        print_text(json.dumps(Entry.model_json_schema(), indent=1))
+    for path in options.entries:
+        entry = load_entry(path)
+        teams = ", ".join(f"{t.robots} robots x {len(t.success)} seeds" for t in entry.teams)
+        print_text(f"passed  {path}: {entry.name}, {teams}")
+    return 0
+
+
+def _table(options: argparse.Namespace) -> int:
+    """Print the committed entries, then others, by number of robots."""
+    compared = [*committed_entries(), *map(load_entry, options.entries)]
+    estimates = tabulate(table_of(compared, options.measure))
+    if options.format != "table":
+        print_data(in_form(estimates, options.format))
+        return 0
+    print_table(estimates)
+    print_text("")
+    for entry in compared:
+        print_wrapped(f"{entry.name}: {entry.about}; is given {entry.given}")
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command on entries and return the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m research.push_n", description="Enter a learner, and compare entries."
+    )
+    commands = parser.add_subparsers(required=True, metavar="run | check | table")
+    run = commands.add_parser("run", help="train and evaluate a spec of one condition")
+    run.set_defaults(run=_run)
+    run.add_argument("spec", type=Path, metavar="SPEC.toml")
+    run.add_argument("--out", type=Path, metavar="DIR", required=True, help="of the study")
+    run.add_argument("--robots", type=int, choices=SIZES, nargs="+", help="team sizes")
+    run.add_argument("--seeds", type=int, default=LEAST_SEEDS, metavar="N", help="from seed 0 on")
+    run.add_argument("--name", metavar="TEXT", required=True, help="label in tables")
+    run.add_argument("--about", metavar="TEXT", required=True, help="how it learns, in a line")
+    run.add_argument("--given", choices=get_args(Given), default="predictor")
+    run.add_argument("--jobs", type=int, metavar="N", help="worker processes")
+    check = commands.add_parser("check", help="check entries")
+    check.set_defaults(run=_check)
+    check.add_argument("--schema", action="store_true", help="print the JSON schema of entries")
+    table = commands.add_parser("table", help="print the committed entries and others")
+    table.set_defaults(run=_table)
+    table.add_argument("--measure", choices=("success", "decisions"), default="success")
+    table.add_argument("--format", default="table", choices=("table", "markdown", "latex", "csv"))
+    for command in (check, table):
+        command.add_argument("entries", type=Path, metavar="ENTRY.json", nargs="*")
+    options = parser.parse_args(arguments)
+    if options.run is _run and options.seeds < LEAST_SEEDS:
+        raise SpecError(f"--seeds = {options.seeds}: must be {LEAST_SEEDS} or more")
+    return int(options.run(options))
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_to_status("research.push_n", main))

@@ -16,10 +16,9 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.world.settings import BoxSettings
-from nested_agents.studies.results.notation import format_estimate
-from nested_agents.studies.results.statistics import rate
+from nested_agents import BoxPushingSettings, rate
+from nested_agents.analysis import format_estimate
+from nested_agents.boxes import BoxSettings
 
 from .scripted.controller import decisions_to_goal
 

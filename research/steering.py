@@ -23,16 +23,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.core.agents.loop import world_seed
-from nested_agents.core.numerics import FloatArray, IntArray, wrap
-from nested_agents.research import ROWS
-from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.world.starts import STARTS
-from nested_agents.studies.results import published
-from nested_agents.studies.results.notation import format_estimate, format_number
-from nested_agents.studies.results.statistics import rate
-from nested_agents.studies.trials.session import EVALUATION_WORLDS
+import nested_agents as na
+from nested_agents import BoxPushingSettings, rate
+from nested_agents.analysis import format_estimate, format_number
+from nested_agents.boxes import STARTS, wrap
+from nested_agents.study import EVALUATION_WORLDS, world_seed
+from research import RESULTS
 
+from . import FloatArray, IntArray
 from .scripted.controller import decisions_to_goal
 from .scripted.crowd import CONE, LEVER
 
@@ -88,13 +86,13 @@ def trained(
     robots: int, name: str, phase: str, condition: str, between: Sequence[float] = EDGES[1:-1]
 ) -> list[str]:
     """Return by bin how many of how many episodes of published results succeeded."""
-    results = published.load(ROWS / f"{name}.json").results
+    results = na.load(RESULTS / f"{name}.json").results
     return counts(robots, results.seeds(condition), results.success(condition, phase), between)
 
 
 def failures(name: str, phase: str, condition: str) -> str:
     """Return in words how episodes of published results ended that did not succeed."""
-    results = published.load(ROWS / f"{name}.json").results
+    results = na.load(RESULTS / f"{name}.json").results
     steps = results.values(condition, "steps", phase)
     failed = results.success(condition, phase) == 0
     away = steps[failed & (steps < STEPS)]

@@ -21,15 +21,11 @@ from itertools import product
 
 import numpy as np
 
-from nested_agents.core.agents.fuzzy import FuzzyAgents
-from nested_agents.core.agents.loop import world_seed
-from nested_agents.core.coordination.graphs import Elimination, MaxPlus, Scope
-from nested_agents.core.interface.experience import Observation
-from nested_agents.core.interface.prediction import Prediction
-from nested_agents.core.numerics import FloatArray, IntArray
-from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.session import EVALUATION_WORLDS, Session
-from nested_agents.studies.trials.trial import trials_of
+from nested_agents import FuzzyAgents, Observation, Prediction, Session, Spec
+from nested_agents.parts import Elimination, MaxPlus, Scope
+from nested_agents.study import EVALUATION_WORLDS, trials_of, world_seed
+
+from . import FloatArray, IntArray
 
 EVERY = 5
 """Decisions from one situation to the next."""

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import nested_agents as na
-from nested_agents.research import ROWS
 from nested_agents.studies.cli.main import main, nested_agents
+from research import RESULTS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -25,7 +25,7 @@ def test_the_tagline_is_the_same_everywhere() -> None:
 
 
 def test_the_table_of_the_readme_is_published(capsys: pytest.CaptureFixture[str]) -> None:
-    edges = ROWS / "edges.json"
+    edges = RESULTS / "edges.json"
     assert (
         main(["table", str(edges), "--columns", "evaluation success", "--format", "markdown"]) == 0
     )

@@ -107,13 +107,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.is_private = is_private(settings, scenario)
         self.views: Views | None = None
         self.evaluator = self._evaluator()
-        self._decides_for_all = (
-            self.evaluator is not None
-            and not self.is_private
-            and type(self.evaluator).decide is not Evaluator.decide
-            and not placement.messages_fail
-            and all_hear_all(hierarchy)
-        )
+        self._searches_jointly = self._can_search_jointly(placement)
         self._neutral = np.full(n, self.action_set.neutral)
         own_rows = dict(zip(self.members.tolist(), self.rows.tolist(), strict=True))
         self._row_of = [own_rows.get(agent) for agent in range(n)]
@@ -136,6 +130,17 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         learned = self.learner if isinstance(self.learner, Evaluator) else None
         present = Present(self.hierarchy, self._left)
         return evaluator_of(self.settings, self.rules, learned, self._placement, present)
+
+    def _can_search_jointly(self, placement: Placement) -> bool:
+        """Return whether one search may find the actions of all agents, see `decide`."""
+        return (
+            self.evaluator is not None
+            and placement.is_whole
+            and not self.is_private
+            and type(self.evaluator).decide is not Evaluator.decide
+            and not placement.messages_fail
+            and all_hear_all(placement.hierarchy)
+        )
 
     def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
         """Consider from now on whom another hierarchy has below; who has left is known to all."""
@@ -208,15 +213,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             views={} if self.views is None else self.views.by_agent(seen, shared, theta),
         )
 
-    def decide_all(self, inputs: FuzzyInputs) -> IntArray | None:
-        """Return what all decide: at random, or by one call of the evaluator if it knows a way."""
-        n = len(self.hierarchy)
-        if self.evaluator is None:
-            return self.rng.integers(len(self.action_set), size=n)
-        if not self._decides_for_all:
-            return None
+    def _joint_search(self, inputs: FuzzyInputs) -> IntArray | None:
+        """Return the joint action ``(n,)`` if one search finds it: all agents hear all others."""
         exploring = self.explorer.exploring if inputs.explore else NOT_EXPLORING
-        if exploring is None:
+        if self.evaluator is None or exploring is None:
             return None
         first = Deliberation(
             agent=self.hierarchy.order[0],
@@ -230,9 +230,16 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         return self.evaluator.decide(first, exploring)
 
     def decide(self, inputs: FuzzyInputs, turn: Turn) -> IntArray:
-        """Return the actions ``(k,)`` of members whose turn it is, one after the other."""
+        """Return the actions ``(k,)`` of the agents of a turn, one after the other.
+
+        Where all agents hear all others, one search in the first turn may find the actions of all.
+        """
         if self.evaluator is None:
             return self.rng.integers(len(self.action_set), size=len(turn.agents))
+        if self._searches_jointly and turn.agents[0] == self.hierarchy.order[0]:
+            inputs.joint_action = self._joint_search(inputs)
+        if inputs.joint_action is not None:
+            return inputs.joint_action[turn.agents]
         if len(turn.agents) == 1:
             return np.array([self._choose(inputs, int(turn.agents[0]), turn.senders, turn.actions)])
         chosen = []

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from numbers import Integral
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 
@@ -47,16 +46,6 @@ class StepRecord:
     """Seconds that the team took to learn."""
     spent: Mapping[str, float]
     """What the decision cost, by the names of `Team.costs`."""
-
-
-class EpisodeSummary(NamedTuple):
-    """What a whole episode came to that was run in one call."""
-
-    steps: int
-    measures: Mapping[str, float]
-    """Values of the scenario's measures by name."""
-    return_: float
-    """Sum of the rewards."""
 
 
 def world_seed(seed: int, episode: int) -> np.random.SeedSequence:

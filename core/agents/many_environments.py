@@ -26,7 +26,7 @@ from .team import Team
 
 
 class Finished(NamedTuple):
-    """Summary of an episode of the first environment."""
+    """Summary of an episode that has ended."""
 
     steps: int
     """Number of decisions."""
@@ -81,7 +81,7 @@ class ManyEnvironmentsLoop:
         """Joint actions since the oldest running episode started."""
         self._states = self._start(range(environments.count))
         self._steps = np.zeros(environments.count, dtype=np.int64)
-        self._return = 0.0
+        self._returns: FloatArray = np.zeros(environments.count)
 
     def _start(self, indices: range | list[int]) -> FloatArray:
         """Start the next episodes in some environments and return their states."""
@@ -100,7 +100,7 @@ class ManyEnvironmentsLoop:
             "steps": self._steps.copy(),
             "actions": joint_actions.reshape(-1, len(self._steps), n),
             "states": self._states.copy(),
-            "return": np.array(self._return),
+            "returns": self._returns.copy(),
             "started": np.array(self._started),
             "decisions": np.array(self.decisions),
         }
@@ -116,7 +116,7 @@ class ManyEnvironmentsLoop:
         self._steps = state["steps"].astype(np.int64)
         self._episodes = state["episodes"].astype(np.int64)
         self._joint_actions = deque(state["actions"].astype(np.int64))
-        self._return = float(state["return"])
+        self._returns = state["returns"].astype(np.float64)
         self._started = int(state["started"])
         self.decisions = int(state["decisions"])
         starts = len(self._joint_actions) - self._steps
@@ -136,8 +136,8 @@ class ManyEnvironmentsLoop:
             raise ValueError("environments: the same joint actions have led to other states")
         self._states = states
 
-    def step(self) -> Finished | None:
-        """Take one step in all environments; return the first one's episode if it ends."""
+    def step(self) -> list[Finished]:
+        """Take one step in all environments; return the episodes that end, by environment."""
         decision = self._team.act(Observation(self._states, self._scenario), explore=True)
         transitions = self._environments.step(decision.joint_action)
         self._joint_actions.append(decision.joint_action)
@@ -145,18 +145,18 @@ class ManyEnvironmentsLoop:
         last = transitions.terminated | transitions.truncated | (self._steps >= self._max_steps)
         self._team.learn_batch(decision, transitions, last)
         self.decisions += self._environments.count
-        self._return += float(transitions.rewards[0].mean())
-        finished = None
-        if last[0]:
-            terminated = bool(transitions.terminated[0])
-            finished = Finished(int(self._steps[0]), self._return, terminated)
-            self._return = 0.0
+        self._returns += transitions.rewards.mean(axis=1)
+        indices = np.flatnonzero(last).tolist()
+        finished = [
+            Finished(int(self._steps[k]), float(self._returns[k]), bool(transitions.terminated[k]))
+            for k in indices
+        ]
         self._states = transitions.states
-        if last.any():
-            indices = np.flatnonzero(last).tolist()
+        if indices:
             self._states = transitions.states.copy()
             self._states[indices] = self._start(indices)
             self._steps[indices] = 0
+            self._returns[indices] = 0.0
         while len(self._joint_actions) > self._steps.max():
             self._joint_actions.popleft()
         return finished

@@ -1,7 +1,6 @@
-"""Those who act for all agents by themselves: learners of users, and of other libraries.
+"""Joint learners: users' classes that choose the whole joint action.
 
-A peer sees the same state variables, gets the same rewards and meets the same worlds as a hierarchy
-of agents does, and returns a whole joint action.
+A `Peer` observes the same state variables and receives the same rewards as a hierarchy of agents.
 """
 
 from __future__ import annotations
@@ -9,54 +8,61 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import Annotated, Self
 
 import numpy as np
+from pydantic import Field
 
 from ..decision.exploration import no_way_on
 from ..hierarchy.turns import Turn
 from ..interface.agents import Agents, Memory, Placement
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Transition
+from ..learners.learner import CORE, TeamSettings
 from ..numerics import AnyArray, FloatArray, IntArray
 
-if TYPE_CHECKING:
-    from ..networks.settings import PeerSettings
+
+class PeerSettings(TeamSettings):
+    """Settings that all joint learners share.
+
+    `build` returns the `Peer` for a scenario, a seed and, if it uses one, a hierarchy.
+    """
+
+    kind_of_agents = f"{CORE}.agents.peer:PeerAgents"
+    discount: Annotated[float, Field(ge=0, lt=1)] = 0.97
+    """Discount per decision."""
 
 
 class Peer(ABC):
-    """A learner that acts for all agents by what it sees; inherit it, and add what it learns.
-
-    Without more it learns nothing. What it has learned it gives as `arrays`, and takes back by
-    `restore`.
+    """Base class of joint learners. Without overriding more than `act` it learns nothing.
 
     Parameters
     ----------
     seed
-        Source of everything random in it.
+        Seed of everything random in it.
     """
 
     is_sampled = False
-    """Whether its policy is one of probabilities, so that sampled actions are evaluated, too."""
+    """Whether its policy is stochastic, so that sampled actions are evaluated, too."""
 
     def __init__(self, seed: np.random.SeedSequence) -> None:
         self.rng = np.random.Generator(np.random.PCG64(seed))
 
-    def begin_episode(self) -> None:  # noqa: B027 - by default nothing is to be done
-        """Begin an episode of learning."""
+    def begin_episode(self) -> None:  # noqa: B027 - optional
+        """Start an episode of learning."""
 
     @abstractmethod
     def act(self, seen: Observation, *, explore: bool = True) -> IntArray:
-        """Return a joint action ``(n,)``; without `explore` the best that it knows."""
+        """Return a joint action ``(n,)``, the greedy one unless it explores."""
 
-    def learn(self, transition: Transition) -> None:  # noqa: B027 - by default nothing is learned
-        """Take in what a step led to."""
+    def learn(self, transition: Transition) -> None:  # noqa: B027 - optional
+        """Learn from a step."""
 
-    def end_episode(self) -> None:  # noqa: B027
-        """Learn what is learned after an episode."""
+    def end_episode(self) -> None:  # noqa: B027 - optional
+        """Learn after an episode."""
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Return what has been learned, if anything."""
+        """Return what it has learned."""
         return {}
 
     def restore(self, arrays: Mapping[str, AnyArray]) -> None:
@@ -71,7 +77,7 @@ class Peer(ABC):
             raise ValueError(f"learner.kind: {type(self).__name__} has no method restore")
 
     def continue_from(self, former: Self) -> None:
-        """Begin where it ended in another world.
+        """Start with what a learner of equal settings has learned elsewhere.
 
         Raises
         ------
@@ -83,25 +89,23 @@ class Peer(ABC):
 
 @dataclass
 class PeerInputs:
-    """What a peer decides by."""
+    """Inputs of a joint decision."""
 
     seen: Observation
-    """What it sees."""
     explore: bool
-    """Whether it explores."""
     joint_action: IntArray | None = None
-    """``(n,)`` what it has decided for all, asked once a decision."""
+    """``(n,)`` the joint action, once it has been chosen."""
 
 
 class PeerAgents(Agents[PeerInputs]):
-    """A peer as the agents of a team.
+    """The agents of a team whose joint action a `Peer` chooses.
 
     Parameters
     ----------
     settings
-        Of the peer, which is built for a scenario, a seed and, if it uses one, a hierarchy.
+        Settings of the learner.
     placement
-        Where it acts.
+        Scenario, seed and hierarchy.
     """
 
     def __init__(self, settings: PeerSettings, placement: Placement) -> None:
@@ -111,38 +115,34 @@ class PeerAgents(Agents[PeerInputs]):
         self.is_sampled = self.peer.is_sampled
 
     def begin_episode(self) -> None:
-        """Begin an episode of learning."""
+        """Start an episode of learning."""
         self.peer.begin_episode()
 
     def perceive(self, seen: Observation, *, explore: bool) -> PeerInputs:
-        """Return what it sees."""
+        """Return the inputs of a decision."""
         return PeerInputs(seen, explore)
 
     def decide(self, inputs: PeerInputs, turn: Turn) -> IntArray:
-        """Return what it decides for some agents."""
+        """Return the actions of the agents of a turn; the first turn chooses those of all."""
         if inputs.joint_action is None:
-            inputs.joint_action = self.decide_all(inputs)
+            joint_action = self.peer.act(inputs.seen, explore=inputs.explore)
+            inputs.joint_action = np.asarray(joint_action)
         return inputs.joint_action[turn.agents]
 
-    def decide_all(self, inputs: PeerInputs) -> IntArray:
-        """Return what it decides for all."""
-        joint: IntArray = self.peer.act(inputs.seen, explore=inputs.explore)
-        return joint
-
     def learn(self, experience: Experience, inputs: PeerInputs) -> None:
-        """Let it learn."""
+        """Learn from a step."""
         self.peer.learn(experience.transition)
         if experience.last:
             self.peer.end_episode()
 
     def memory(self) -> Memory:
-        """Return what it has learned."""
+        """Return what has been learned."""
         return dict(self.peer.arrays())
 
     def restore(self, memory: Mapping[str, AnyArray]) -> None:
-        """Continue from what `memory` returned, if the peer can."""
+        """Continue from what `memory` returned, if the learner can."""
         self.peer.restore(memory)
 
     def continue_from(self, former: Self) -> None:
-        """Go on where it ended in another world, if the peer can."""
+        """Start with what was learned elsewhere, if the learner can."""
         self.peer.continue_from(former.peer)

@@ -194,9 +194,7 @@ class Team:
         if self._present is not self.messages.hierarchy:
             self._rearrange()
         inputs = tuple(part.perceive(seen, explore=explore) for part in self.parts)
-        joint = self.parts[0].decide_all(inputs[0]) if len(inputs) == 1 else None
-        if joint is None:
-            joint = self._walk(seen, inputs)
+        joint = self._walk(seen, inputs)
         if self._has_contents:
             self.messages.advance(joint, self._contents(inputs))
         else:

@@ -65,6 +65,8 @@ class FuzzyInputs:
     """``(n, A)`` how often each agent was seen to take each action, rows summing to one."""
     explore: bool
     """Whether they explore."""
+    joint_action: IntArray | None = None
+    """``(n,)`` the joint action, if one search has found the actions of all agents."""
     views: dict[int, OwnView] = field(default_factory=dict)
     """By agent, what it decides by in place of prediction and weights; empty: all by these."""
     expected: dict[int, IntArray] = field(default_factory=dict)

@@ -1,1 +1,1 @@
-"""Agents that are functions of a user's: scripts, rules, whatever can be called and answers."""
+"""Agents that decide by a function of a user."""

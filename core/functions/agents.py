@@ -1,15 +1,18 @@
-"""Agents that are functions: each is asked for its action when it is its turn.
+"""Agents that decide by a function.
 
-All that is random in an answer follows from the seed, the episode, the step and the agent, whoever
-else is asked, in whatever order. So topologies are compared on the same random numbers.
+A function has some of the parameters in `PARAMETERS`; a function that decides for several agents in
+one call has some of those in `BATCH_PARAMETERS`, which are lists with one entry per agent except
+for ``actions`` and ``step``. All randomness of an answer follows from the seed, the episode, the
+step and the agent, so that topologies are compared with common random numbers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
-from typing import Self
+from inspect import Parameter, iscoroutinefunction, signature
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -17,30 +20,48 @@ from ..hierarchy.turns import Turn
 from ..interface.agents import Agents, Memory, Placement
 from ..interface.experience import Observation
 from ..interface.measures import Measure
+from ..learners import LEARNERS
 from ..numerics import AnyArray, FloatArray, IntArray
-from .asking import Asking
-from .plain import HeardMessage, Query
-from .recorded import canonical
-from .replies import Reply
+from ..plugins import sources
+from .replies import Reply, canonical, read_reply
 from .settings import FunctionSettings
 
+PARAMETERS = ("observation", "received", "rng", "agent", "actions", "step")
+"""Parameters that a function may have."""
+BATCH_PARAMETERS = ("observations", "received", "rngs", "agents", "actions", "step")
+"""Parameters that a function may have which decides for several agents in one call."""
+COMMON = ("actions", "step")
+"""Parameters that are equal for all agents."""
 COUNTED = (
     Measure("calls", "calls", gathering="sum", better="lower", least=0),
     Measure("message_bytes", "size of messages", "B", gathering="sum", better="lower", least=0),
 )
-"""What is measured of functions without being said: answers, and the size of contents."""
+"""Measures of all function agents: answers, and the size of the contents received."""
+
+
+class FunctionError(ValueError):
+    """A function did not answer as it should; one line that names the agent."""
+
+
+class ReceivedMessage(NamedTuple):
+    """Message of another agent."""
+
+    action: str
+    """Action that the sender decided."""
+    content: Any = None
+    """Content that the sender added; None if it added nothing, or the message was garbled."""
 
 
 @dataclass
 class FunctionInputs:
-    """What functions decide by, and what has come of it."""
+    """Inputs and answers of one decision."""
 
-    present: FloatArray
-    """``(n, d)`` the states that all agents are in."""
+    states: FloatArray
+    """States of all agents ``(n, d)``."""
     replies: dict[int, Reply] = field(default_factory=dict)
-    """What each has answered, by agent."""
+    """Answer of each agent that has decided."""
     message_bytes: int = 0
-    """Size of all contents that have arrived [B]."""
+    """Size of all contents received [B]."""
 
 
 class FunctionAgents(Agents[FunctionInputs]):
@@ -49,14 +70,14 @@ class FunctionAgents(Agents[FunctionInputs]):
     Parameters
     ----------
     settings
-        Which function, and its settings.
+        The function and its settings.
     placement
-        Where they act.
+        Scenario, hierarchy, and random seed of the agents.
 
     Raises
     ------
     ValueError
-        If the function takes something else than it may; one line.
+        If the function is asynchronous, or has a parameter that is not allowed.
     """
 
     at_once = True
@@ -69,71 +90,123 @@ class FunctionAgents(Agents[FunctionInputs]):
         self._agents = tuple(scenario.agents)
         self._actions = scenario.action_set.names
         self._variables = [variable.name for variable in scenario.state_space.variables]
-        self._asking = Asking(settings, self._actions)
+        self._function: Callable[..., Any] = LEARNERS.find(settings.kind)
+        self._parameters = parameters_of(settings.kind, self._function)
+        own = type(settings).model_fields.keys() - FunctionSettings.model_fields.keys()
+        self._options = {name: value for name, value in settings if name in own}
         self.rng = np.random.Generator(np.random.PCG64(placement.seed))
         self._key = placement.seed.generate_state(2, np.uint64)
+        reported = [
+            Measure(name, name, unit, gathering="sum", better="lower", least=0)
+            for name, unit in settings.costs.items()
+        ]
         counted = [measure for measure in COUNTED if measure.name not in settings.costs]
-        self.costs = (
-            *counted,
-            *(
-                Measure(name, name, unit, gathering="sum", better="lower", least=0)
-                for name, unit in settings.costs.items()
-            ),
-        )
+        self.costs = (*counted, *reported)
         self.begin_world(0)
 
     def begin_world(self, episode: int) -> None:
-        """Begin an episode: nobody remembers the one before."""
+        """Start an episode."""
         self._episode = episode
         self._step = 0
-        self._asking.begin()
 
     def perceive(self, seen: Observation, *, explore: bool) -> FunctionInputs:
-        """Return what all see."""
+        """Return the inputs of a decision."""
         return FunctionInputs(seen.present)
 
     def decide(self, inputs: FunctionInputs, turn: Turn) -> IntArray:
-        """Return what some agents answer to what they see and have been told."""
+        """Return the actions of the agents whose turn it is ``(k,)``.
+
+        Raises
+        ------
+        FunctionError
+            If the function raises an error, or does not return an action.
+        """
         agents = turn.agents.tolist()
-        told = self._told(inputs, turn)
-        queries = [self._query(inputs, agent, told[agent]) for agent in agents]
-        inputs.replies |= dict(zip(agents, self._asking.replies(queries), strict=True))
+        received = self._received(inputs, turn)
+        arguments = [self._arguments(inputs, agent, received[agent]) for agent in agents]
+        if "observations" in self._parameters:
+            answers = self._call_batch(arguments)
+        else:
+            answers = [self._call_one(given) for given in arguments]
+        for agent, answer in zip(agents, answers, strict=True):
+            try:
+                reply = read_reply(answer, self._actions, self.settings.costs)
+            except ValueError as error:
+                raise FunctionError(
+                    f"agent {self._agents[agent]!r}: {self.settings.kind} {error}"
+                ) from None
+            inputs.replies[agent] = reply
         return np.array([inputs.replies[agent].action for agent in agents])
 
-    def _query(self, inputs: FunctionInputs, agent: int, told: Mapping[str, HeardMessage]) -> Query:
-        seen = dict(zip(self._variables, inputs.present[agent].tolist(), strict=True))
-        place = [0, agent, self._step, self._episode]
-        rng = np.random.Generator(np.random.Philox(counter=place, key=self._key))
-        seed = (*self._key.tolist(), *place[1:])
-        return Query(self._agents[agent], seen, told, rng, self._actions, self._step, seed)
+    def _arguments(
+        self, inputs: FunctionInputs, agent: int, received: Mapping[str, ReceivedMessage]
+    ) -> dict[str, Any]:
+        """Return the value of every parameter in `PARAMETERS` for one agent."""
+        state = inputs.states[agent].tolist()
+        counter = [0, agent, self._step, self._episode]
+        return {
+            "observation": dict(zip(self._variables, state, strict=True)),
+            "received": received,
+            "rng": np.random.Generator(np.random.Philox(counter=counter, key=self._key)),
+            "agent": self._agents[agent],
+            "actions": self._actions,
+            "step": self._step,
+        }
 
-    def _told(self, inputs: FunctionInputs, turn: Turn) -> dict[int, dict[str, HeardMessage]]:
-        """Return the messages of each agent by sender, in agent order, and count them."""
-        told: dict[int, dict[str, HeardMessage]] = {agent: {} for agent in turn.agents.tolist()}
-        hears = self.settings.hears == "contents" and bool(turn.contents)
-        contents = turn.contents if hears else (None,) * len(turn.senders)
-        # What a sender says to all is one object; it is measured once.
-        messages: dict[tuple[int, int, int], tuple[HeardMessage, int]] = {}
+    def _call_one(self, given: Mapping[str, Any]) -> Any:
+        chosen = {name: given[name] for name in self._parameters}
+        return self._call(given["agent"], chosen)
+
+    def _call_batch(self, given: Sequence[Mapping[str, Any]]) -> Sequence[Any]:
+        chosen: dict[str, Any] = {}
+        for one, many in zip(PARAMETERS, BATCH_PARAMETERS, strict=True):
+            if many in self._parameters:
+                chosen[many] = given[0][one] if one in COMMON else [own[one] for own in given]
+        first = given[0]["agent"]
+        answers = self._call(first, chosen)
+        if not isinstance(answers, list | tuple | np.ndarray) or len(answers) != len(given):
+            raise FunctionError(
+                f"agent {first!r}: {self.settings.kind} returns {answers!r:.60}, allowed: a list "
+                f"of {len(given)} answers"
+            )
+        return list(answers)
+
+    def _call(self, agent: str, chosen: Mapping[str, Any]) -> Any:
+        try:
+            return self._function(**chosen, **self._options)
+        except (Exception, SystemExit) as error:
+            reason = f"{sources.format_error(error)}{sources.place(error)}"
+            raise FunctionError(f"agent {agent!r}: {self.settings.kind} raises {reason}") from error
+
+    def _received(
+        self, inputs: FunctionInputs, turn: Turn
+    ) -> dict[int, dict[str, ReceivedMessage]]:
+        """Return the messages of each agent by sender, in agent order, and count their size."""
+        received: dict[int, dict[str, ReceivedMessage]] = {a: {} for a in turn.agents.tolist()}
+        hears_contents = self.settings.hears == "contents" and bool(turn.contents)
+        contents = turn.contents if hears_contents else (None,) * len(turn.senders)
+        # A content that a sender tells several agents is one object, measured once.
+        messages: dict[tuple[int, int, int], tuple[ReceivedMessage, int]] = {}
         arrays = (turn.receivers.tolist(), turn.senders.tolist(), turn.actions.tolist())
         for receiver, sender, action, content in zip(*arrays, contents, strict=True):
             key = sender, action, id(content)
             if key not in messages:
-                message = HeardMessage(self._actions[action], content)
-                messages[key] = message, 0 if content is None else len(canonical(content).encode())
+                size = 0 if content is None else len(canonical(content).encode())
+                messages[key] = ReceivedMessage(self._actions[action], content), size
             message, size = messages[key]
-            if isinstance(content, list | dict):  # what one does with it changes nobody else's
+            if isinstance(content, list | dict):  # receivers may modify what they receive
                 message = message._replace(content=deepcopy(content))
-            told[receiver][self._agents[sender]] = message
+            received[receiver][self._agents[sender]] = message
             inputs.message_bytes += size
-        return told
+        return received
 
     def contents(self, inputs: FunctionInputs) -> Mapping[int, object]:
-        """Return by agent what has been said so far."""
+        """Return the contents of the messages of this decision by agent."""
         replies = inputs.replies.items()
         return {agent: reply.message for agent, reply in replies if reply.message is not None}
 
     def spent(self, inputs: FunctionInputs) -> Mapping[str, float]:
-        """Return what all answers of a decision have cost."""
+        """Return the costs of all answers of a decision."""
         total = {measure.name: 0.0 for measure in self.costs}
         counts = (len(inputs.replies), inputs.message_bytes)
         for measure, count in zip(COUNTED, counts, strict=True):
@@ -145,17 +218,41 @@ class FunctionAgents(Agents[FunctionInputs]):
         return total
 
     def conclude(self, inputs: FunctionInputs, joint_action: IntArray) -> None:
-        """Go on to the next decision."""
+        """Advance to the next decision."""
         self._step += 1
 
     def memory(self) -> Memory:
-        """Return who they are: they remember nothing from one episode to the next."""
+        """Return the agents' indices; functions have no other state."""
         return {"members": self.members}
 
     def restore(self, memory: Mapping[str, AnyArray]) -> None:
-        """Refuse what other agents remember."""
+        """Check that saved arrays are those of these agents."""
         if memory.keys() != {"members"} or not np.array_equal(memory["members"], self.members):
             raise ValueError(f"team: saved arrays are not of the function {self.settings.kind}")
 
     def continue_from(self, former: Self) -> None:
-        """Go on in another world, with nothing learned."""
+        """Do nothing, because functions do not learn."""
+
+
+def parameters_of(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return the positional parameters of a function that decides.
+
+    Raises
+    ------
+    ValueError
+        If the function is asynchronous, or has a parameter that is not allowed.
+    """
+    if iscoroutinefunction(function):
+        raise ValueError(
+            f"learner.kind = {name!r}: the function is async; decorate it with slow_calls of the "
+            "plug-in nested_agents_language (pip install plugins/language_agents, in a checkout)"
+        )
+    own = [p for p in signature(function).parameters.values() if p.kind is not p.KEYWORD_ONLY]
+    allowed = BATCH_PARAMETERS if any(p.name == "observations" for p in own) else PARAMETERS
+    for parameter in own:
+        if parameter.name not in allowed and parameter.default is Parameter.empty:
+            raise ValueError(
+                f"learner.kind = {name!r}: parameter {parameter.name!r}, allowed: "
+                f"{', '.join(allowed)}; settings are annotated keyword-only parameters"
+            )
+    return tuple(p.name for p in own if p.name in allowed)

@@ -1,8 +1,8 @@
-"""What a function answers: an action, and what it says beside and has cost.
+"""Answers of functions: an action, the content of a message, and costs.
 
-An answer is the name or the index of an action, or a table of ``action``, ``message`` and
-``costs``. What is said, the *content* of a message, is whatever JSON holds; its size is the number
-of bytes of its JSON text.
+An answer is the name or the index of an action, or a mapping of ``action``, ``message`` and
+``costs``. The content of a message is any value that JSON can represent; its size is the number of
+bytes of its JSON text.
 """
 
 import json
@@ -11,39 +11,37 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .recorded import canonical
-
 KEYS = ("action", "message", "costs")
-"""What a table may hold."""
+"""Keys of an answer that is a mapping."""
 
 
 class Reply(NamedTuple):
-    """What an agent has decided, said and spent."""
+    """Answer of an agent."""
 
     action: int
-    """Index of its action."""
+    """Index of the action."""
     message: object
-    """What it says to others; none: nothing."""
+    """Content of the message to other agents; None if there is none."""
     costs: Mapping[str, float]
-    """What the answer has cost, by name."""
+    """Costs of the answer by name."""
 
 
 def read_reply(answer: object, actions: Sequence[str], costs: Mapping[str, str]) -> Reply:
-    """Return what a function's answer means.
+    """Return the answer of a function, checked.
 
     Parameters
     ----------
     answer
-        What it has returned.
+        Value that the function returned.
     actions
         Names of all actions.
     costs
-        Units of what it may say to have spent, by name.
+        Units of the costs that the function may report, by name.
 
     Raises
     ------
     ValueError
-        If there is no such action, or the answer holds something else; one line.
+        If the action is unknown, or the answer has other keys or values.
 
     Examples
     --------
@@ -89,3 +87,17 @@ def _costs(answer: Mapping[str, object], units: Mapping[str, str]) -> dict[str, 
             raise ValueError(f"returns costs.{name} = {value!r:.60}, allowed: numbers from 0")
         costs[str(name)] = float(value)
     return costs
+
+
+def canonical(value: object) -> str:
+    """Return the unique compact JSON text of a value.
+
+    Raises
+    ------
+    ValueError
+        If JSON cannot represent the value.
+    """
+    try:
+        return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"{value!r:.60}: {error}; allowed: what JSON holds") from None

@@ -80,7 +80,7 @@ class Counts:
 class Agents(ABC, Generic[I]):
     """A part of a team: agents of one kind."""
 
-    at_once: ClassVar[bool] = False
+    at_once: bool = False
     """Whether members who have been told all that they will be decide in one call; if not, one
     after the other."""
     is_vectorized: ClassVar[bool] = False
@@ -139,13 +139,6 @@ class Agents(ABC, Generic[I]):
     @abstractmethod
     def decide(self, inputs: I, turn: Turn) -> IntArray:
         """Return the actions ``(k,)`` of members whose turn it is; what they are told is noted."""
-
-    def decide_all(self, inputs: I) -> IntArray | None:
-        """Return the whole joint action ``(n,)`` in one call; None: turn by turn.
-
-        Asked of the agents of a team that are its only part.
-        """
-        return None
 
     def contents(self, inputs: I) -> Mapping[int, object]:
         """Return by agent what has been said beside its action, in this decision so far."""

@@ -43,15 +43,14 @@ def offered(thing: object, name: str, otherwise: Any = None) -> Any:
 
 
 def decides(thing: object) -> bool:
-    """Return whether a user's function, or a class by its method ``decide``, decides for agents.
+    """Return whether a user's function decides for agents.
 
-    >>> decides(lambda observation, told, rng: 0), decides(lambda rules, rows: 0)
+    >>> decides(lambda observation, received, rng: 0), decides(lambda rules, rows: 0)
     (True, False)
     """
-    own = offered(thing, "decide") if isinstance(thing, type) else thing
-    if not isfunction(own):
+    if not isfunction(thing):
         return False
-    return bool({"observation", "observations"} & signature(own).parameters.keys())
+    return bool({"observation", "observations"} & signature(thing).parameters.keys())
 
 
 def as_scenario(thing: object) -> Scenario:

@@ -13,7 +13,7 @@ from ..interface.scenario import Scenario
 from ..plugins.registry import SettingsRegistry
 from .learner import CORE, LearnerSettings, TeamSettings
 
-PEERS = f"{CORE}.networks.settings"
+PPO = f"{CORE}.networks.settings"
 FUNCTIONS = f"{CORE}.functions.settings:FunctionSettings"
 
 
@@ -36,11 +36,10 @@ LEARNERS = SettingsRegistry(
         "fitted-q": f"{__name__}.fitted_q:FittedQSettings",
         "frozen": f"{__name__}.td:FrozenSettings",
         "written": f"{__name__}.written:WrittenSettings",
-        "ppo": f"{PEERS}:PPOSettings",
-        "ippo": f"{PEERS}:IPPOSettings",
-        "hierarchy-ppo": f"{PEERS}:HierarchyPPOSettings",
-        "mappo": f"{PEERS}:MAPPOSettings",
-        "dqn": f"{PEERS}:DQNSettings",
+        "ppo": f"{PPO}:PPOSettings",
+        "ippo": f"{PPO}:IPPOSettings",
+        "hierarchy-ppo": f"{PPO}:HierarchyPPOSettings",
+        "mappo": f"{PPO}:MAPPOSettings",
         "mixed": f"{CORE}.agents.mixed:MixedSettings",
     },
     LearnerSettings,

@@ -1,137 +1,76 @@
-"""What networks are fed: states in the ranges of their variables, and scaled rewards.
+"""Encoding of states as inputs of networks.
 
-A variable is mapped so that its range is [-1, 1], and cut at `FARTHEST`; a periodic one becomes
-sine and cosine. These are the ranges that membership functions are laid over, so that networks know
-no less of the variables than fuzzy agents do.
+The range of every variable is scaled to [-1, 1] and clipped at `MAX_INPUT`; a periodic variable
+becomes a sine and a cosine. Membership functions of rule bases cover the same ranges.
 """
-
-from collections.abc import Mapping
 
 import numpy as np
 
-from ..interface.agents import Memory
 from ..interface.scenario import Scenario
-from ..numerics import AnyArray, FloatArray
+from ..numerics import FloatArray, IntArray
 
-FARTHEST = 3.0
-"""Where inputs are cut, in half ranges."""
+MAX_INPUT = 3.0
+"""Bound of scaled variables, in half ranges."""
 
 
-class Inputs:
-    """Turns states into inputs.
+class InputEncoder:
+    """Encoder of states.
 
     Parameters
     ----------
     scenario
-        Whose states.
+        Scenario of the states.
     numbered
-        Whether the inputs of an agent say which one it is.
+        Whether the inputs of an agent contain its number, one-hot.
 
     Attributes
     ----------
-    n_own, n_joint
-        Number of inputs of one agent, and of all together.
     own_names, joint_names
-        What each of them is, in words: inputs of one name mean the same in other worlds.
+        Names of the inputs of one agent, and of all agents together. Equal names mean the same
+        quantity in all scenarios.
 
     Examples
     --------
     >>> from nested_agents.scenarios.line_up import LineUpSettings
-    >>> inputs = Inputs(LineUpSettings(carts=2).build())
-    >>> inputs.n_own, inputs.n_joint
-    (4, 4)
+    >>> encoder = InputEncoder(LineUpSettings(carts=2).build())
+    >>> own = encoder.own(np.array([[0.0, 1.0], [2.0, 9.0]]))
+    >>> own.shape, encoder.joint(own).shape
+    ((2, 4), (4,))
     """
 
     def __init__(self, scenario: Scenario, *, numbered: bool = True) -> None:
         space = scenario.state_space
+        n_agents = len(scenario.agents)
         self._low, self._span = space.ranges
-        self._periodic = np.array([v.periodic for v in space.variables])
-        # Which variable each input is of: all of them, then the cosines of the periodic.
-        self._columns = np.append(np.arange(space.n_variables), np.flatnonzero(self._periodic))
-        self._own = self._columns < space.n_own
-        self._firsts = [group[0] for group in scenario.groups]
-        n = len(scenario.agents)
-        self._identities = np.eye(n) if numbered else np.zeros((n, 0))
-        self.n_own = len(self._columns) + self._identities.shape[1]
-        self.n_joint = int(n * self._own.sum() + len(self._firsts) * (~self._own).sum())
-        variables = [space.variables[column].name for column in self._columns]
-        kinds = ["value"] * space.n_variables + ["cosine"] * int(self._periodic.sum())
-        inputs = [f"{name} {kind}" for name, kind in zip(variables, kinds, strict=True)]
+        self._periodic: IntArray = np.flatnonzero([v.periodic for v in space.variables])
+        self._n_variables = space.n_variables
+        self._identities = np.eye(n_agents, n_agents if numbered else 0, dtype=np.float32)
+        variables = [v.name for v in space.variables]
+        names = [f"{name} value" for name in variables]
+        names += [f"{variables[column]} cosine" for column in self._periodic]
         identities = [f"is {agent}" for agent in scenario.agents] if numbered else []
-        self.own_names = [*inputs, *identities]
-        firsts = [scenario.agents[first] for first in self._firsts]
-        of_agents = [name for name, own in zip(inputs, self._own, strict=True) if own]
-        of_groups = [name for name, own in zip(inputs, self._own, strict=True) if not own]
-        self.joint_names = [
-            *(f"{agent}: {name}" for agent in scenario.agents for name in of_agents),
-            *(f"{first}: {name}" for first in firsts for name in of_groups),
-        ]
+        self.own_names = [*names, *identities]
+        # Agents of a group share their last variables, which are joint inputs once.
+        columns = np.append(np.arange(space.n_variables), self._periodic)
+        firsts = [group[0] for group in scenario.groups]
+        entries = [(i, k) for i in range(n_agents) for k in np.flatnonzero(columns < space.n_own)]
+        entries += [(i, k) for i in firsts for k in np.flatnonzero(columns >= space.n_own)]
+        self.joint_names = [f"{scenario.agents[i]}: {names[k]}" for i, k in entries]
+        self._joint: IntArray = np.array([i * len(self.own_names) + k for i, k in entries], int)
 
-    def each(self, states: FloatArray) -> FloatArray:
-        """Return the inputs ``(..., n, n_own)`` of every agent: its state, and which one it is."""
-        scaled = self._scaled(states)
-        identities = np.broadcast_to(
-            self._identities, (*scaled.shape[:-1], len(self._identities.T))
-        )
-        return np.concatenate([scaled, identities], axis=-1)
+    def own(self, states: FloatArray) -> FloatArray:
+        """Return the inputs ``(..., n, len(own_names))`` of agents in states ``(..., n, d)``."""
+        n = self._n_variables
+        inputs = np.empty((*states.shape[:-1], len(self.own_names)), np.float32)
+        position = (states - self._low) / self._span
+        np.clip(2.0 * position - 1.0, -MAX_INPUT, MAX_INPUT, out=inputs[..., :n], casting="unsafe")
+        if len(self._periodic):
+            angles = 2.0 * np.pi * position[..., self._periodic]
+            inputs[..., self._periodic] = np.sin(angles)
+            inputs[..., n : n + len(self._periodic)] = np.cos(angles)
+        inputs[..., n + len(self._periodic) :] = self._identities
+        return inputs
 
-    def joint(self, states: FloatArray) -> FloatArray:
-        """Return the inputs ``(..., n_joint)`` of all: what agents of a group share stands once."""
-        scaled = self._scaled(states)
-        lead = scaled.shape[:-2]
-        of_agents = scaled[..., self._own].reshape(*lead, -1)
-        of_groups = scaled[..., self._firsts, :][..., ~self._own].reshape(*lead, -1)
-        return np.concatenate([of_agents, of_groups], axis=-1)
-
-    def _scaled(self, states: FloatArray) -> FloatArray:
-        place = (states - self._low) / self._span
-        linear = np.clip(2.0 * place - 1.0, -FARTHEST, FARTHEST)
-        angles = 2.0 * np.pi * place[..., self._periodic]
-        columns = np.where(self._periodic, np.sin(2.0 * np.pi * place), linear)
-        return np.concatenate([columns, np.cos(angles)], axis=-1)
-
-
-class RewardScale:
-    """Divides rewards by the standard deviation of the discounted return so far.
-
-    Parameters
-    ----------
-    discount
-        Of the return.
-    n
-        Number of rewards at every step.
-    """
-
-    def __init__(self, discount: float, n: int) -> None:
-        self._discount = discount
-        self._returns: FloatArray = np.zeros(n)
-        self._count = 1e-4
-        self._mean = 0.0
-        self._squares = 1e-4
-
-    def scaled(self, rewards: FloatArray) -> FloatArray:
-        """Take in the rewards ``(n,)`` of a step, and return them scaled, cut at 10."""
-        self._returns = self._discount * self._returns + rewards
-        for value in self._returns:  # Welford's recursion
-            self._count += 1.0
-            before = value - self._mean
-            self._mean += before / self._count
-            self._squares += before * (value - self._mean)
-        return np.clip(rewards / np.sqrt(self._squares / self._count), -10.0, 10.0)
-
-    def end_episode(self) -> None:
-        """Begin the return anew."""
-        self._returns[:] = 0.0
-
-    def memory(self) -> Memory:
-        """Return what it remembers."""
-        return {
-            "returns": self._returns,
-            "moments": np.array([self._count, self._mean, self._squares]),
-        }
-
-    def restore(self, memory: Mapping[str, AnyArray]) -> None:
-        """Continue from what `memory` returned, or from that of other agents between episodes."""
-        if memory["returns"].shape == self._returns.shape:
-            self._returns = memory["returns"].copy()
-        self._count, self._mean, self._squares = memory["moments"].tolist()
+    def joint(self, own: FloatArray) -> FloatArray:
+        """Return the inputs ``(..., len(joint_names))`` of all, given those ``own`` returns."""
+        return own.reshape(*own.shape[:-2], -1).take(self._joint, axis=-1)

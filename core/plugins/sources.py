@@ -25,9 +25,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from .compiled import compiled_name
 from .printing import printable
 from .syntax import imported, tree_text
-from .trust import is_trusted, module_text, sha256, trust
+from .trust import is_trusted, module_text, place_of, sha256, trust
 
 ZIPPED = b"PK"
 """With what such a file begins."""
@@ -35,21 +36,10 @@ FOLDER = "sources"
 """Where a study keeps copies, below its own directory."""
 MOST_BYTES = 1_000_000
 """Of a file; a larger one is no program."""
-ANSWERS = "answers.db"
-"""Where a study keeps what functions have answered, see `core.functions.recorded`."""
 TEAMS = ".npz"
 """Suffix of files that hold what a team remembers; as text they are kept in base 64."""
 GRAPHS = (".graphml", ".json", ".toml")
 """Suffixes of files that hold a hierarchy."""
-
-
-class Answers(NamedTuple):
-    """Where a study keeps what functions of users have answered."""
-
-    path: Path
-    """The file."""
-    calls: bool = True
-    """Whether they may be called for answers that are missing."""
 
 
 class Checkpoints(NamedTuple):
@@ -85,8 +75,6 @@ class Sources:
 
     Attributes
     ----------
-    answers
-        Where functions' answers are kept; none: nowhere.
     checkpoints
         Where trials put down what they have come to; none: nowhere.
 
@@ -107,15 +95,12 @@ class Sources:
         brought_by: str | None = None,
     ) -> None:
         self.folder = folder
-        self.answers: Answers | None = None
         self.checkpoints: Checkpoints | None = None
         self._texts = dict(texts or {})
         self._studies = [place for place in (study, folder) if place is not None]
         self._brought = dict.fromkeys(self._texts, brought_by) if brought_by else {}
         self._brought_by = brought_by
         self._was_sent = False
-        self._copies: dict[Path, str] = {}
-        """Which file each copy of a study is of, by path."""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sources) and self._texts == other._texts
@@ -125,7 +110,7 @@ class Sources:
 
     def __getstate__(self) -> dict[str, Any]:
         # Of what was sent to a worker all that is known is that its sender has run it.
-        own = {"_was_sent": True, "answers": self.answers, "checkpoints": self.checkpoints}
+        own = {"_was_sent": True, "checkpoints": self.checkpoints}
         return {**vars(Sources(None, self._texts)), **own}
 
     @property
@@ -138,7 +123,6 @@ class Sources:
         sources = Sources(None, {name: self.text(name) for name in sorted(names)})
         sources._brought = {name: by for name, by in self._brought.items() if name in names}
         sources._brought_by = self._brought_by
-        sources.answers = self.answers
         return sources
 
     def text(self, name: str) -> str:
@@ -231,8 +215,7 @@ class Sources:
         path = self.folder / name
         if not path.exists():
             for study in self._studies:
-                copy = self._copy(study / FOLDER, name)
-                if copy is not None:
+                if (copy := study / FOLDER / kept_name(name)).exists():
                     path = copy
                     self._brought[name] = str(study)
                     break
@@ -250,28 +233,13 @@ class Sources:
         except UnicodeDecodeError:
             raise ValueError(f"{name}: is not UTF-8 text") from None
         for other in imported(text) - {"nested_agents"} if name.endswith(".py") else ():
-            if any(
-                (path.parent / place).exists() for place in (f"{other}.py", f"{other}/__init__.py")
-            ):
+            beside = [path.parent / f"{other}.py", path.parent / other / "__init__.py"]
+            if any(map(Path.exists, beside)) and place_of(other) in (None, *map(str, beside)):
                 raise ValueError(
                     f"{name}: imports {other}, which stands beside it; a study keeps single files: "
                     "put both in one, or install what is shared as a package"
                 )
         return text
-
-    def _copy(self, folder: Path, name: str) -> Path | None:
-        """Return a study's copy of a file; None if it has none."""
-        for copy in (folder / kept_name(name), folder / former_kept_name(name)):
-            if copy.exists():
-                other = self._copies.setdefault(copy, name)
-                if other == name:
-                    return copy
-                raise ValueError(
-                    f"{name}: the copy {copy.name} in {folder} is that of {other}, or of both: "
-                    "version 0.3 kept but one of them; put the file back where the spec looks for "
-                    "it"
-                )
-        return None
 
     def _module(self, name: str) -> ModuleType:
         text = self.text(name)
@@ -287,13 +255,13 @@ class Sources:
             trust(text)
         module = ModuleType(key)
         path = None if self.folder is None else self.folder / name
-        # Compiled code can be cached beside a file that exists.
         module.__file__ = str(path.resolve()) if path is not None and path.exists() else name
         module.__dict__["__source_name__"] = name
-        linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
+        file = compiled_name(module.__file__, text)
+        linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
         sys.modules[key] = module  # dataclasses look their own module up
         try:
-            exec(compile(text, module.__file__, "exec"), module.__dict__)
+            exec(compile(text, file, "exec"), module.__dict__)
         except (Exception, SystemExit) as error:
             del sys.modules[key]
             raise ValueError(f"{name} cannot be run: {format_error(error)}") from None
@@ -376,17 +344,6 @@ def kept_name(name: str) -> str:
     flat = quoted.replace("/", "__")
     # File systems take names of up to 255 bytes.
     return flat if len(flat.encode()) <= 200 else f"{sha256(name)}{flat[-30:]}"
-
-
-def former_kept_name(name: str) -> str:
-    """Return the name of a study's copy of a file in version 0.3: not always its own.
-
-    Examples
-    --------
-    >>> former_kept_name("arms/arm.py") == former_kept_name("arms__arm.py")
-    True
-    """
-    return name.replace("\\", "/").replace("/", "__")
 
 
 @cache

@@ -62,11 +62,11 @@ def module_text(module: str) -> str:
 
     Nothing is imported for it.
     """
-    return f"module {module} of {_place_of(module.partition('.')[0])}"
+    return f"module {module} of {place_of(module.partition('.')[0])}"
 
 
-def _place_of(package: str) -> str | None:
-    """Return where a package or module at the top is; None if there is none."""
+def place_of(package: str) -> str | None:
+    """Return the path of a top-level package or module; None if there is none."""
     known = sys.modules.get(package)
     spec = None if known is None else known.__spec__
     try:

@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nested_agents as na
-from nested_agents.studies.presentation.figures import COLOURS
+from nested_agents.figures import COLOURS
 
 from grade import grade
 

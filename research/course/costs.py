@@ -18,8 +18,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import nested_agents as na
-from nested_agents.core.agents.cost import Problem, below_counts
-from nested_agents.studies.presentation.figures import COLOURS, STYLES
+from nested_agents.figures import COLOURS, STYLES
+from nested_agents.parts import Problem, below_counts
 
 from grade import grade
 

@@ -21,10 +21,8 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal, NoReturn
 
-from nested_agents.core.plugins.words import closest, show
-from nested_agents.studies.cli.main import run_to_status
-from nested_agents.studies.errors import SpecError
-from nested_agents.studies.presentation.tables import write_csv
+from nested_agents import SpecError
+from nested_agents.terminal import closest, run_to_status, show, write_csv
 
 from labs import LABS, Lab
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from nested_agents.core.agents.cost import Problem, below_counts
-from nested_agents.topologies import build
+from nested_agents import build_hierarchy as build
+from nested_agents.parts import Problem, below_counts
 
 from questions import Choice, Edges, Numeric, Question
 

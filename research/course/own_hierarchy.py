@@ -17,8 +17,8 @@ the chain of the paper, and against agents who see nobody.
 import matplotlib.pyplot as plt
 
 import nested_agents as na
-from nested_agents.core.agents.cost import Problem, below_counts
-from nested_agents.studies.presentation.figures import COLOURS
+from nested_agents.figures import COLOURS
+from nested_agents.parts import Problem, below_counts
 
 from grade import grade
 

@@ -12,8 +12,8 @@ from typing import Any, Protocol
 
 import networkx as nx
 
-from nested_agents.core.agents.cost import PAPER_ACTIONS, Problem, below_counts
-from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents import Hierarchy
+from nested_agents.parts import PAPER_ACTIONS, Problem, below_counts
 
 
 class Question(Protocol):

@@ -20,7 +20,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nested_agents as na
-from nested_agents.studies.presentation.figures import COLOURS, STYLES
+from nested_agents.figures import COLOURS, STYLES
 
 from grade import grade
 

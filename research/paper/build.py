@@ -12,12 +12,11 @@ from pathlib import Path
 import jinja2
 
 import nested_agents as na
-from nested_agents.research import ROWS, claims, push_n
-from nested_agents.research.studies.chain_order import order_tests
-from nested_agents.studies.presentation.tables import Cell
-from nested_agents.studies.results import published
-from nested_agents.studies.results.analysis import Summary
-from nested_agents.studies.results.notation import format_number
+from nested_agents import Summary
+from nested_agents.analysis import format_number
+from nested_agents.terminal import Cell
+from research import claims, load, push_n
+from research.studies.chain_order import order_tests
 
 FOLDER = Path(__file__).parent
 
@@ -25,7 +24,7 @@ FOLDER = Path(__file__).parent
 @cache
 def rows(name: str) -> na.StudyResults:
     """Return the committed results of a name."""
-    return na.load(ROWS / f"{name}.json")
+    return load(name)
 
 
 def cell(name: str, condition: str, column: str) -> str:
@@ -76,8 +75,7 @@ def orders() -> dict[str, str]:
 
 def verdicts() -> Counter[str]:
     """Return how many claims of the paper have each verdict."""
-    results = published.read(ROWS, claims.studies_of(claims.OWN))
-    findings = claims.judge({name: study.results for name, study in results.items()})
+    findings = claims.judge(claims.committed(claims.OWN))
     return Counter(finding.verdict for finding in findings)
 
 

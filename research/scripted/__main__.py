@@ -13,8 +13,8 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents import BoxPushingSettings
+from nested_agents.boxes import BOXES
 
 from .controller import decisions_to_goal
 

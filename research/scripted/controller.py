@@ -18,11 +18,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from nested_agents.core.numerics import FloatArray, IntArray, wrap
-from nested_agents.scenarios.box_pushing.driving import CLEARANCE, Drivers, paths
-from nested_agents.scenarios.box_pushing.prediction.push import push
-from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents import BoxPushing
+from nested_agents.boxes import CLEARANCE, Drivers, paths, push, wrap
 
+from .. import FloatArray, IntArray
 from .crowd import SLOT_GAP, Crowd
 from .sides import SPREAD, Side, behind, is_concave, sides_of
 

@@ -23,10 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from nested_agents.core.numerics import BoolArray, FloatArray, IntArray, wrap
-from nested_agents.scenarios.box_pushing.driving import CLEARANCE, Drivers, paths
-from nested_agents.scenarios.box_pushing.prediction.push import push
+from nested_agents.boxes import CLEARANCE, Drivers, paths, push, wrap
 
+from .. import BoolArray, FloatArray, IntArray
 from .sides import SPREAD, Side
 
 SLOT_GAP = 0.015

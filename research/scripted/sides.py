@@ -16,9 +16,7 @@ import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
-from nested_agents.scenarios.box_pushing.world.geometry import surface
-from nested_agents.scenarios.box_pushing.world.starts import approach
+from nested_agents.boxes import BoxSpec, approach, surface
 
 SPREAD = 0.55
 """Robots use this part of a side's half length."""

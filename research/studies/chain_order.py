@@ -16,13 +16,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...studies.catalogue import ablation
-from ...studies.catalogue.study import measure as measure
-from ...studies.results.analysis import Analysis, Figures, phases_of, select_shared
-from ...studies.results.contrasts import Group, contrasts
-from ...studies.results.notation import format_number, format_p
-from ...studies.results.results import Results
-from ...studies.results.statistics import LEVEL, Friedman, friedman, holm
+from nested_agents import Analysis, Study
+from nested_agents.analysis import (
+    LEVEL,
+    Figures,
+    Friedman,
+    Group,
+    Results,
+    compare_with_first,
+    contrasts,
+    format_number,
+    format_p,
+    friedman,
+    holm,
+    phases_of,
+    select_shared,
+)
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -39,7 +48,7 @@ def analyse(results: Results) -> Analysis:
         equal = map(equivalence, groups) if results.main.is_rate else ()  # `MARGIN` is of rates
         notes = (*equal, *by_order.notes)
         return Analysis(by_order.table, notes, (), {g.setting: g.differences for g in groups})
-    compared = ablation.compared_with_first(results, shorten_orders(conditions))
+    compared = compare_with_first(results, shorten_orders(conditions))
     tests = order_tests(results)
     notes = (*(test.verdict for test in tests), *compared.notes, *_legend(conditions))
     return replace(compared, notes=notes, cases=tests)
@@ -122,6 +131,14 @@ def _legend(orders: Sequence[str]) -> list[str]:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: what each order differs from the first one by."""
-    from ...studies.presentation.figures import draw_forest
+    from nested_agents.figures import draw_forest
 
     return draw_forest("chain-order", analysis.differences, "difference from the first order")
+
+
+class ChainOrderStudy(Study):
+    """Compares orders of the agents of a chain."""
+
+    PUBLISHED = PUBLISHED
+    analyse = staticmethod(analyse)
+    draw = staticmethod(draw)

@@ -9,17 +9,19 @@ that are optimal: if one play is evaluated, that of seeds that reach the optimum
 edges are compared with none, as in the study `hierarchies`.
 """
 
-from ...studies.catalogue.hierarchies import analysis_of
-from ...studies.catalogue.hierarchies.cases import HierarchyCase
-from ...studies.catalogue.study import check_evaluated, distinct
-from ...studies.errors import SpecError
-from ...studies.results.analysis import EVALUATED, Analysis, Figures
-from ...studies.results.results import Results, Sizes
-from ...studies.results.statistics import exactly, rate
-from ...studies.spec.spec import Spec
-from ...studies.spec.tables import label
-from ...studies.trials.session import Session
-from ...studies.trials.trial import Trial, TrialResult
+from nested_agents import Analysis, Session, Spec, SpecError, Study, rate
+from nested_agents.analysis import (
+    EVALUATED,
+    Figures,
+    HierarchyCase,
+    Results,
+    Sizes,
+    distinct,
+    exactly,
+    label,
+)
+from nested_agents.analysis import compare_hierarchies as analysis_of
+from nested_agents.study import Trial, TrialResult, check_evaluated
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -66,7 +68,7 @@ def analyse(results: Results) -> Analysis:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: success by edges, a panel for each game."""
-    from ...studies.presentation import figures as f  # matplotlib takes its time
+    from nested_agents import figures as f
 
     cases = analysis.cases
     games = distinct(case.setting for case in cases)
@@ -84,3 +86,13 @@ def draw(analysis: Analysis) -> Figures:
     f.name_rows(panels[0, 0], edges)
     figure.supxlabel(f"{EVALUATED}, bars: 95% intervals", fontsize=9)
     return {"fit": figure}
+
+
+class FitStudy(Study):
+    """Compares edges of a game."""
+
+    PUBLISHED = PUBLISHED
+    check = staticmethod(check)
+    measure = staticmethod(measure)
+    analyse = staticmethod(analyse)
+    draw = staticmethod(draw)

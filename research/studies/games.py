@@ -12,31 +12,26 @@ from itertools import product
 from string import ascii_uppercase
 from textwrap import wrap
 
-from ...scenarios.matrix_games.plays import whole_episode
-from ...studies.catalogue.study import check_evaluated as check
-from ...studies.catalogue.study import distinct, system_of
-from ...studies.errors import WIDTH
-from ...studies.results.analysis import Analysis, Case, Figures, Summary
-from ...studies.results.notation import format_number
-from ...studies.results.results import Results
-from ...studies.results.statistics import rate
-from ...studies.store.database import EVALUATION
-from ...studies.trials.session import Session
-from ...studies.trials.trial import Trial, TrialResult
+from nested_agents import Analysis, Session, Study, Summary, rate
+from nested_agents.analysis import Case, Figures, Results, distinct, format_number, system_of
+from nested_agents.study import Trial, TrialResult
+from nested_agents.study import check_evaluated as check
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
 TIMED = False
 """Trials are too short for their times to say anything."""
-AFTER_ONE = f"{EVALUATION}after one episode"
+AFTER_ONE = "evaluation:after one episode"
 """Phase of the evaluation after the first episode of training."""
+WIDTH = 80
+"""Width of a printed line [characters]."""
 COLUMNS = 3
 """Panels of the figure that stand beside each other."""
 
 
 def measure(trial: Trial) -> TrialResult:
     """Train, and evaluate after the first and the last episode; imported by name in workers."""
-    session = Session(trial, whole_episode)
+    session = Session(trial)
     session.train(1)
     with session.team.drawing_apart():
         session.evaluate(phase=AFTER_ONE)
@@ -100,7 +95,7 @@ def draw(analysis: Analysis) -> Figures:
     other, a colour and a marker for the rest of the setting; what is filled has been measured after
     all plays.
     """
-    from ...studies.presentation import figures as f  # matplotlib takes its time
+    from nested_agents import figures as f
 
     cases = analysis.cases
     systems = distinct(case.system for case in cases)
@@ -137,4 +132,12 @@ def draw(analysis: Analysis) -> Figures:
     return {"games": figure}
 
 
-__all__ = ["analyse", "check", "draw", "measure"]
+class GamesStudy(Study):
+    """Estimates how often learners find the optimum of a game."""
+
+    PUBLISHED = PUBLISHED
+    TIMED = TIMED
+    check = staticmethod(check)
+    measure = staticmethod(measure)
+    analyse = staticmethod(analyse)
+    draw = staticmethod(draw)

@@ -11,27 +11,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...studies.catalogue.experience import AFTER, evaluated_after
-from ...studies.catalogue.study import check_evaluated as check
-from ...studies.results.analysis import (
+from nested_agents import Analysis, Session, Study, Summary, bootstrap
+from nested_agents.analysis import (
+    AFTER,
+    CPU,
     EVALUATED,
-    Analysis,
-    Figures,
-    Summary,
-    estimate_of,
-    evaluated,
-    judged,
-)
-from ...studies.results.results import CPU, Results
-from ...studies.results.statistics import (
     NOT_NEGATIVE,
     Array,
     Estimate,
-    bootstrap,
+    Figures,
+    Results,
+    estimate_of,
+    evaluated,
+    evaluated_after,
+    judged,
     stack_estimates,
 )
-from ...studies.trials.session import Session
-from ...studies.trials.trial import Trial, TrialResult
+from nested_agents.study import Trial, TrialResult
+from nested_agents.study import check_evaluated as check
 
 CHECKPOINTS = (0.01, 0.03, 0.1, 0.3)
 """Shares of the episodes after which training stops for an evaluation, before the last one."""
@@ -121,7 +118,7 @@ def draw(analysis: Analysis) -> Figures:
     """
     from matplotlib.ticker import LogLocator
 
-    from ...studies.presentation import figures as f  # matplotlib takes its time
+    from nested_agents import figures as f
 
     courses = analysis.cases
     (title,) = analysis.differences
@@ -143,4 +140,10 @@ def draw(analysis: Analysis) -> Figures:
     return {"peers": figure}
 
 
-__all__ = ["analyse", "check", "draw", "measure"]
+class PeersStudy(Study):
+    """Compares learners after the same experience."""
+
+    check = staticmethod(check)
+    measure = staticmethod(measure)
+    analyse = staticmethod(analyse)
+    draw = staticmethod(draw)

@@ -17,26 +17,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...core.agents.fuzzy import FuzzyAgents
-from ...studies.catalogue.study import (
-    check_evaluated,
-    check_rule_bases,
-    distinct,
-    system_of,
-)
-from ...studies.results.analysis import (
+from nested_agents import Analysis, FuzzyAgents, Session, Spec, Study, Summary, bootstrap
+from nested_agents.analysis import (
     EVALUATED,
-    Analysis,
+    NOT_NEGATIVE,
     Case,
     Figures,
-    Summary,
+    Results,
+    distinct,
     evaluated,
+    system_of,
 )
-from ...studies.results.results import Results
-from ...studies.results.statistics import NOT_NEGATIVE, bootstrap
-from ...studies.spec.spec import Spec
-from ...studies.trials.session import Session
-from ...studies.trials.trial import Trial, TrialResult
+from nested_agents.study import Trial, TrialResult, check_evaluated, check_rule_bases
 
 COUNTS = ("messages", "formula", "counted")
 """Numbers of whole trials that the table shows as they are."""
@@ -126,7 +118,7 @@ def draw(analysis: Analysis) -> Figures:
     """
     from matplotlib.ticker import SymmetricalLogLocator  # matplotlib takes its time
 
-    from ...studies.presentation import figures as f
+    from nested_agents import figures as f
 
     cases = analysis.cases
     systems = distinct(case.system for case in cases)
@@ -156,3 +148,13 @@ def draw(analysis: Analysis) -> Figures:
     ]
     f.add_legend(figure, handles, ncols=5)
     return {"related": figure}
+
+
+class RelatedStudy(Study):
+    """Compares ways to coordinate agents, and their costs."""
+
+    NUMBERS = NUMBERS
+    check = staticmethod(check)
+    measure = staticmethod(measure)
+    analyse = staticmethod(analyse)
+    draw = staticmethod(draw)

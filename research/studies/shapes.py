@@ -8,22 +8,19 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 import numpy as np
 
-from ...studies.catalogue.study import check_evaluations
-from ...studies.catalogue.study import measure as measure
-from ...studies.results.analysis import (
+from nested_agents import Analysis, Spec, Study, Summary, bootstrap, rate
+from nested_agents.analysis import (
     EVALUATED,
-    Analysis,
     Difference,
     Figures,
-    Summary,
+    Results,
     adjust,
+    format_estimate,
+    format_p,
+    power_lines,
     ratio,
 )
-from ...studies.results.notation import format_estimate, format_p
-from ...studies.results.power import power_lines
-from ...studies.results.results import Results
-from ...studies.results.statistics import bootstrap, rate
-from ...studies.spec.spec import Spec
+from nested_agents.study import check_evaluations
 
 TRAINED = "trained on"
 """How the box of training is called among the others."""
@@ -78,7 +75,15 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figures of an analysis by name."""
-    from ...studies.presentation.figures import draw_forest
+    from nested_agents.figures import draw_forest
 
     unit = "success over that with the box of training"
     return draw_forest("shapes", dict(analysis.cases), unit, null=1.0)
+
+
+class ShapesStudy(Study):
+    """Compares boxes of other shapes than the one of training."""
+
+    check = staticmethod(check)
+    analyse = staticmethod(analyse)
+    draw = staticmethod(draw)

@@ -13,15 +13,9 @@ from nested_agents_signals.bayesian import Bayesian
 from nested_agents_signals.scenario import SignalsSettings
 from nested_agents_signals.theory import expected
 
-from ...studies.catalogue.study import check_evaluated, distinct
-from ...studies.errors import SpecError
-from ...studies.results.analysis import Analysis, Figures, Summary
-from ...studies.results.results import Results, Sizes
-from ...studies.results.statistics import Estimate, bootstrap, exactly
-from ...studies.spec.spec import Spec
-from ...studies.spec.tables import label_but
-from ...studies.trials.session import Session
-from ...studies.trials.trial import Trial, TrialResult
+from nested_agents import Analysis, Session, Spec, SpecError, Study, Summary, bootstrap
+from nested_agents.analysis import Estimate, Figures, Results, Sizes, distinct, exactly, label_but
+from nested_agents.study import Trial, TrialResult, check_evaluated
 
 SHARES = {"right": "share right", "last": "last right", "vote": "vote right"}
 """What is compared with theory: measures of an episode, and their titles."""
@@ -123,7 +117,7 @@ def _notes(cases: list[SignalsCase]) -> list[str]:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: shares by number of agents; in grey, what theory says."""
-    from ...studies.presentation import figures as f  # matplotlib takes its time
+    from nested_agents import figures as f
 
     cases = analysis.cases
     systems = distinct(case.system for case in cases)
@@ -144,3 +138,13 @@ def draw(analysis: Analysis) -> Figures:
         axes.set_xlabel(cases[0].sizes.word)
     f.name_lines(figure, systems, "means over seeds, bars: 95% intervals; grey: theory")
     return {"signals": figure}
+
+
+class SignalsStudy(Study):
+    """Compares told agents with theory."""
+
+    PUBLISHED = PUBLISHED
+    check = staticmethod(check)
+    measure = staticmethod(measure)
+    analyse = staticmethod(analyse)
+    draw = staticmethod(draw)

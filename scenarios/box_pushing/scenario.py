@@ -37,7 +37,7 @@ from .world.stepping import step_address
 from .world.world import TOUCHING, WheelFailures, World
 
 if TYPE_CHECKING:
-    from .pictures.policy import Policy
+    from .pictures.policy import BoxPolicyMap
 
 SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
@@ -255,7 +255,7 @@ class BoxPushing(Scenario, Embodiment):
         self,
         choose: Callable[[Prediction], IntArray],
         predict: Callable[[], Prediction | None],
-    ) -> Policy:
+    ) -> BoxPolicyMap:
         """Return what those do around the box who choose so; the scenario begins another episode.
 
         Raises

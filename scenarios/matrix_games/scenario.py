@@ -4,8 +4,7 @@ An agent's state is what it knows of the last play: the actions of all agents, i
 own alone, or its own and those of the agents listed before it. Membership functions stand at the
 actions, so that a rule base of full order is a table with one value for each of these combinations.
 
-Plays are independent: what a joint action leads to does not depend on where the game stands. That
-lets `nested_agents.scenarios.matrix_games.plays` run an episode in one compiled loop.
+Plays are independent: payoff and next state depend on the joint action alone.
 
 The games are those of Claus and Boutilier (1998) and of Kapetanakis and Kudenko (2002). All agents
 receive the same payoff, and must find the joint action of the greatest expected one. Actions are

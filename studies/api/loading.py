@@ -1,45 +1,51 @@
-"""Loads results: of kept studies, of published files, of tables of scores."""
+"""Loading of results: kept studies, exported files, and results of other tools."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import TypedDict, Unpack
 
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
-from ...core.plugins.words import expect, expect_each
-from ..errors import SpecError
-from ..results import foreign, published
+from ...core.plugins.words import closest, expect, expect_each
+from ..errors import SpecError, refused
+from ..results import exported, foreign, marl_eval, published
+from ..results.foreign import Better, ScoreColumns
+from ..results.json_values import JsonValue, parse
 from ..results.parts import join_parts
 from ..results.results import combine
+from ..results.score_files import SUFFIXES, ScoreTable, read_table, table_of
+from ..spec.outline import StudyOutline
 from ..spec.tables import TomlTable
+from ..store.durable import read_text
 from ..store.store import Store
 from .comparison import Comparison
-from .study import Place, StudyResults
+from .study import Defaults, Place, StudyResults
+
+Roles = Mapping[str, str | Sequence[str]]
+"""Column of a table by its role, see `ScoreColumns`."""
 
 
-def load(
-    *places: Place, columns: Sequence[str] = (), better: Literal["higher", "lower"] = "higher"
-) -> StudyResults:
+def load(*places: Place, columns: Sequence[str] = (), better: Better | None = None) -> StudyResults:
     """Return the results of a study that is kept in a directory, or of several together.
 
     Parameters
     ----------
     *places
-        Directories of studies; or single files that ``export --format json`` has written, or of the
-        form of marl-eval, as those of BenchMARL are; or tables of scores of others: CSV, JSON lines
-        or Parquet, see `nested_agents.studies.results.foreign`.
+        Directories of studies; single files that ``export`` has written; files of the form of
+        marl-eval, as BenchMARL and Mava write them, which are put together if no run is in two of
+        them; or tables of scores of other tools: CSV, JSON lines, JSON or Parquet, see
+        `nested_agents.studies.results.foreign`.
         Parts of one study, whose specs differ in their seeds alone, are put together. Conditions
         of several studies whose labels are equal get the name of their directory; the first study
         says how all of them are analysed.
     columns
-        Of tables of scores, which column is what: ``"condition=model,seed=run,score=accuracy"``; as
-        `compare_table` has them.
+        Roles of the columns of tables of scores: ``"condition=model,seed=run,score=accuracy"``. By
+        default a column has the role that it is called by.
     better
-        Which scores of tables are better.
+        Which scores of other tools are better, by default higher ones.
 
     Raises
     ------
@@ -53,45 +59,56 @@ def load(
     expect_each("pairs of a role and a column, ROLE=COLUMN", str, columns=columns)
     paths = [Path(place) for place in places]
     _check_distinct(paths)
-    is_table = [path.suffix in foreign.SUFFIXES for path in paths]
-    if columns and not any(is_table):
-        raise SpecError(f"columns: are of tables, {', '.join(foreign.SUFFIXES)}")
-    loaded = [
-        _load_table(path, columns, better) if table else _load_one(path)
-        for path, table in zip(paths, is_table, strict=True)
-    ]
-    return loaded[0] if len(loaded) == 1 else _merge(paths, loaded)
+    roles = foreign.parse_roles(columns)
+    opened = [_open(path) for path in paths]
+    if roles and not any(isinstance(own, ScoreTable) for own in opened):
+        raise SpecError(f"columns: are of tables, {', '.join(SUFFIXES)}")
+    if better is not None and all(isinstance(own, StudyResults) for own in opened):
+        raise SpecError("better: is of results of other tools; a study knows what is better")
+    loaded = _results_of(paths, opened, roles, better or "higher")
+    if len(loaded) == 1:
+        return next(iter(loaded.values()))
+    return _merge(list(loaded), list(loaded.values()))
+
+
+class RoleColumns(TypedDict, total=False):
+    """RoleColumns of a table of scores, by role; see `ScoreColumns`."""
+
+    condition: str | Sequence[str]
+    score: str | Sequence[str]
+    seed: str | None
+    item: str | None
+    step: str | None
 
 
 def compare_table(
     table: pd.DataFrame | Place,
     *,
-    condition: str | Sequence[str] = "condition",
-    score: str | Sequence[str] = "score",
-    seed: str | None = None,
-    item: str | None = None,
-    better: Literal["higher", "lower"] = "higher",
+    better: Better = "higher",
     by: str | None = None,
+    measure: str | None = None,
+    phase: str | None = None,
     reference: str | None = None,
+    **columns: Unpack[RoleColumns],
 ) -> Comparison:
-    """Compare conditions of which a table has the scores, whoever has made it.
+    """Compare conditions whose scores are in a table, by any tool.
+
+    The command ``compare`` does the same. Runs and items are paired by name; a table without seeds
+    and items holds independent samples.
 
     Parameters
     ----------
     table
-        A row for each score; or a file of it, CSV, JSON lines or Parquet.
-    condition
-        Column of what is compared; several are crossed.
-    score
-        Column of what is measured; of several the first is compared.
-    seed
-        Column of the runs on which conditions are compared; None: on the items.
-    item
-        Column of what each score was measured on: a question, a task.
+        A row for each score; or a file of it, CSV, JSON lines, JSON or Parquet.
     better
         Which scores are better.
-    by, reference
-        As in `StudyResults.compare`.
+    by, measure, phase, reference
+        As in `StudyResults.compare`. The reference is by default the first condition by name.
+    **columns
+        By role: `condition` is what is compared, and `score` what is measured (several conditions
+        are crossed, and of several scores the first is compared); `seed` names the run, `item` the
+        question or task, `step` the step of training. By default a column has the role that it is
+        called by, also the role ``phase``.
 
     Raises
     ------
@@ -110,31 +127,124 @@ def compare_table(
     -0.23
     """
     expect("a table of pandas or the path of a file", pd.DataFrame | str | PathLike, table=table)
+    condition, score = columns.get("condition", ()), columns.get("score", ())
     expect_each("names of columns", str, condition=condition, score=score)
-    frame = table if isinstance(table, pd.DataFrame) else foreign.read_table(Path(table))
-    names = foreign.ScoreColumns(_several(condition), _several(score), seed, item)
-    return _of_table(foreign.results_of(frame, names, better)).compare(by, reference=reference)
+    roles = _roles(columns)
+    if isinstance(table, pd.DataFrame):
+        results = _of_table(table_of(table), None, roles, better)
+    else:
+        path = Path(table)
+        results = _results_of([path], [_open(path)], roles, better)[path]
+    return results.compare(by, measure, phase=phase, reference=reference)
 
 
-def _several(names: str | Sequence[str]) -> tuple[str, ...]:
-    return (names,) if isinstance(names, str) else tuple(names)
+def _roles(columns: RoleColumns) -> Roles:
+    """Return the roles that are given; an unknown one is refused."""
+    known = RoleColumns.__annotations__
+    for role in columns:
+        if role not in known:
+            raise TypeError(f"compare_table: unknown argument {role!r}; {closest(role, known)}")
+    given = {role: columns.get(role) for role in known}
+    return {r: c for r, c in given.items() if isinstance(c, str | Sequence)}
 
 
-def _load_table(
-    path: Path, columns: Sequence[str], better: Literal["higher", "lower"]
-) -> StudyResults:
-    """Return the results of a file of scores; what is said of them names it."""
-    frame = foreign.read_table(path)
-    names = foreign.ScoreColumns.parse(columns, [str(name) for name in frame.columns])
+Opened = StudyResults | ScoreTable | list[marl_eval.AlgorithmRun]
+"""What a path holds: a study, a table, or runs of the form of marl-eval."""
+
+
+def _open(path: Path) -> Opened:
+    """Return what a path holds.
+
+    Raises
+    ------
+    SpecError
+        If it holds none of these.
+    """
+    if path.suffix in SUFFIXES and not path.is_dir():
+        return read_table(path)
+    if not path.is_file():
+        with Store.open(path) as store:
+            store.verify()
+            return StudyResults.of(store)
     try:
-        results = _of_table(foreign.results_of(frame, names, better))
-    except SpecError as error:
-        raise SpecError(f"{path}: {error}") from None
-    return replace(results, remarks=tuple(f"{path}: {line}" for line in results.remarks))
+        file = parse(read_text(path))
+        if isinstance(file.content, list):
+            return read_table(path)
+        if "results_version" not in file.table():
+            return marl_eval.runs_of(file)
+        return _of_published(path, file)
+    except SpecError:
+        raise
+    except (OSError, ValueError, RecursionError) as error:
+        raise SpecError(f"{path}: holds no published results: {error}") from None
 
 
-def _of_table(table: foreign.Foreign) -> StudyResults:
-    return StudyResults(table.outline, table.results, (), table.remarks)
+def _of_published(path: Path, file: JsonValue) -> StudyResults:
+    kept = published.read_file(file)
+    remarks = (f"{path}: {kept.note}",) if kept.note else ()
+    sources = Sources(path.parent, brought_by=str(path))
+    return StudyResults(kept.outline, kept.results, (), remarks, sources)
+
+
+def _results_of(
+    paths: Sequence[Path], opened: Sequence[Opened], roles: Roles, better: Better
+) -> dict[Path, StudyResults]:
+    """Return the results of what paths hold; runs of several files are put together."""
+    runs = {path: own for path, own in zip(paths, opened, strict=True) if isinstance(own, list)}
+    keys = [run.key for own in runs.values() for run in own]
+    if len(runs) > 1 and len({*keys}) == len(keys):
+        first = next(iter(runs))
+        runs = {first: [run for own in runs.values() for run in own]}
+    loaded: dict[Path, StudyResults] = {}
+    for path, own in zip(paths, opened, strict=True):
+        if isinstance(own, StudyResults):
+            loaded[path] = own
+        elif isinstance(own, ScoreTable):
+            loaded[path] = _of_table(own, path, roles, better)
+        elif path in runs:
+            loaded[path] = _of_runs(path, runs[path], better)
+    return loaded
+
+
+def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better) -> StudyResults:
+    """Return the results of a table of scores, or of an exported one; messages name its file."""
+    before = f"{path}: " if path else ""
+    measure = None
+    with refused(before):
+        if exported.is_exported(table) and roles.keys() <= {"score"}:
+            header = published.header_beside(path) if path else None
+            own = exported.results_of(table, header and header.description)
+            outline = header.outline if header else _outline(own.conditions)
+            results, notes = header.limited(own.results) if header else own.results, own.notes
+            measure = next(iter(map(str, roles.values())), None)
+        else:
+            columns = ScoreColumns.of(roles, table.columns)
+            outline, results, notes = foreign.results_of(table, columns, better)
+    remarks = tuple(f"{before}{line}" for line in notes)
+    return StudyResults(outline, results, (), remarks, _defaults=Defaults(measure))
+
+
+def _outline(conditions: Mapping[str, Mapping[str, object]]) -> StudyOutline:
+    """Return the outline of results whose spec is not known."""
+    table = {"study": "learning-curve", "seeds": 1, "episodes": 0, "steps": 0, "evaluation": 1}
+    return StudyOutline.noted(table, conditions)
+
+
+def _of_runs(path: Path, runs: Sequence[marl_eval.AlgorithmRun], better: Better) -> StudyResults:
+    """Return the results of runs of the form of marl-eval."""
+    header = published.header_beside(path)
+    known = header.columns if header else {}
+    names = {marl_eval.exported_name(condition) for condition in known}
+    is_exported = header is not None and {run.algorithm for run in runs} <= names
+    with refused(f"{path}: "):
+        if header is not None and is_exported:
+            own = marl_eval.results_of(runs, better, known, header.measures)
+            outline, results = header.outline, header.limited(own.results)
+        else:
+            own = marl_eval.results_of(runs, better)
+            outline, results = _outline(own.results.columns), own.results
+    remarks = tuple(f"{path}: {line}" for line in own.notes)
+    return StudyResults(outline, results, (), remarks, _defaults=Defaults(by=own.by))
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:
@@ -144,17 +254,6 @@ def _check_distinct(paths: Sequence[Path]) -> None:
         if path.resolve() in known:
             raise SpecError(f"{path}: is named more than once")
         known.add(path.resolve())
-
-
-def _load_one(path: Path) -> StudyResults:
-    if path.is_file():
-        kept = published.load(path)
-        remarks = (f"{path}: {kept.note}",) if kept.note else ()
-        sources = Sources(brought_by=str(path))
-        return StudyResults(kept.outline, kept.results, (), remarks, sources)
-    with Store.open(path) as store:
-        store.verify()
-        return StudyResults.of(store)
 
 
 def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResults:

@@ -25,6 +25,7 @@ from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
 from ..results.laws import FEWEST
+from ..results.notation import format_number
 from ..results.power import SMALLEST, USUAL_DEVIATION, exponent_text, planned_text
 from ..results.scaling_law import size_key
 from ..spec.controls import LEARN_NOTHING
@@ -124,7 +125,7 @@ class Plan:
             yield f"time     about {duration(self.seconds)} with {processes} ({lower} to {upper}),"
             yield "         extrapolated from pilot episodes"
         if self.memory:
-            yield f"memory   about {self.memory / 1e9:.1f} GB with {processes}"
+            yield f"memory   about {format_number(self.memory / 1e9)} GB with {processes}"
         if any(cost.decision for cost in self.costs.values()):
             yield from self._decision_costs()
         if self.comparisons:

@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ...core.numerics import pd
-from ...core.plugins.sources import ANSWERS, Answers, Sources
+from ...core.plugins.sources import Sources
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..presentation.progress import Terminal
@@ -75,7 +75,6 @@ def reevaluate(
         check_teams(store, {*identities.values()})
         table = {**store.spec(), "evaluations": _entries(topology, decision), "keep_teams": False}
         sources = Sources(Path(), store.sources(), brought_by=str(directory))
-        sources.answers = Answers(directory / ANSWERS)
     spec = Spec.of(table, sources)
     if spec.evaluation < 1:
         raise SpecError("evaluation = 0: reevaluate needs a study of 1 or more")

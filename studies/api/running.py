@@ -12,9 +12,8 @@ from math import inf
 from os import PathLike
 from pathlib import Path
 
-from ...core.functions.recorded import AnswersError, RecordedAnswers
 from ...core.interface.measures import Measure
-from ...core.plugins.sources import ANSWERS, Answers, Checkpoints, is_reference
+from ...core.plugins.sources import Checkpoints, is_reference
 from ...core.plugins.words import expect
 from ..catalogue.study import load_study, measure_by_name
 from ..errors import SpecError
@@ -47,8 +46,6 @@ def run_study(
     accept_code: bool = False,
     observer: Observer | None = None,
     chosen: Sequence[Trial] = (),
-    answers: Path | None = None,
-    calls: bool = True,
     checkpoint: float = CHECKPOINT,
 ) -> Iterator[Store]:
     """Run what is left of a study; then its store is open for as long as the context lasts.
@@ -69,11 +66,6 @@ def run_study(
         Who is notified of progress; None: nobody.
     chosen
         Those of its trials that are run; none named: all.
-    answers
-        A file of recorded answers of functions, which are taken over to begin with; none: only the
-        study's own.
-    calls
-        Whether functions whose answers are recorded may be called for those that are missing.
     checkpoint
         How often a trial puts down what it has come to, so that it goes on from there if it is
         killed [s]; 0: never.
@@ -92,7 +84,6 @@ def run_study(
     """
     observer = observer or Observer()
     measures = examine(spec, may_fail=True)
-    spec.sources.answers = Answers(directory.resolve() / ANSWERS, calls)
     trials = chosen or trials_of(spec)
     check_workers(backend, jobs, address)
     if not 0.0 <= checkpoint < inf:
@@ -103,8 +94,6 @@ def run_study(
         workers = None if address is None else stack.enter_context(start(len(trials)))
         opened = open_to_run(directory, spec, trials, measures, accept_code=accept_code)
         store = stack.enter_context(opened)
-        if answers is not None:
-            observer.note(merge_answers(directory, answers))
         if retry_failed:
             store.forget_failed()
         if checkpoint:
@@ -151,23 +140,6 @@ def _checkpoints(store: Store, seconds: float, observer: Observer) -> Iterator[C
             folder.rmdir()
 
 
-def merge_answers(directory: Path, other: Path) -> str:
-    """Take over the recorded answers of another study, or file, and return what came of it.
-
-    Raises
-    ------
-    SpecError
-        If they cannot be read; one line.
-    """
-    other = other / ANSWERS if other.is_dir() else other
-    try:
-        merged = RecordedAnswers(directory.resolve() / ANSWERS).merge(other)
-    except AnswersError as error:
-        raise SpecError(f"--answers {error}") from None
-    differing = f", {merged.other} of them otherwise, which is left out" if merged.other else ""
-    return f"answers: {merged.added} of {other}, {merged.known} were known{differing}"
-
-
 def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
     """Return what a study measures of its episodes, if it can be run; see `check_conditions`.
 
@@ -194,8 +166,6 @@ def run(
     accept_code: bool = False,
     progress: bool = True,
     observer: Observer | None = None,
-    answers: Place | None = None,
-    calls: bool = True,
     checkpoint: float = CHECKPOINT,
 ) -> StudyResults:
     """Run what is left of a study and return its results; the same call again continues it.
@@ -207,7 +177,7 @@ def run(
     out
         Where the study is kept; made if it does not exist. Every trial is kept the moment it
         finishes.
-    jobs, backend, address, retry_failed, accept_code, answers, calls, checkpoint
+    jobs, backend, address, retry_failed, accept_code, checkpoint
         As those of `run_study`.
     progress
         Whether to show how it goes.
@@ -237,8 +207,6 @@ def run(
         retry_failed=retry_failed,
         accept_code=accept_code,
         observer=listener,
-        answers=None if answers is None else Path(answers),
-        calls=calls,
         checkpoint=checkpoint,
     ) as store:
         study = StudyResults.of(store)

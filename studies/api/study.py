@@ -22,7 +22,7 @@ from html import escape
 from itertools import chain
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...core.interface.measures import RETURN, SUCCESS
 from ...core.numerics import pd
@@ -30,7 +30,7 @@ from ...core.plugins.sources import Sources
 from ...core.plugins.words import closest
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
-from ..presentation.headlines import headlines
+from ..presentation.headlines import below_random, headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.choices import choose_trials
 from ..results.contrasts import contrasts, power_with_first
@@ -56,6 +56,13 @@ Place = str | PathLike[str]
 """Of a directory or a file."""
 
 
+class Defaults(NamedTuple):
+    """What `StudyResults.compare` compares unless it is told otherwise."""
+
+    measure: str | None = None
+    by: str | None = None
+
+
 @dataclass(frozen=True)
 class StudyResults:
     """What the finished trials of a study measured, or those of several studies together.
@@ -75,6 +82,7 @@ class StudyResults:
     _settings: Mapping[str, TomlTable] = field(default_factory=dict, repr=False)
     _directories: tuple[Path, ...] = ()
     _is_whole: bool = True
+    _defaults: Defaults = field(default_factory=Defaults)
 
     @classmethod
     def of(cls, store: Store) -> StudyResults:
@@ -129,9 +137,9 @@ class StudyResults:
 
     @property
     def _of_controls(self) -> tuple[str, ...]:
-        """What must be said of controls, in lines, see `nested_agents.studies.spec.controls`."""
+        """Remarks on controls, and on learners that are below them, in lines."""
         there = {c: self._settings[c] for c in self.conditions if c in self._settings}
-        return control_lines(there)
+        return (*control_lines(there), *below_random(self.results, there))
 
     @property
     def unlearned(self) -> tuple[str, ...]:
@@ -192,10 +200,11 @@ class StudyResults:
         SpecError
             If there is no such key, measure, phase or reference.
         """
+        by = by or self._defaults.by
         key = None if by == "condition" else by
-        name = self.results.main.name if measure is None else measure
+        name = measure or self._defaults.measure or self.results.main.name
         compared = contrasts(self.results, name, phase, key, reference)
-        return Comparison(compared, self._of_controls)
+        return Comparison(compared, (*self._of_controls, *self.remarks))
 
     def where(self, choice: str) -> StudyResults:
         """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `chosen`."""

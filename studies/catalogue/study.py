@@ -1,11 +1,7 @@
-"""What a study is: a measure of one trial, an analysis of all, and figures of the analysis.
+"""Studies: the measurement of one trial, the analysis of all trials, and its figures.
 
-A study is a module, or a class, that offers these, and one line in `STUDIES`
-or ``study = "mine.py:Mine"`` in a spec. It may also offer ``check(spec)``, which raises `SpecError`
-if the spec has not what it needs; and ``NUMBERS``, names of the numbers of whole trials that its
-analysis rests on, so that trials of other studies that lack them are refused; ``PUBLISHED``, names
-of the measures of an episode that its published results keep, all unless it says so; and ``TIMED``,
-False if its trials are too short for their times to say anything.
+A spec names a study of the catalog, ``study = "scaling"``, or a class of a file,
+``study = "mine.py:Mine"``, which inherits `Study` or offers the same attributes.
 """
 
 from __future__ import annotations
@@ -28,18 +24,53 @@ T = TypeVar("T")
 
 
 PARTS = ("measure", "analyse", "draw")
-"""What every study offers."""
+"""Attributes that every study needs."""
 OPTIONS = {"check": "check", "NUMBERS": "numbers", "PUBLISHED": "published", "TIMED": "timed"}
-"""What it may offer beside, and the attribute of `Study` that this becomes."""
+"""Optional attributes, and the field of `LoadedStudy` for each."""
 
 
 def accept(spec: Spec) -> None:
-    """Take any spec, as studies do that have no ``check``."""
+    """Accept any spec."""
+
+
+class Study:
+    """Base class of studies.
+
+    A subclass defines ``analyse(results)``, which returns the `Analysis` of finished trials;
+    everything else has a default.
+
+    Examples
+    --------
+    >>> class Mine(Study):
+    ...     def analyse(self, results):
+    ...         return Analysis(())
+    >>> Mine().draw(Mine().analyse(None))
+    {}
+    """
+
+    NUMBERS: Sequence[str] = ()
+    """Numbers of whole trials that the analysis needs. Trials of other studies without them are
+    refused."""
+    PUBLISHED: Sequence[str] | None = None
+    """Measures of an episode that published results keep; None: all."""
+    TIMED: bool = True
+    """False if trials are too short for their times to be meaningful."""
+
+    def check(self, spec: Spec) -> None:
+        """Raise `SpecError` unless the spec has what the study needs."""
+
+    def measure(self, trial: Trial) -> TrialResult:
+        """Run one trial; called by name in worker processes."""
+        return measure(trial)
+
+    def draw(self, analysis: Analysis) -> Figures:
+        """Return the figures of an analysis by name."""
+        return {}
 
 
 @dataclass(frozen=True)
-class Study:
-    """What a study's module or class offers, see the head of this file."""
+class LoadedStudy:
+    """The attributes of a study, with defaults for those that it lacks."""
 
     measure: Callable[[Trial], TrialResult]
     """Runs one trial; imported by name in worker processes."""
@@ -49,16 +80,16 @@ class Study:
     draw: Callable[[Any], Figures]
     """Returns the figures of an analysis by name."""
     check: Callable[[Spec], None] = accept
-    """Raises `SpecError` if the spec has not what the study needs."""
+    """Raises `SpecError` unless the spec has what the study needs."""
     numbers: Sequence[str] = ()
-    """Names of the numbers of whole trials that the analysis rests on."""
+    """Names of the numbers of whole trials that the analysis needs."""
     published: Sequence[str] | None = None
     """Names of the measures of an episode that published results keep; None: all."""
     timed: bool = True
-    """Whether trials are long enough for their times to say anything."""
+    """Whether trials are long enough for their times to be meaningful."""
 
 
-def load_study(name: str) -> Study:
+def load_study(name: str) -> LoadedStudy:
     """Return the study of a name in `STUDIES`, or of a user's file.
 
     Raises
@@ -74,7 +105,7 @@ def load_study(name: str) -> Study:
     source = entry() if isinstance(entry, type) else entry
     names = OPTIONS | {part: part for part in PARTS}
     known = {own: offered(source, part, MISSING) for part, own in names.items()}
-    return Study(**{own: part for own, part in known.items() if part is not MISSING})
+    return LoadedStudy(**{own: part for own, part in known.items() if part is not MISSING})
 
 
 def notes_of(analysis: Any) -> tuple[str, ...]:
@@ -179,7 +210,7 @@ def system_of(results: Results, condition: str) -> tuple[str, dict[str, object]]
     return name, {key: value for key, value in columns.items() if value != ""}
 
 
-def draw_figures(study: Study, analysis: Any) -> Figures:
+def draw_figures(study: LoadedStudy, analysis: Any) -> Figures:
     """Return the figures of an analysis by name, as all figures look; none of an empty table."""
     from ..presentation.figures import apply_style, spell_dollars  # matplotlib takes its time
 

@@ -116,6 +116,7 @@ def show_results(
     from ...topologies.builders import join_names
     from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
     from ..presentation.progress import count, say
+    from ..spec.controls import TROUBLESHOOTING
 
     directory = study.directory
     print_study(study)
@@ -127,7 +128,7 @@ def show_results(
         names = join_names(study.unlearned, 3)
         print_wrapped(
             f"{names}: no better than frozen weights in evaluation. What to try, and in which "
-            f"order: docs/not_learned.md; {command_line('tune')} tries it for you.",
+            f"order: {TROUBLESHOOTING}; {command_line('tune')} tries it for you.",
             first="hint    ",
             indent=8,
         )

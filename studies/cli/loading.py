@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from ...core.plugins.sources import Sources, files_in
+from ...core.plugins.sources import Sources, files_in, is_file, is_reference, split
 from ...core.plugins.trust import is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
+from ...topologies.files import read_file
+from ..errors import refused
 from ..presentation.progress import say
 from ..spec.outline import other_spec
 from ..store.database import DATABASE, SPEC_FILE
@@ -31,24 +33,35 @@ def open_study(directory: Path) -> Iterator[Store]:
 
 
 def load_results(
+    sources: Sequence[Path], *, study: str | None = None, where: str | None = None, trust: bool
+) -> StudyResults:
+    """Return the results at some places, as a study analyses them, and print their remarks."""
+    results = read_results(sources, where=where, trust=trust)
+    say_remarks(results)
+    return results if study is None else results.as_study(study)
+
+
+def read_results(
     sources: Sequence[Path],
     *,
-    study: str | None = None,
-    where: str | None = None,
+    where: str | None,
     trust: bool,
     columns: Sequence[str] = (),
-    better: Literal["higher", "lower"] = "higher",
+    better: Literal["higher", "lower"] | None = None,
 ) -> StudyResults:
-    """Return the results at some places, as a study analyses them, or a choice of the trials."""
+    """Return the results at some places, or a choice of their trials."""
     from ..api.loading import load
 
     if trust:
         trust_files(*sources)
     results = load(*sources, columns=columns, better=better)
+    return results if where is None else results.where(where)
+
+
+def say_remarks(results: StudyResults) -> None:
+    """Print the remarks on results, apart from what other programs read."""
     for remark in results.remarks:
         say(remark)
-    results = results if where is None else results.where(where)
-    return results if study is None else results.as_study(study)
 
 
 def trust_files(*sources: Path) -> None:
@@ -89,7 +102,7 @@ def untrusted(source: Path) -> dict[str, str]:
     """Return the code of others that a study brings along or names, by what it is.
 
     These are the Python files that are kept with it, and modules by name; those of a file of
-    results are named in its spec.
+    results are named in its spec. Of the files that such a spec names, only the study's is run.
     """
     files: dict[str, str] = {}
     if source.is_dir():
@@ -97,15 +110,26 @@ def untrusted(source: Path) -> dict[str, str]:
             files = store.sources()
             tables: object = [store.spec(), *store.settings().values()]
     else:
-        from ..results import published  # pandas takes its time
+        from ..api.loading import load  # pandas takes its time
 
-        tables = published.load(source).outline.table
+        outline = load(source).outline
+        tables = outline.table
+        if is_reference(outline.study):
+            name = split(outline.study)[0]
+            with refused(f"{source}: study: "):
+                files = {name: Sources(source.parent).text(name)}
     return _untrusted(source, files, tables)
 
 
 def _untrusted(source: Path, files: Mapping[str, str], tables: object) -> dict[str, str]:
-    """Return what is not trusted of files, and of the modules that tables name."""
+    """Return untrusted files, and untrusted modules that tables and files of hierarchies name."""
     texts = {f"{n}, which came with {source},": t for n, t in files.items() if n.endswith(".py")}
-    modules = {module for module, _ in modules_in(tables)}
+
+    contents: list[object] = []
+    with Sources(None, files).active():
+        for name in filter(is_file, files):
+            with suppress(ValueError):  # reported when the hierarchy is built
+                contents.append(read_file(name))
+    modules = {module for module, _ in modules_in([tables, contents])}
     texts |= {f"{name}, which {source} names,": module_text(name) for name in sorted(modules)}
     return {title: text for title, text in texts.items() if not is_trusted(text)}

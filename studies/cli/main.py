@@ -12,7 +12,6 @@ import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from io import TextIOWrapper
-from pathlib import Path
 
 import click
 
@@ -31,10 +30,6 @@ REFUSING = ("strict", "surrogateescape")
 LEAST_ADDRESSES = 10**9
 """Of the process [bytes]: with less, libraries of linear algebra crash or wait for ever."""
 
-PUBLISHED = "...research.commands"
-"""Module of the commands on what has been published."""
-RESULTS = Path(__file__).parents[2] / "research"
-"""Where that is in a checkout; an installed package does not have it."""
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Run": {
         "demo": (".commands.running", "Train two robots to push a box: table, figures, report."),
@@ -59,14 +54,8 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "schema": (".commands.describing", "Write the JSON schema of specs, for editors."),
         "topology": (".commands.describing", "List the topologies, or show one of them."),
         "check": (".commands.checking", "Check that scenarios satisfy their interface."),
-        "combine": (".commands.describing", "Try every learner with every part of a condition."),
         "cost": (".commands.describing", "Print the cost of hierarchies, by formula or measured."),
         "profile": (".commands.describing", "Show the time of a decision, part by part."),
-    },
-    "Published results": {
-        "atlas": (PUBLISHED, "Print what small teams tell of large ones, task by task."),
-        "benchmark": (PUBLISHED, "Enter a learner in the benchmark push-n, and compare entries."),
-        "claims": (PUBLISHED, "Print the claims of the paper and the verdict on each."),
     },
 }
 """Groups of commands as `--help` shows them: the module of each command, imported on first use,
@@ -74,12 +63,9 @@ and its summary."""
 COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
 
 
-def load_command(name: str) -> click.Command | None:
-    """Return one of `COMMANDS`; None if the repository has it, and this is an installed package."""
-    place = COMMANDS[name][0]
-    if place == PUBLISHED and not RESULTS.is_dir():
-        return None
-    command = vars(import_module(place, __package__))[name]
+def load_command(name: str) -> click.Command:
+    """Return one of `COMMANDS`."""
+    command = vars(import_module(COMMANDS[name][0], __package__))[name]
     assert isinstance(command, click.Command)
     return command
 
@@ -98,11 +84,6 @@ class _Commands(click.Group):
     ) -> tuple[str, click.Command, list[str]]:
         _check_address_space()
         command = self.get_command(ctx, args[0])
-        if command is None and args[0] in COMMANDS:
-            raise SpecError(
-                f"{args[0]}: is a command on published results, which are in the repository, in "
-                "research/, not in the installed package"
-            )
         if command is None:
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
         parts = command.commands if isinstance(command, click.Group) else {}
@@ -132,13 +113,25 @@ def nested_agents() -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
-    # SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
+    warnings.formatwarning = _format_warning
+    # `core.fonts` says it in one line for all characters of a figure.
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     warnings.filterwarnings("ignore", message=r".*joblib will operate in serial mode")  # never used
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors in REFUSING:
             stream.reconfigure(errors=IN_ASCII)
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
+
+
+def _format_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    line: str | None = None,
+) -> str:
+    """Return a warning in one line, without the place in the code that raises it."""
+    return printable(f"{PROGRAM}: warning: {' '.join(str(message).split())}\n")
 
 
 def _check_address_space() -> None:

@@ -130,37 +130,13 @@ def running(command: Callable[..., int]) -> Callable[..., int]:
     return jobs(_backend(_address(_accept_code(command))))
 
 
-class AnswerOptions(TypedDict):
-    """The options of recorded answers and checkpoints."""
-
-    answers: Path | None
-    calls: bool
-    checkpoint: float
-
-
-def recorded(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options of recorded answers and checkpoints, see `AnswerOptions`."""
-    checkpoint = number(
-        "--checkpoint",
-        "SECONDS",
-        300.0,
-        "How often a trial puts down what it has come to, so that it goes on from there, to the "
-        "same rows, if it is killed; 0: never.",
-    )
-    answers = click.option(
-        "--answers",
-        type=PATH,
-        metavar="DIR|FILE",
-        help="Take over recorded answers of functions: of another study, or a file answers.db.",
-    )
-    calls = click.option(
-        "--calls/--no-calls",
-        default=True,
-        help="Whether functions may be called for answers that are not recorded; if not, a trial "
-        "that lacks one fails.",
-    )
-    return answers(calls(checkpoint(command)))
-
+checkpoint = number(
+    "--checkpoint",
+    "SECONDS",
+    300.0,
+    "Interval at which a running trial saves its state, so that it resumes after an interruption "
+    "to the same results; 0: never.",
+)
 
 trust = flag(
     "--trust",

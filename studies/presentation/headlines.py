@@ -5,10 +5,16 @@ from typing import Any
 
 from ..results.analysis import Difference, estimate_of
 from ..results.contrasts import contrasts
-from ..results.notation import format_estimate
+from ..results.notation import format_estimate, wrapped
 from ..results.results import Results
 from ..results.statistics import LEVEL
-from ..spec.controls import LEARN_NOTHING, control_of, is_drawn
+from ..spec.controls import (
+    LEARN_NOTHING,
+    TROUBLESHOOTING,
+    control_of,
+    is_drawn,
+    random_control,
+)
 from .progress import count
 
 MOST = 3
@@ -41,6 +47,32 @@ def headlines(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tu
         if len(measured) == 2:
             sentences.append(_sentence(results, team, measured[1], there))
     return tuple(sentences)
+
+
+def below_random(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
+    """Return a remark on the learners whose evaluation ends below that of random actions, in lines.
+
+    Learners are judged by the means of `Results.main`, beside the random control of their scenario.
+    """
+    main = results.main
+    there = {c: settings[c] for c in results.of_phase("evaluation") if c in settings}
+    known = {c: own for c, own in there.items() if results.has(c, "evaluation", main.name)}
+    sign = -1.0 if main.better == "lower" else 1.0
+    below: dict[str, str] = {}
+    for condition, own in known.items():
+        control = random_control(condition, known)
+        if own["learner"]["kind"] not in LEARN_NOTHING and control is not None:
+            means = [results.means(c, "evaluation", main.name).mean() for c in (condition, control)]
+            if sign * (means[0] - means[1]) < 0.0:
+                below[condition] = control
+    if not below:
+        return ()
+    shown = [f"{c} {_evaluated(results, c)}" for c in [*below][:MOST]]
+    if len(below) > MOST:
+        shown.append(f"{len(below) - MOST} more")
+    controls = [f"{c} {_evaluated(results, c)}" for c in dict.fromkeys(below.values())]
+    text = f"Below random actions in evaluation {main.heading}: {'; '.join(shown)}; "
+    return tuple(wrapped(f"{text}{'; '.join(controls)}. What to try: {TROUBLESHOOTING}"))
 
 
 def _sentence(

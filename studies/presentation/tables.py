@@ -28,6 +28,7 @@ from ...core.plugins.words import expect_each, near
 from ..errors import SpecError
 from ..results.analysis import Summary
 from ..results.notation import format_estimate
+from ..results.spreadsheet import harmless
 from ..results.statistics import FEW, Estimate, exactly, stack_estimates
 from .legend import meanings
 from .progress import count
@@ -110,10 +111,6 @@ def _format(measure: Measure, values: Sequence[Any]) -> str:
     return ".2f" if measure.unit == "1" else ".3f"
 
 
-FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""With what a spreadsheet's formula begins, if the spaces before it are left out."""
-
-
 def write_csv(file: TextIO, names: Iterable[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a header and rows; None becomes an empty cell."""
     writer = csv.writer(file, lineterminator="\n")
@@ -128,28 +125,30 @@ def in_csv(frame: pd.DataFrame) -> str:
     return file.getvalue()
 
 
+def in_parquet(frame: pd.DataFrame) -> bytes:
+    """Return a frame as a Parquet file; columns of mixed types become text.
+
+    Raises
+    ------
+    SpecError
+        If pyarrow is not installed.
+    """
+    mixed = {
+        name: column.map(str, na_action="ignore")
+        for name, column in frame.items()
+        if column.dtype == object and column.dropna().map(type).nunique() > 1
+    }
+    try:
+        return frame.assign(**mixed).to_parquet()
+    except ImportError:
+        raise SpecError(
+            "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"
+        ) from None
+
+
 def rows_of(frame: pd.DataFrame) -> Iterator[tuple[object, ...]]:
     """Yield the rows of a frame as values of Python's own types; None is what is missing."""
     yield from frame.astype(object).where(frame.notna(), None).itertuples(index=False, name=None)
-
-
-def harmless(value: object) -> object:
-    """Return a value as it may stand in a spreadsheet, a truth value as 0 or 1.
-
-    Examples
-    --------
-    >>> [harmless(value) for value in ("=1+1", "@SUM(A1)", "-0.5", -0.5, "chain", None)]
-    ["'=1+1", "'@SUM(A1)", '-0.5', -0.5, 'chain', None]
-    """
-    if isinstance(value, bool):
-        return int(value)
-    if not isinstance(value, str) or not value.lstrip(" \n").startswith(FORMULA):
-        return value
-    try:
-        float(value)
-    except ValueError:
-        return f"'{value}"
-    return value
 
 
 MATHS_SPACE = r"\;"

@@ -15,7 +15,7 @@ from ...core.plugins.words import show
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
 from ..presentation.growth import growth_figures
-from ..presentation.headlines import headlines
+from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Analysis, identity_lines
@@ -79,7 +79,7 @@ def page(directory: Path) -> str:
         significant=significant(analysis),
         leads=headlines(results, there) or extremes(table, rate),
         rate=rate,
-        notes=unfolded((*notes, *control_lines(there))),
+        notes=unfolded((*notes, *control_lines(there), *below_random(results, there))),
         table=table,
         pictures=pictures(figures),
         replays=packed,

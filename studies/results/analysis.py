@@ -5,7 +5,7 @@ on the worlds that both have met.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -17,8 +17,21 @@ from ...core.numerics import pd
 from ..errors import WIDTH
 from .notation import format_estimate, format_p, wrapped
 from .power import power_lines
-from .results import STEPS, Results
-from .statistics import LEVEL, NOT_NEGATIVE, Array, Estimate, bootstrap, exactly, paired_tests, rate
+from .results import STEPS, Results, row_means
+from .statistics import (
+    LEVEL,
+    NOT_NEGATIVE,
+    Array,
+    Estimate,
+    bootstrap,
+    exactly,
+    holm,
+    independent_permutation,
+    paired_permutation,
+    paired_tests,
+    rate,
+    welch,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,12 +71,13 @@ def estimate_of(
     results: Results, condition: str, phase: str, measure: Measure, part: slice = slice(None)
 ) -> Estimate:
     """Return the mean of a measure of episodes, or of a part, with its interval over seeds."""
-    values = results.values(condition, measure.name, phase)[:, part]
-    if measure.is_rate:
+    values = results.values(condition, measure.name, phase, part)
+    if measure.is_rate and not np.isnan(values).any():
         return rate(values)
+    means = row_means(pd.DataFrame(values)).to_numpy()
     if measure.name == STEPS.name:
-        return steps_estimate(values.mean(axis=1), results.steps(phase))
-    return bootstrap(values.mean(axis=1), bounds=measure.bounds)
+        return steps_estimate(means, results.steps(phase))
+    return bootstrap(means, bounds=measure.bounds)
 
 
 def estimate_over_seeds(values: Array, measure: Measure) -> Estimate:
@@ -82,31 +96,36 @@ def steps_estimate(means: Array, steps: Measure) -> Estimate:
 
 @dataclass(frozen=True)
 class Difference:
-    """A condition minus the reference."""
+    """The difference between a condition and the reference."""
 
     condition: str
-    """What is compared with the reference."""
+    """Name of the condition that is compared with the reference."""
     measure: str
-    """By what it is compared."""
+    """Name of the measure."""
     seeds: int
-    """How many seeds both have finished."""
+    """Number of seeds that both have, or the size of the smaller one of independent samples."""
     estimate: Estimate
-    """The mean difference with its 95% bootstrap interval."""
+    """The mean difference with its 95% interval."""
     raw: float
-    """p of no difference, by permutation of signs."""
+    """Unadjusted p of no difference, by permutation."""
     p: float
-    """The same, adjusted over all that were compared together, see `adjusted`."""
+    """p adjusted over all differences that were compared together, by Holm's method."""
     sample: Array = field(repr=False, compare=False)
-    """The differences of single seeds ``(n_seeds,)``."""
+    """Differences of single seeds ``(n_seeds,)``; empty for independent samples."""
+    paired: bool = True
+    """Whether runs of equal seed were compared; otherwise the samples are independent."""
 
     @property
     def shown(self) -> str:
-        """Value, interval, p as it is and adjusted, as text."""
+        """Value, interval, adjusted and unadjusted p, as text; says if samples are independent."""
         raw = format_p(self.raw)
         shown = f"{format_estimate(self.estimate, signed=True)}, p {format_p(self.p)}"
-        return f"{shown} ({raw.removeprefix('= ')} unadjusted)"
+        kind = "" if self.paired else ", independent samples"
+        return f"{shown} ({raw.removeprefix('= ')} unadjusted){kind}"
 
 
+MIN_RUNS = 2
+"""Smallest number of runs that can be compared."""
 BySeed: TypeAlias = "pd.Series | pd.DataFrame"
 """Values with their seeds as index."""
 Pair = tuple[str, str, BySeed, BySeed]
@@ -121,22 +140,53 @@ def differences(
     Parameters
     ----------
     groups
-        What is compared, by a name of what it has in common. Pairs that share fewer than two seeds
-        are left out.
+        By the name of a group, the pairs to compare, see `compare_pair`.
     measure
-        What the values are means of: no interval leaves its range.
+        The measure whose means are compared: no interval leaves its range.
     """
     names = []
     compared = []
     for group, pairs in groups.items():
-        for condition, title, *values in pairs:
-            own, base = select_shared(values)
-            if len(own) >= 2:
+        for condition, title, own, base in pairs:
+            compared_pair = compare_pair(condition, title, own, base, measure)
+            if compared_pair is not None:
                 names.append(group)
-                estimate = paired_difference(own, base, measure)
-                compared.append((condition, title, own, base, estimate))
-    made = list(zip(names, adjust(compared), strict=True))
+                compared.append(compared_pair)
+    made = list(zip(names, adjusted(compared), strict=True))
     return {g: tuple(d for name, d in made if name == g) for g in groups}
+
+
+def compare_pair(
+    condition: str, title: str, own: BySeed, base: BySeed, measure: Measure
+) -> Difference | None:
+    """Compare the values of a condition with those of a reference, both by seed.
+
+    Runs of equal seed are paired. Without two common seeds the samples are independent: the
+    interval is Welch's, and p is by permutation of labels.
+
+    Returns
+    -------
+    Difference or None
+        The difference, its p not adjusted; None if there are too few runs.
+    """
+    one, other = select_shared([own, base])
+    if len(one) >= MIN_RUNS:
+        estimate = paired_difference(one, other, measure)
+        p = paired_permutation(one, other)
+        return Difference(condition, title, len(one), estimate, p, p, one - other)
+    if min(len(own), len(base)) < MIN_RUNS:
+        return None
+    one, other = (np.asarray(values, float) for values in (own, base))
+    estimate = independent_difference(one, other, measure)
+    p = independent_permutation(one, other)
+    fewer = min(len(one), len(other))
+    return Difference(condition, title, fewer, estimate, p, p, np.empty(0), paired=False)
+
+
+def adjusted(compared: Sequence[Difference]) -> list[Difference]:
+    """Return differences whose p is adjusted over all of them by Holm's method."""
+    ps = holm([d.raw for d in compared]).tolist()
+    return [replace(d, p=p) for d, p in zip(compared, ps, strict=True)]
 
 
 def adjust(
@@ -151,6 +201,17 @@ def adjust(
         Difference(condition, measure, len(own), estimate, *ps, own - base)
         for (condition, measure, own, base, estimate), ps in zip(compared, tests, strict=True)
     )
+
+
+def independent_difference(own: Array, base: Array, measure: Measure) -> Estimate:
+    """Return the difference of the means of independent runs with its 95% interval.
+
+    The interval is Welch's. For constant rates it is Newcombe's, because Welch's has no width.
+    """
+    if measure.is_rate and np.ptp(own) == np.ptp(base) == 0.0:
+        return difference(own[:, None], base[:, None])
+    least, greatest = measure.bounds
+    return Estimate(*np.clip(welch(own, base), least - greatest, greatest - least))
 
 
 def paired_difference(own: Array, base: Array, measure: Measure) -> Estimate:
@@ -264,10 +325,15 @@ class Analysis:
     """What was compared, by measure or by setting, p adjusted over all."""
 
 
-NOTHING = "Nothing to compare: no two conditions share two seeds."
+NOTHING = "Nothing to compare: no two conditions have two seeds each."
+TESTS = {
+    True: "permutation of signs over seeds",
+    False: "permutation of labels of independent samples, whose intervals are Welch's",
+}
+"""Names of the tests of paired and of independent samples."""
 TWO_TESTS = (
-    "An interval is of one difference alone, and p is of permuted signs and adjusted over all: "
-    "where they seem to disagree about 0, p decides."
+    "Intervals are not adjusted for multiple comparisons; p is adjusted and by permutation. Where "
+    "an interval and p seem to disagree about 0, p decides."
 )
 """Said once where an interval and p seem to contradict each other."""
 
@@ -302,11 +368,13 @@ def verdicts(
             lines += verdict_lines(group, measure.better)
     if compared:
         counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
-        lines.append(f"p: permutation of signs over seeds, adjusted over {counted} (Holm).")
+        tests = [text for paired, text in TESTS.items() if paired in {d.paired for d in compared}]
+        lines += wrapped(f"p: {' and '.join(tests)}, adjusted over {counted} (Holm).")
     if any(map(_seems_contradicted, compared)):
         lines += wrapped(TWO_TESTS)
     title = title or " or ".join(dict.fromkeys(d.measure for d in compared))
-    return lines + power_lines([d.sample for d in compared], title, of_rates=measure.is_rate)
+    samples = [d.sample for d in compared if d.paired]
+    return lines + power_lines(samples, title, of_rates=measure.is_rate)
 
 
 def _seems_contradicted(difference: Difference) -> bool:

@@ -9,21 +9,23 @@ from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
 from .analysis import (
+    MIN_RUNS,
     NOTHING,
     BySeed,
     Difference,
     Summary,
     differences,
-    estimate_of,
-    estimate_over_seeds,
     identity_lines,
     select_shared,
+    steps_estimate,
     verdicts,
 )
+from .notation import wrapped
 from .power import power_lines
 from .recovery import RECOVERY, recovery_by_seed
-from .results import SECONDS, Results, describe_number
-from .statistics import Array, Estimate
+from .results import SECONDS, STEPS, Results, describe_number, row_means
+from .series import LAST_STEP
+from .statistics import Array, Estimate, bootstrap, rate
 
 
 class Group(NamedTuple):
@@ -41,6 +43,8 @@ class Group(NamedTuple):
     """By the name of each, the means of its seeds ``(n_seeds,)``."""
     training: Mapping[str, Array]
     """Values of each episode of training ``(n_seeds, n_episodes)``, if it is measured there."""
+    left_out: tuple[str, ...] = ()
+    """By condition, how many runs or scores have no partner in the reference, or it in them."""
 
 
 class Contrasts(NamedTuple):
@@ -78,6 +82,9 @@ class Contrasts(NamedTuple):
             head = ": ".join(filter(None, (group.setting, self.title)))
             groups[f"{head}, less that of {group.reference}"] = group.differences
         lines = verdicts(groups, self.measure, self.title)
+        left_out = "; ".join(text for group in self.groups for text in group.left_out)
+        if left_out:
+            lines += wrapped(f"Without a partner and left out of the difference: {left_out}.")
         return (*(lines or [NOTHING]), *identity_lines(self.identical))
 
 
@@ -115,19 +122,29 @@ def contrasts(
     SpecError
         If the results have no such measure, phase, key or reference.
     """
-    shown_as, values, phase = values_of(results, measure, phase)
+    shown_as, values, phase = values_by_seed(results, measure, phase)
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
     pairs = {
-        setting: [(name, measure, values[c], values[members[0][1]]) for name, c in members[1:]]
+        setting: [
+            (name, measure, *_pair(values[c], values[members[0][1]], results.pairs_episodes))
+            for name, c in members[1:]
+        ]
         for setting, members in groups
     }
     compared = differences(pairs, shown_as)
     compared_groups = []
     for setting, members in groups:
-        less = {d.condition: {"difference": d.estimate} for d in compared[setting]}
+        less = {d.condition: {DIFFERENCE[d.paired]: d.estimate} for d in compared[setting]}
+        paired = {d.condition for d in compared[setting] if d.paired}
+        left_out = [
+            (", ".join(filter(None, (setting, name))), _left_out(results, values[c], base))
+            for base in [values[members[0][1]]]
+            for name, c in members[1:]
+            if name in paired
+        ]
         lines = []
         for name, c in members:
-            own = {title_of(shown_as, phase): _estimate(results, shown_as, phase, c, values[c])}
+            own = {title_of(shown_as, phase): mean_estimate(shown_as, values[c])}
             whose = ", ".join(filter(None, (setting, name)))
             lines.append(Summary(whose, len(values[c]), own | less.get(name, {})))
         compared_groups.append(
@@ -136,12 +153,13 @@ def contrasts(
                 reference=members[0][0],
                 differences=compared[setting],
                 table=tuple(lines),
-                values={name: values[c].to_numpy() for name, c in members},
+                values={name: row_means(values[c]).to_numpy() for name, c in members},
                 training={
-                    name: results.values(c, shown_as.name)
+                    name: results.by_seed(c, "training", shown_as.name).dropna(axis=1).to_numpy()
                     for name, c in members
                     if phase and results.has(c, "training", shown_as.name)
                 },
+                left_out=tuple(f"{name}, {text}" for name, text in left_out if text),
             )
         )
     return Contrasts(shown_as, phase, tuple(compared_groups), results.identical)
@@ -159,20 +177,63 @@ def power_with_first(results: Results) -> tuple[str, ...]:
     return tuple(power_lines(samples, title_of(measure, phase), of_rates=measure.is_rate))
 
 
-def _usual_phase(results: Results) -> str:
-    """Return the phase of evaluation, if all trained conditions have it, else that of training."""
-    evaluated = {*results.of_phase("evaluation")}
-    is_whole = evaluated and evaluated >= {*results.of_phase("training")}
-    return "evaluation" if is_whole else "training"
+def usual_phase(results: Results, measure: str) -> str:
+    """Return the phase of evaluation, if all trained conditions have it, else that of training.
+
+    Series of other tools that were not evaluated are compared at their last step.
+
+    Raises
+    ------
+    SpecError
+        If there are several other phases.
+    """
+    trained = {*results.of_phase("training")}
+    for phase in ("evaluation", LAST_STEP):
+        known = {c for c in results.of_phase(phase) if results.has_any(c, phase, measure)}
+        if known and known >= trained:
+            return phase
+    if trained or len(results.phases) < 2:
+        return next(iter(results.phases), "training")
+    raise SpecError(f"phase: name one, known: {', '.join(results.phases)}")
 
 
-def _estimate(
-    results: Results, measure: Measure, phase: str, condition: str, means: BySeed
-) -> Estimate:
-    """Return the mean over seeds of a measure, or of a number of trials, with its interval."""
-    if phase:
-        return estimate_of(results, condition, phase, measure)
-    return estimate_over_seeds(means.to_numpy().astype(float), measure)
+DIFFERENCE = {True: "difference", False: "difference (independent samples)"}
+"""Headings of the column of differences, of paired and of independent runs."""
+
+
+def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[BySeed, BySeed]:
+    """Return the means of two conditions by seed, over common episodes if these are paired."""
+    if pairs_episodes:
+        seeds = own.index.intersection(base.index, sort=False)
+        episodes = own.columns.intersection(base.columns)
+        shared = [values.loc[seeds, episodes] for values in (own, base)]
+        both = shared[0].notna() & shared[1].notna()
+        shared = [values.where(both).dropna(how="all") for values in shared]
+        if len(shared[0]) >= MIN_RUNS:
+            own, base = shared
+    return row_means(own), row_means(base)
+
+
+def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
+    """Return how many runs, or scores if these are paired, only one of two conditions has."""
+    index, other = own.index, base.index
+    unit = "runs"
+    if results.pairs_episodes:
+        index, other = own.stack().dropna().index, base.stack().dropna().index
+        unit = "scores"
+    total = len(index) + len(other)
+    count = total - 2 * len(index.intersection(other))
+    return f"{count} of {total} {unit}" if count else ""
+
+
+def mean_estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
+    """Return the mean over seeds of a measure's values, a row for each seed, with its interval."""
+    means = row_means(values).to_numpy()
+    if measure.name == STEPS.name:
+        return steps_estimate(means, measure)
+    if measure.is_rate and values.notna().all(axis=None):
+        return rate(values.to_numpy(dtype=float))
+    return bootstrap(means, bounds=measure.bounds)
 
 
 _Pairs = list[tuple[str, str]]
@@ -182,27 +243,40 @@ _Pairs = list[tuple[str, str]]
 def values_of(
     results: Results, name: str, phase: str | None = None
 ) -> tuple[Measure, dict[str, BySeed], str]:
-    """Return a measure, its means of seeds by condition, and the phase that they are of.
+    """Return a measure, its means of seeds by condition, and the phase that they are of."""
+    measure, values, phase = values_by_seed(results, name, phase)
+    return measure, {condition: row_means(own) for condition, own in values.items()}, phase
 
-    The phase is empty if the measure is one of whole trials, or of recovery from a failure.
+
+def values_by_seed(
+    results: Results, name: str, phase: str | None = None
+) -> tuple[Measure, dict[str, pd.DataFrame], str]:
+    """Return a measure, its values by condition, and the phase that they are of.
+
+    Values have a row for each seed and a column for each episode, or one for a number of trials.
+    The phase is by default the usual one; it is empty for a number of trials, and for a measure of
+    recovery from a failure.
     """
     has_failed = any("onset" in results.numbers(condition) for condition in results.conditions)
     recovery = RECOVERY if has_failed else {}
     name = next((m.name for m in recovery.values() if name in (m.heading, m.title)), name)
-    is_recovery = name in recovery
-    phase = phase or ("training" if is_recovery else _usual_phase(results))
-    measures = {m.name: m for m in (*results.measures, results.steps(phase), RETURN)}
+    measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
     name = next((m.name for m in measures.values() if m.heading == name), name)
-    if not results.phases:
+    if not results.conditions:
         raise SpecError("no trial has finished")
-    if (name in measures or is_recovery) and phase not in results.phases:
+    if phase is not None and phase not in results.phases:
         raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
-    if is_recovery:
-        measure, values = recovery_by_seed(results, name, phase)
-        return measure, {**values}, ""
+    if name in recovery:
+        measure, values = recovery_by_seed(results, name, phase or "training")
+        return measure, {c: own.to_frame() for c, own in values.items()}, ""
     if name in measures:
-        of_phase = (c for c in results.of_phase(phase) if results.has(c, phase, name))
-        return measures[name], {c: results.means(c, phase, name) for c in of_phase}, phase
+        phase = phase or usual_phase(results, name)
+        measure = results.steps(phase) if name == STEPS.name else measures[name]
+        of_phase = {c: results.by_seed(c, phase, name) for c in results.of_phase(phase)}
+        known = {c: own for c, own in of_phase.items() if own.size}
+        if not known:
+            raise SpecError(f"measure = {name!r}: no condition has it in the phase {phase!r}")
+        return measure, known, phase
     numbers = {c: results.numbers(c) for c in results.conditions}
     columns = dict.fromkeys(n for own in numbers.values() for n in own)
     names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
@@ -210,8 +284,12 @@ def values_of(
     if column is None:
         raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *recovery, *columns})}")
     measure, factor = describe_number(column)
-    of_trials = {c: factor * own[column] for c, own in numbers.items() if column in own}
-    return measure, {c: pd.Series(own, results.seeds(c)) for c, own in of_trials.items()}, ""
+    of_trials = {
+        c: pd.DataFrame(factor * own[column], results.seeds(c))
+        for c, own in numbers.items()
+        if column in own
+    }
+    return measure, of_trials, ""
 
 
 def _groups(

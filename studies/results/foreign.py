@@ -1,146 +1,138 @@
-"""Results that no study here has made: a table of scores, as CSV, JSON lines or Parquet.
+"""Results of other tools, read from a table of scores.
 
-A row is one score of a condition: by a run (its seed), on an item (a question, a task, an episode),
-or both. Conditions are compared on the seeds that both have; without seeds, on the items. What is
-measured on an item stands where a study has an episode of evaluation.
+A row is one score of a condition: of a run (its seed), on an item (a question, a task, an episode),
+or both; in a phase, and at a step of training. Runs and items are paired by name. A table that
+names neither holds independent samples.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from io import StringIO
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
-from ...core.plugins.words import closest, show
+from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
 from ..spec.tables import label
-from ..store.durable import check_file, read_text
-from .results import Array, Results, from_arrays
+from .long_form import (
+    UNNAMED,
+    pack,
+    plain_levels,
+    refuse_repeated,
+    sort_labels,
+    whole_names,
+)
+from .results import Results
+from .score_files import ScoreTable
+from .series import at_last_step
 
 PHASE = "evaluation"
-"""Of all that is measured."""
-BLANK = -1
-"""Code of a run of which no seed is known."""
-CONDITION, RUN, ITEM = ("its condition", "its run", "its item")
-"""Columns of a table of scores, beside those of scores, once it has been read."""
-RESERVED = ("seed", "phase", "episode", "steps", "return", "state")
-"""Columns of results, which have a meaning there: a table's own of these names are called anew."""
+"""Phase of the scores of a table that names none."""
+RESERVED = ("condition", "seed", "phase", "episode", "step", "steps", "return", "state")
+"""Names of columns of results; columns of a table with these names get other ones."""
+LABEL = "label of the condition"
+Better = Literal["higher", "lower"]
 
 
 class ScoreColumns(NamedTuple):
-    """Which columns of a table are what."""
+    """The role of each column of a table."""
 
     condition: tuple[str, ...] = ("condition",)
     """What is compared; several columns are crossed."""
     score: tuple[str, ...] = ("score",)
-    """What is measured, each a measure."""
+    """What is measured, each column a measure."""
     seed: str | None = None
-    """Which run it is of; none: items are compared one by one."""
+    """Name of the run."""
     item: str | None = None
-    """On what it was measured; none: rows of a run are averaged."""
+    """Name of the question or task that was scored."""
+    phase: str | None = None
+    """Part of the data, such as training or test; phases are never pooled."""
+    step: str | None = None
+    """Step of training at which the score was measured; the last one is compared."""
 
     @classmethod
-    def parse(cls, pairs: Sequence[str], known: Sequence[str]) -> ScoreColumns:
-        """Return what ``ROLE=COLUMN`` says, ``+`` between columns; else those called as their role.
+    def of(
+        cls, given: Mapping[str, str | Sequence[str] | None], known: Sequence[str]
+    ) -> ScoreColumns:
+        """Return the roles that are given; other roles are those of columns of the same name.
 
         Parameters
         ----------
-        pairs
-            One or several, also with commas between them.
+        given
+            Column by role, or several columns of conditions and scores.
         known
             The columns of the table.
-
-        Raises
-        ------
-        SpecError
-            If a role is unknown or given twice.
-
-        Examples
-        --------
-        >>> ScoreColumns.parse(["condition=topology+model,score=right"], ["topology", "seed"])
-        ScoreColumns(condition=('topology', 'model'), score=('right',), seed='seed', item=None)
         """
-        given: dict[str, str] = {}
-        for pair in (part for text in pairs for part in text.split(",")):
-            role, _, column = pair.partition("=")
-            if role not in cls._fields or not column or role in given:
-                raise SpecError(
-                    f"columns = {pair!r}: must be ROLE=COLUMN, each role once: "
-                    f"{', '.join(cls._fields)}"
-                )
-            given[role] = column
-        return cls(
-            condition=tuple(given.get("condition", "condition").split("+")),
-            score=tuple(given.get("score", "score").split("+")),
-            seed=given.get("seed", "seed" if "seed" in known else None),
-            item=given.get("item", "item" if "item" in known else None),
-        )
+        several = {
+            role: _several(given.get(role) or role, known) for role in ("condition", "score")
+        }
+        single = {role: given.get(role) for role in cls._fields[2:]}
+        taken = {*chain(*several.values()), *single.values()}
+        for role in single:
+            if single[role] is None and role in known and role not in taken:
+                single[role] = role
+        return cls(**several, **single)  # type: ignore[arg-type]
 
 
-Labels = dict[str, dict[str, object]]
-"""By condition, what tells it from the others."""
-
-
-class Foreign(NamedTuple):
-    """Results of a table, and what must be given of them."""
-
-    outline: StudyOutline
-    results: Results
-    remarks: tuple[str, ...]
-
-
-def read_table(path: Path) -> pd.DataFrame:
-    """Return the table of a file, by its suffix: ``.csv``, ``.jsonl`` or ``.parquet``.
+def parse_roles(pairs: Sequence[str]) -> dict[str, str]:
+    """Return the column of each role that ``ROLE=COLUMN`` names, with commas between pairs.
 
     Raises
     ------
     SpecError
-        If it cannot be read, or what reads it is not installed; one line.
+        If a role is unknown or given twice.
+
+    Examples
+    --------
+    >>> parse_roles(["condition=topology+model,score=right"])
+    {'condition': 'topology+model', 'score': 'right'}
     """
-    try:
-        if path.suffix == ".csv":
-            return pd.read_csv(StringIO(read_text(path)))
-        if path.suffix == ".jsonl":
-            rows = [json.loads(line) for line in read_text(path).splitlines() if line.strip()]
-            if not all(isinstance(row, dict) for row in rows):
-                raise ValueError("every line must be a table, {...}")
-            return pd.DataFrame(rows)
-        check_file(path)
-        return pd.read_parquet(path)
-    except ImportError:
-        raise SpecError(f"{path}: Parquet is read by pyarrow: pip install pyarrow") from None
-    except (OSError, ValueError, RecursionError) as error:
-        line = str(error).partition("\n")[0]
-        raise SpecError(f"{path}: holds no table of scores: {line}") from None
+    given: dict[str, str] = {}
+    for pair in (part for text in pairs for part in text.split(",")):
+        role, _, column = pair.partition("=")
+        if role not in ScoreColumns._fields or not column or role in given:
+            raise SpecError(
+                f"columns = {pair!r}: must be ROLE=COLUMN, each role once: "
+                f"{', '.join(ScoreColumns._fields)}"
+            )
+        given[role] = column
+    return given
 
 
-SUFFIXES = (".csv", ".jsonl", ".parquet")
-"""Of files that `read_table` reads."""
+def _several(names: str | Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns that a name or several names joined by ``+`` stand for."""
+    if not isinstance(names, str):
+        return tuple(names)
+    return (names,) if names in known else tuple(names.split("+"))
 
 
-def results_of(
-    table: pd.DataFrame, columns: ScoreColumns, better: Literal["higher", "lower"] = "higher"
-) -> Foreign:
-    """Return the results that a table of scores holds.
+class Foreign(NamedTuple):
+    """Results of other tools, and what was left out or chosen when they were read."""
 
-    Rows without a score are left out, and items that not all runs have. A row without a seed, where
-    others have one, is a published figure: it is shown, and compared with nothing.
+    outline: StudyOutline
+    results: Results
+    notes: tuple[str, ...]
+
+
+def results_of(table: ScoreTable, columns: ScoreColumns, better: Better = "higher") -> Foreign:
+    """Return the results of a table of scores.
+
+    A condition whose rows have no seed, where others have one, holds published figures: it is
+    shown, and not paired.
 
     Parameters
     ----------
     table
         A row for each score.
     columns
-        What is what.
+        The roles of its columns.
     better
-        Which scores are better. Those that are 0 or 1 throughout are rates.
+        Which scores are better. Scores that are 0 or 1 throughout are rates.
 
     Raises
     ------
@@ -148,139 +140,165 @@ def results_of(
         If a column is missing, a score is no finite number, a row stands twice, or nothing is left.
     """
     _check_columns(table, columns)
-    remarks: list[str] = []
-    known = table.dropna(subset=list(columns.score))
-    if len(known) < len(table):
-        remarks.append(f"{len(table) - len(known)} of {len(table)} rows have no score: left out")
-    if known.empty:
+    scores = pd.DataFrame({_own_name(name): table.numbers(name) for name in columns.score})
+    notes = _blank_notes(scores)
+    rows = np.flatnonzero(scores.notna().any(axis=1))
+    if not len(rows):
         raise SpecError(f"score = {'+'.join(columns.score)!r}: no row has one")
-    frame = pd.DataFrame({name: _numbers(known[name]) for name in columns.score})
-    frame[CONDITION] = known[list(columns.condition)].agg(_label, axis=1)
-    unit = columns.seed or columns.item
-    if unit is None:  # every row is a run of its own
-        frame[RUN] = frame.groupby(CONDITION).cumcount()
-    else:
-        frame[RUN] = _codes(known[unit])
-        _check_published(frame)
-    if columns.seed is None and columns.item is not None:
-        remarks.append(f"a seed below is one value of {unit!r}: conditions are compared on these")
-    whole = frame.groupby([CONDITION, RUN], sort=False).mean().reset_index()
-    if columns.seed is not None and columns.item is not None:
-        frame[ITEM] = _codes(known[columns.item])
-        whole, left_out = _shared_items(frame, columns.seed, columns.item)
-        remarks += left_out
-    first = known.assign(**{CONDITION: frame[CONDITION]}).drop_duplicates(CONDITION)
-    labels: Labels = {
-        row[CONDITION]: {_own_name(n): row[n] for n in columns.condition if n != "condition"}
-        for row in first.to_dict("records")
-    }
-    measures = tuple(_measure(name, frame[name], whole[name], better) for name in columns.score)
+    table = table.take(rows)
+    levels = pd.DataFrame({name: table.filled(name) for name in columns.condition})
+    frame = scores.iloc[rows].reset_index(drop=True).assign(**_keys(table, columns, levels))
+    conditions = _conditions(frame["condition"], levels)
+    notes += _pairing_notes(columns)
+    _check_runs(table, frame, columns)
+    if columns.step is not None:
+        frame, aligned = at_last_step(frame, list(scores), columns.step)
+        notes += aligned
+    has_items = columns.seed is not None and columns.item is not None
+    frame["seed"] = whole_names(frame["seed"])
+    frame["episode"] = whole_names(frame["episode"]) if has_items else 0
+    titles = zip(scores, columns.score, strict=True)
+    measures = [_measure(name, title, frame, better) for name, title in titles]
+    results = pack(frame, conditions, measures, pairs_episodes=has_items)
     outline = {"study": "learning-curve", "seeds": 1, "episodes": 0, "steps": 0, "evaluation": 1}
-    results = _packed(whole, labels, measures)
-    return Foreign(StudyOutline.noted(outline, labels), results, tuple(remarks))
+    return Foreign(StudyOutline.noted(outline, conditions), results, tuple(notes))
+
+
+def _keys(table: ScoreTable, columns: ScoreColumns, levels: pd.DataFrame) -> dict[str, object]:
+    """Return the columns of the long form that name a score."""
+    item = table.text(columns.item) if columns.item else ""
+    return {
+        "condition": _labels(levels),
+        "phase": table.filled(columns.phase) if columns.phase else PHASE,
+        "step": _steps(table, columns.step) if columns.step else 0.0,
+        "seed": table.text(columns.seed) if columns.seed else item,  # an item stands for a run
+        "episode": item if columns.seed else "",
+    }
+
+
+def _pairing_notes(columns: ScoreColumns) -> list[str]:
+    """Return what must be said of how runs are paired, in lines."""
+    if columns.seed is not None:
+        return []
+    if columns.item is not None:
+        return [f"no column 'seed': a seed below is one value of {columns.item!r}"]
+    return [
+        "no column 'seed' or 'item': runs cannot be paired, independent samples are compared; "
+        "--columns seed=COLUMN names the runs"
+    ]
 
 
 def _own_name(name: str) -> str:
     return f"{name} (own)" if name in RESERVED else name
 
 
-def _check_columns(table: pd.DataFrame, columns: ScoreColumns) -> None:
-    wanted = [("condition", name) for name in columns.condition]
-    wanted += [("score", name) for name in columns.score]
-    wanted += [(r, n) for r, n in (("seed", columns.seed), ("item", columns.item)) if n]
+def _check_columns(table: ScoreTable, columns: ScoreColumns) -> None:
+    """Refuse roles of columns that the table does not have, or that are named twice."""
+    roles = columns._asdict()
+    wanted = [(role, name) for role in ("condition", "score") for name in roles.pop(role)]
+    wanted += [(role, name) for role, name in roles.items() if name is not None]
     names = [name for _, name in wanted]
     for role, name in wanted:
-        if name not in table:
-            hint = closest(name, [str(column) for column in table.columns])
+        if name not in table.columns:
+            hint = closest(name, table.columns)
             raise SpecError(f"columns: {role} = {name!r}: no such column; {hint}")
         if names.count(name) > 1:
             raise SpecError(f"columns: {role} = {name!r}: is named twice")
-        cells = table[name]
-        nested = ~cells.map(pd.api.types.is_scalar)
-        if nested.any():
-            row = cells.index[nested][0]
-            raise SpecError(f"{name} = {show(cells[row])} in row {row}: must be text or a number")
-        if role == "condition" and cells.isna().any():
-            row = cells.index[cells.isna()][0]
-            raise SpecError(f"{name} is blank in row {row}: every score is of a condition")
 
 
-def _numbers(column: pd.Series) -> pd.Series:
-    """Return scores as numbers; true is 1."""
-    numbers = pd.to_numeric(column.replace({True: 1, False: 0}), errors="coerce").astype(float)
-    wrong = ~np.isfinite(numbers.to_numpy())
-    if wrong.any():
-        value = column[wrong].iloc[0]
-        row = column.index[wrong][0]
-        raise SpecError(f"{column.name} = {show(value)} in row {row}: must be a finite number")
-    return numbers
+def _blank_notes(scores: pd.DataFrame) -> list[str]:
+    """Return how many rows lack a score, by column, in lines."""
+    blank = scores.isna().sum()
+    return [
+        f"{count} of {len(scores)} rows have no {name!r}: left out"
+        for name, count in blank.items()
+        if count
+    ]
 
 
-def _label(row: pd.Series) -> str:
-    return str(row.iloc[0]) if len(row) == 1 else label(row.to_dict())
+def _steps(table: ScoreTable, column: str) -> pd.Series:
+    steps = table.numbers(column)
+    blank = steps.isna().to_numpy()
+    if blank.any():
+        raise SpecError(f"{table.place(int(blank.argmax()))}: {column} is blank")
+    return steps
 
 
-def _codes(column: pd.Series) -> pd.Series:
-    """Return whole numbers from 0 on as they are, other values by their order, blank as `BLANK`."""
-    numbers = pd.to_numeric(column, errors="coerce")
-    whole = numbers[numbers.notna()]
-    is_whole = len(whole) == column.notna().sum() and bool(((whole >= 0) & (whole % 1 == 0)).all())
-    codes = numbers if is_whole else pd.Series(pd.factorize(column, sort=True)[0], column.index)
-    return codes.fillna(BLANK).astype(int)
+def _labels(levels: pd.DataFrame) -> pd.Series:
+    """Return the label of each row's condition; labels of different conditions differ."""
+    if levels.shape[1] == 1:
+        return levels.iloc[:, 0]
+    labels = pd.Series([label(row) for row in levels.to_dict("records")], levels.index)
+    known = levels.assign(**{LABEL: labels}).drop_duplicates()[LABEL]
+    if known.duplicated().any():
+        twice = known[known.duplicated()].iloc[0]
+        raise SpecError(f"columns: condition: two conditions have the label {twice!r}")
+    return labels
 
 
-def _check_published(frame: pd.DataFrame) -> None:
-    """Refuse a condition some of whose rows have a seed, and others none."""
-    blank = (frame[RUN] == BLANK).groupby(frame[CONDITION]).mean()
-    mixed = blank.index[(blank > 0.0) & (blank < 1.0)]
-    if len(mixed):
-        raise SpecError(f"condition {mixed[0]!r}: some of its rows have a seed, others none")
+def _conditions(labels: pd.Series, levels: pd.DataFrame) -> dict[str, dict[str, object]]:
+    """Return the levels of each condition, sorted by the labels of the conditions."""
+    named = {_own_name(name): plain_levels(levels[name]) for name in levels if name != "condition"}
+    rows = pd.DataFrame({LABEL: labels, **named}).drop_duplicates(LABEL).to_dict("records")
+    known = {row.pop(LABEL): row for row in rows}
+    return {condition: known[condition] for condition in sort_labels(known)}
 
 
-def _shared_items(frame: pd.DataFrame, seed: str, item: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return a table in which every run has the same items, and what was left out for that."""
-    known = frame[frame[RUN] != BLANK]
-    twice = known[known.duplicated([CONDITION, RUN, ITEM])]
-    if len(twice):
-        row = twice.index[0]
-        where = f"condition {twice.loc[row, CONDITION]!r}"
-        raise SpecError(f"row {row}: {where}, {seed} and {item} stand in a row before, too")
-    times = known.groupby(ITEM).size()
-    n_runs = known.groupby([CONDITION, RUN]).ngroups
-    shared = times.index[times == n_runs]
-    if not len(shared):
-        raise SpecError(f"item = {item!r}: no item has a score of all {n_runs} runs")
-    published = frame[frame[RUN] == BLANK].groupby([CONDITION, RUN]).mean().reset_index()
-    whole = pd.concat([known[known[ITEM].isin(shared)], published], ignore_index=True)
-    if len(shared) == len(times):
-        return whole, []
-    fewer = len(times) - len(shared)
-    return whole, [f"{fewer} of {len(times)} values of {item!r} are not of all runs: left out"]
+def _check_runs(table: ScoreTable, frame: pd.DataFrame, columns: ScoreColumns) -> None:
+    """Name the runs that have no name, and refuse rows that stand twice."""
+    unnamed = (frame["seed"] == "").to_numpy()
+    blank = pd.Series(unnamed).groupby(frame["condition"].to_numpy()).transform("mean").to_numpy()
+    mixed = unnamed & (blank < 1.0)
+    if mixed.any():
+        row = int(mixed.argmax())
+        condition = frame["condition"].iloc[row]
+        column = columns.seed or columns.item
+        raise SpecError(
+            f"{table.place(row)}: {column} is blank, but other rows of condition {condition!r} "
+            "have one"
+        )
+    if columns.item is not None and columns.seed is not None:
+        is_blank = (frame["episode"] == "").to_numpy() & ~unnamed
+        if is_blank.any():
+            raise SpecError(f"{table.place(int(is_blank.argmax()))}: {columns.item} is blank")
+    has_items = bool((frame["episode"] != "").any())
+    if unnamed.any() and not has_items and columns.step is None:
+        # The order of rows must not matter, so that runs are numbered in the order of their scores.
+        keys = ["condition", "phase", *map(_own_name, columns.score)]
+        order = frame[unnamed].sort_values(keys).index
+        frame.loc[order, "seed"] = [f"{UNNAMED}{k}" for k in range(len(order))]
+    elif unnamed.any():
+        frame.loc[unnamed, "seed"] = UNNAMED + frame["condition"][unnamed]
+    roles = {
+        "condition": "+".join(columns.condition),
+        "phase": columns.phase,
+        "seed": columns.seed or columns.item,
+        "episode": columns.item if columns.seed else None,
+        "step": columns.step,
+    }
+    missing = [r for r, own in (("seed", columns.seed), ("item", columns.item)) if own is None]
+    hint = f"; name the column that differs: --columns {missing[0]}=COLUMN" if missing else ""
+    refuse_repeated(table, frame, roles, hint)
 
 
-def _measure(
-    name: str, scores: pd.Series, means: pd.Series, better: Literal["higher", "lower"]
-) -> Measure:
-    """Return the measure of scores, or of their means where runs have several rows."""
-    are_flags = bool(scores.isin((0.0, 1.0)).all())
-    is_rate = are_flags and bool(means.isin((0.0, 1.0)).all())
-    if is_rate and name == SUCCESS.name and better == "higher":
+def _measure(name: str, title: str, frame: pd.DataFrame, better: Better) -> Measure:
+    """Return the measure of a column of scores."""
+    kind = score_kind(frame, name)
+    if kind == "rate" and name == SUCCESS.name and better == "higher":
         return SUCCESS
-    least, greatest = (0.0, 1.0) if are_flags else (None, None)
-    own = _own_name(name)
-    return Measure(own, name, is_rate=is_rate, better=better, least=least, greatest=greatest)
+    least, greatest = (0.0, 1.0) if kind else (None, None)
+    is_rate = kind == "rate"
+    return Measure(name, title, is_rate=is_rate, better=better, least=least, greatest=greatest)
 
 
-def _packed(frame: pd.DataFrame, labels: Labels, measures: tuple[Measure, ...]) -> Results:
-    """Return the results of a table in which every run has the same items."""
-    frame = frame.sort_values([name for name in (RUN, ITEM) if name in frame])
-    arrays: dict[str, dict[str, Array]] = {}
-    seeds: dict[str, list[int]] = {}
-    beyond = int(frame[RUN].max()) + 1  # no other condition has it
-    for condition in labels:
-        own = frame[frame[CONDITION] == condition]
-        seeds[condition] = [beyond if s == BLANK else s for s in own[RUN].unique().tolist()]
-        arrays[condition] = {
-            m.name: own[m.title].to_numpy().reshape(len(seeds[condition]), -1) for m in measures
-        }
-    return from_arrays({PHASE: arrays}, seeds, {}, {}, labels, measures)
+def score_kind(frame: pd.DataFrame, name: str) -> Literal["rate", "share", ""]:
+    """Tell whether scores are rates: 0 or 1, and as many in every run of a condition.
+
+    Scores that are 0 or 1 are shares if runs have different numbers of them.
+    """
+    known = frame[frame[name].notna()]
+    if not known[name].isin((0.0, 1.0)).all():
+        return ""
+    groups = known.groupby(["condition", "phase"], sort=False)
+    sizes = groups.agg(rows=(name, "size"), seeds=("seed", "nunique"), items=("episode", "nunique"))
+    return "rate" if (sizes["rows"] == sizes["seeds"] * sizes["items"]).all() else "share"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from typing import Any, NamedTuple, NoReturn
 
@@ -128,14 +128,31 @@ class JsonValue(NamedTuple):
 
 
 def parse(text: str) -> JsonValue:
-    """Return what a text of JSON says.
+    """Return the value of a JSON text.
 
     Raises
     ------
     ValueError, RecursionError
         If it is no JSON, or a table has a key twice.
     """
-    return JsonValue(json.loads(text, object_pairs_hook=_table))
+    return JsonValue(read_json(text))
+
+
+def read_json(text: str, number: Callable[[str], object] | None = None) -> Any:
+    """Return what a JSON text holds; numbers as `number` makes them of their text, if it is given.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        If it is no JSON, or a table has a key twice.
+    """
+    return json.loads(
+        text,
+        object_pairs_hook=_table,
+        parse_float=number,
+        parse_int=number,
+        parse_constant=number,
+    )
 
 
 def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

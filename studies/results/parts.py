@@ -9,6 +9,7 @@ from itertools import chain
 
 from ...core.numerics import pd
 from ..spec.outline import StudyOutline
+from .long_form import name_key
 from .results import Results, assemble
 
 Part = tuple[StudyOutline, Results]
@@ -37,7 +38,7 @@ def join_parts(parts: Sequence[Part]) -> Part | None:
     )
     seeds = tuple(dict.fromkeys(chain.from_iterable(outline.seeds for outline, _ in parts)))
     table = {**first.table, "seeds": list(seeds)}
-    joined = replace(joined, step_limits=results.step_limits)
+    joined = replace(joined, step_limits=results.step_limits, pairs_episodes=results.pairs_episodes)
     return first._replace(seeds=seeds, table=table), joined
 
 
@@ -49,6 +50,8 @@ def _without_seeds(outline: StudyOutline) -> object:
 def _in_order(frames: Sequence[pd.DataFrame], place: dict[str, int]) -> pd.DataFrame:
     """Return rows below each other, by condition and seed; what a trial has stays in its order."""
     whole = pd.concat(frames, ignore_index=True)
-    keys = pd.DataFrame({"place": whole["condition"].map(place), "seed": whole["seed"]})
+    keys = pd.DataFrame(
+        {"place": whole["condition"].map(place), "seed": whole["seed"].map(name_key)}
+    )
     order = keys.sort_values(["place", "seed"], kind="stable").index
     return whole.loc[order].reset_index(drop=True)

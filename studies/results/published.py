@@ -1,9 +1,11 @@
 """Results of a study as one small JSON file, with spec and seeds, fit to be committed or published.
 
-Rates are kept as one character an episode, steps and other measures in three decimals; returns are
-left out. Claims are always decided by results in this form, so the committed files give the table
-that the run gave.
+Rates are kept as one character an episode, other measures with every digit. Returns are left out
+unless they are what is compared. Claims are always decided by results in this form, so the
+committed files give the table that the run gave.
 """
+
+from __future__ import annotations
 
 import json
 import math
@@ -14,38 +16,36 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
-from ...core.interface.measures import Measure
+from ...core.interface.measures import RETURN, Measure
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
 from ..store.database import RESULTS_VERSION, tables
 from ..store.database import SECONDS as PARTS
 from ..store.durable import read_text
-from . import marl_eval
+from .exported import Description
 from .json_values import JsonValue, parse
-from .results import SECONDS, Array, Results, StepLimits, from_arrays
+from .results import SECONDS, Array, Results, StepLimits, from_arrays, pad_rows
 
 GATHERINGS = get_args(Measure.__annotations__["gathering"])
 """How the steps of an episode make one number."""
-DECIMALS = 3
+HEADER = "study.json"
+"""Name of the file beside exported tables that describes their study."""
 FEW = 100
 """Fewer rows, or values, are always written one by one."""
 
 
 def dumps(outline: StudyOutline, results: Results) -> str:
     """Return results of this version, and their spec, as JSON text."""
-    measures = [m for m in results.measures if m.name in results.episodes]
-    rates = {"steps": False} | {measure.name: measure.is_rate for measure in measures}
+    rates = {m.name: m.is_rate for m in results.measures if m.name in results.episodes}
+    kept = {"steps": False, **rates, **({RETURN.name: False} if results.main == RETURN else {})}
     content = {
-        "results_version": RESULTS_VERSION,
-        "spec": outline.table,
-        "columns": {c: results.columns.get(c, {}) for c in results.conditions},
-        "measures": tables(measures),
+        **header(outline, results),
         "seeds": {c: _pack_seeds(results.seeds(c)) for c in results.conditions},
         "phases": {
             phase: {
                 condition: {
                     name: _pack(results.values(condition, name, phase), is_rate=is_rate)
-                    for name, is_rate in rates.items()
+                    for name, is_rate in kept.items()
                     if results.has(condition, phase, name)
                 }
                 for condition in results.of_phase(phase)
@@ -59,38 +59,100 @@ def dumps(outline: StudyOutline, results: Results) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
+def header(outline: StudyOutline, results: Results) -> dict[str, object]:
+    """Return what tells the results of a study apart from rows: version, spec, keys, measures."""
+    return {
+        "results_version": RESULTS_VERSION,
+        "spec": outline.table,
+        "columns": {c: results.columns.get(c, {}) for c in results.conditions},
+        "measures": tables(m for m in results.measures if m.name in results.episodes),
+    }
+
+
+class Header(NamedTuple):
+    """What `header` holds."""
+
+    outline: StudyOutline
+    columns: dict[str, dict[str, str | float | bool | None]]
+    measures: tuple[Measure, ...]
+    version: int
+
+    @property
+    def note(self) -> str | None:
+        """Note on results of another version than this; None for those of this version."""
+        if self.version == RESULTS_VERSION:
+            return None
+        return f"results of version {self.version}, this is version {RESULTS_VERSION}"
+
+    def limited(self, results: Results) -> Results:
+        """Return results with the limits of the spec."""
+        return replace(results, step_limits=StepLimits.of(self.outline.table))
+
+    @property
+    def description(self) -> Description:
+        """What must be known to read exported tables."""
+        return Description(self.columns, self.measures)
+
+    @classmethod
+    def of(cls, file: JsonValue) -> Header:
+        """Return the header of a file.
+
+        Raises
+        ------
+        ValueError
+            If the file has none.
+        """
+        version = file.child("results_version").whole(1, MOST_VERSION)
+        columns = _columns(file.child("columns"))
+        outline = _outline(file.child("spec"), columns)
+        return cls(outline, columns, _measures(file.child("measures")), version)
+
+
+def header_beside(path: Path) -> Header | None:
+    """Return the header of the exported study beside a table; None if there is none.
+
+    Raises
+    ------
+    SpecError
+        If it is damaged.
+    """
+    place = path.with_name(HEADER)
+    if not place.is_file():
+        return None
+    try:
+        file = parse(read_text(place))
+        return Header.of(file) if "results_version" in file.table() else None
+    except (OSError, ValueError, RecursionError) as error:
+        raise SpecError(f"{place}: describes no exported study: {error}") from None
+
+
 class Published(NamedTuple):
     """Results with their spec as a table, and the version of the code that they are of."""
 
     outline: StudyOutline
     results: Results
     version: int
-
-    @property
-    def note(self) -> str | None:
-        """What must be noted of results of another version than this, in one line."""
-        if self.version == RESULTS_VERSION:
-            return None
-        return f"results of version {self.version}, this is version {RESULTS_VERSION}"
+    note: str | None
 
 
 def loads(text: str) -> Published:
-    """Return what `dumps` has written, or results of the form of marl-eval.
+    """Return what `dumps` has written.
 
     Raises
     ------
     ValueError, RecursionError
-        If it is neither; one line names the key, its value and what is allowed.
+        If it is something else; one line names the key, its value and what is allowed.
     """
-    file = parse(text)
-    if "results_version" not in file.table():
-        results = marl_eval.results_of(file)
-        outline = StudyOutline.noted(marl_eval.spec_of(results), results.columns)
-        return Published(outline, results, RESULTS_VERSION)
-    version = file.child("results_version").whole(1, MOST_VERSION)
-    measures = _measures(file.child("measures"))
-    seeds = {name: _seeds(own) for name, own in file.child("seeds").table().items()}
-    columns = _columns(file.child("columns"), seeds)
+    return read_file(parse(text))
+
+
+def read_file(file: JsonValue) -> Published:
+    """Return the results of a file as `loads` does."""
+    own = Header.of(file)
+    measures = own.measures
+    seeds = {name: _seeds(listed) for name, listed in file.child("seeds").table().items()}
+    for condition in seeds:
+        file.child("columns").child(condition)
     room = Room()
     phases = {
         phase: _arrays(by_condition, seeds, measures, room)
@@ -98,10 +160,8 @@ def loads(text: str) -> Published:
     }
     numbers = _numbers(file.child("numbers"), seeds, (), room)
     usage = _numbers(file.child("usage"), seeds, PARTS, room)
-    outline = _outline(file.child("spec"), columns)
-    results = from_arrays(phases, seeds, numbers, usage, columns, measures)
-    results = replace(results, step_limits=StepLimits.of(outline.table))
-    return Published(outline, results, version)
+    results = own.limited(from_arrays(phases, seeds, numbers, usage, own.columns, measures))
+    return Published(own.outline, results, own.version, own.note)
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:
@@ -141,11 +201,14 @@ Packed = Sequence[object] | dict[str, object]
 
 
 def _pack(values: np.ndarray, *, is_rate: bool) -> Packed:
+    is_ragged = bool(np.isnan(values).any())
+    rows = [row[~np.isnan(row)] for row in values]
     if not is_rate:
-        rounded = np.round(values, DECIMALS)
-        return _constant(rounded) or rounded.tolist()
-    rows = ["".join("1" if v else "0" for v in row) for row in values]
-    return rows if len(rows) < FEW else {"flags": "".join(rows), "shape": list(values.shape)}
+        return [row.tolist() for row in rows] if is_ragged else _constant(values) or values.tolist()
+    flags = ["".join("1" if v else "0" for v in row) for row in rows]
+    if is_ragged or len(flags) < FEW:
+        return flags
+    return {"flags": "".join(flags), "shape": list(values.shape)}
 
 
 def _constant(values: np.ndarray) -> Packed | None:
@@ -159,7 +222,7 @@ def _pack_numbers(results: Results, wanted: Callable[[str], bool]) -> dict[str, 
     """Return by condition the numbers of the wanted names; seconds by their part alone."""
     return {
         condition: {
-            name.removeprefix(SECONDS): _constant(values) or [float(f"{v:.5g}") for v in values]
+            name.removeprefix(SECONDS): _constant(values) or values.tolist()
             for name, values in numbers.items()
         }
         for condition in results.conditions
@@ -223,13 +286,9 @@ def _seeds(value: JsonValue) -> tuple[int, ...]:
     return seeds
 
 
-def _columns(
-    value: JsonValue, conditions: Collection[str]
-) -> dict[str, dict[str, str | float | bool | None]]:
+def _columns(value: JsonValue) -> dict[str, dict[str, str | float | bool | None]]:
     """Return what tells the conditions apart, texts and numbers."""
     columns = {name: row.table() for name, row in value.table().items()}
-    for condition in conditions:
-        value.child(condition)
     for row in columns.values():
         for own in row.values():
             if isinstance(own.content, int | float) and not isinstance(own.content, bool):
@@ -286,10 +345,11 @@ def _arrays(
                 raise ValueError(f"{own.key}: no measure is called so")
             unpack = _unpack_rates if name in rates else _unpack
             array = unpack(own, room, len(seeds[condition]), MOST_EPISODES)
-            if name == "steps" and (array.dtype.kind != "i" or array.min() < 0):
+            known = array[~np.isnan(array)]
+            if name == "steps" and not ((known == np.rint(known)) & (known >= 0)).all():
                 raise own.refusal("whole numbers, none below 0")
             arrays[condition][name] = array
-        if len({array.shape for array in arrays[condition].values()}) > 1:
+        if len({np.isnan(array).tobytes() for array in arrays[condition].values()}) > 1:
             raise ValueError(f"{value.key}: must have as many episodes of every measure")
     return arrays
 
@@ -321,8 +381,10 @@ def _unpack(value: JsonValue, room: Room, n_seeds: int, *most: int) -> Array:
     if isinstance(value.content, dict):
         number = value.child("all").number()
         array = np.full(room.take(value.child("shape"), n_seeds, *most), number)
+    elif most:
+        array = pad_rows([row.array(1) for row in value.items()] or [np.empty(0)])
     else:
-        array = value.array(1 + len(most))
+        array = value.array(1)
     return _check_rows(array, value, n_seeds)
 
 
@@ -334,10 +396,8 @@ def _unpack_rates(value: JsonValue, room: Room, n_seeds: int, most: int) -> Arra
         if len(flags) != math.prod(shape):
             raise value.child("shape").refusal(f"that of {len(flags)} flags")
         return _check_rows(flags.reshape(shape), value, n_seeds)
-    rows = [_bits(row) for row in value.items()]
-    if len(set(map(len, rows))) > 1:
-        raise value.refusal("rows of equal length")
-    return _check_rows(np.array(rows), value, n_seeds)
+    rows = [_bits(row) for row in value.items()] or [np.empty(0)]
+    return _check_rows(pad_rows(rows), value, n_seeds)
 
 
 def _bits(value: JsonValue) -> Array:

@@ -59,6 +59,7 @@ class StepLimits(NamedTuple):
 
 
 UNLIMITED = StepLimits()
+EVERY_EPISODE = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +81,8 @@ class Results:
     """What is measured of an episode, of any condition; success first."""
     usage: tuple[str, ...] = ()
     """Names of the numbers that differ from run to run, times first."""
+    pairs_episodes: bool = False
+    """Whether conditions are compared on the episodes that both have, such as questions."""
     step_limits: StepLimits = UNLIMITED
     """Longest episode that the spec allows."""
 
@@ -111,21 +114,38 @@ class Results:
             return rows is not None if phase else condition in self._finished
         return measure in self._measured and not np.isnan(self._measured[measure][rows]).any()
 
+    def has_any(self, condition: str, phase: str, measure: str) -> bool:
+        """Tell whether any episode of a phase has a measure, or it is none of episodes."""
+        rows = self._rows.get((phase, condition), np.empty(0, int))
+        values = self._measured.get(measure, np.zeros(len(self.episodes)))
+        return not np.isnan(values[rows]).all()
+
     def of_phase(self, phase: str) -> tuple[str, ...]:
         """Return the conditions that have episodes of a phase."""
         return tuple(condition for own, condition in self._rows if own == phase)
 
-    def values(self, condition: str, measure: str, phase: str = "training") -> Array:
-        """Return what was measured of a condition's episodes, ``(n_seeds, n_episodes)``.
+    def values(
+        self,
+        condition: str,
+        measure: str,
+        phase: str = "training",
+        part: slice = EVERY_EPISODE,
+    ) -> Array:
+        """Return a measure of the episodes of a condition ``(n_seeds, n_episodes)``.
+
+        Seeds that train for a number of decisions may have different numbers of episodes. The rows
+        of those with fewer end in values that are not a number.
 
         Parameters
         ----------
         condition
-            Its label.
+            Label of the condition.
         measure
             Name of a measure, ``steps`` or ``return``.
         phase
-            Of the episodes.
+            Phase of the episodes.
+        part
+            Episodes of each seed, such as its last five.
 
         Raises
         ------
@@ -134,21 +154,31 @@ class Results:
         """
         rows = self._rows[phase, condition]
         values = self._measured[measure][rows]
-        if measure in ("steps", *(m.name for m in self.measures if m.is_rate)):
-            values = values.astype(int)
-        return values.reshape(len(np.unique(self.episodes["seed"].to_numpy()[rows])), -1)
+        seeds = self.episodes["seed"].to_numpy()[rows]
+        starts = 1 + np.flatnonzero(seeds[1:] != seeds[:-1])
+        series = [own[part] for own in np.split(values, starts)]
+        values = pad_rows(series)
+        is_whole = measure in ("steps", *(m.name for m in self.measures if m.is_rate))
+        return values.astype(int) if is_whole and not np.isnan(values).any() else values
 
     def success(self, condition: str, phase: str = "training") -> Array:
         """Return the `values` of success."""
         return self.values(condition, SUCCESS.name, phase)
 
     def by_seed(self, condition: str, phase: str, measure: str = SUCCESS.name) -> pd.DataFrame:
-        """Return the `values`: a row for each seed, a column for each episode."""
-        return pd.DataFrame(self.values(condition, measure, phase), self.seeds(condition))
+        """Return a measure's values: a row for each seed that has any, a column for each episode.
+
+        An episode that a seed lacks is not a number.
+        """
+        rows = self._rows[phase, condition]
+        places = self.episodes[["seed", "episode"]].iloc[rows]
+        frame = places.assign(value=self._measured[measure][rows]).dropna(subset="value")
+        wide = frame.pivot(index="seed", columns="episode", values="value")
+        return wide.loc[frame["seed"].unique()]
 
     def means(self, condition: str, phase: str, measure: str = SUCCESS.name) -> pd.Series:
-        """Return the means of `values` by seed."""
-        return pd.Series(self.values(condition, measure, phase).mean(axis=1), self.seeds(condition))
+        """Return the means of a measure's values by seed, of the seeds that have any."""
+        return row_means(self.by_seed(condition, phase, measure))
 
     def other_evaluations(self, condition: str) -> dict[str, str]:
         """Return the phases of a condition's evaluations beside its own, by their names."""
@@ -160,10 +190,14 @@ class Results:
 
     @cached_property
     def main(self) -> Measure:
-        """The measure by which conditions are judged: the first, or returns if nothing is one."""
+        """The measure that is compared: the first, or the return if that never varies.
+
+        Where returns are left out, it is the first measure that can vary.
+        """
         main = main_measure(self.measures)
-        is_left_out = main == RETURN and self.episodes[RETURN.name].isna().all()
-        return self.measures[0] if is_left_out and self.measures else main
+        if main != RETURN or self.episodes[RETURN.name].notna().any():
+            return main
+        return next((m for m in self.measures if not (m.is_rate and m.greatest == 0.0)), main)
 
     @cached_property
     def identical(self) -> tuple[tuple[str, ...], ...]:
@@ -199,6 +233,30 @@ class Results:
         names = {"steps", "return", *(measure.name for measure in self.measures)}
         columns = self.episodes[[name for name in self.episodes if name in names]]
         return {n: own.to_numpy(dtype=float, na_value=np.nan) for n, own in columns.items()}
+
+
+def pad_rows(rows: Sequence[Array]) -> Array:
+    """Return rows as one array, in which those that are shorter end in NaN.
+
+    Examples
+    --------
+    >>> pad_rows([np.array([1, 2]), np.array([3])]).tolist()
+    [[1.0, 2.0], [3.0, nan]]
+    """
+    longest = max(map(len, rows))
+    if all(len(row) == longest for row in rows):
+        return np.stack(rows)
+    padded = np.full((len(rows), longest), np.nan)
+    for own, row in zip(padded, rows, strict=True):
+        own[: len(row)] = row
+    return padded
+
+
+def row_means(values: pd.DataFrame) -> pd.Series:
+    """Return the mean of each row without its missing values."""
+    array = np.ascontiguousarray(values.to_numpy(dtype=float))
+    mean = np.nanmean if np.isnan(array).any() else np.mean
+    return pd.Series(mean(array, axis=1), values.index)
 
 
 UNKNOWN = "agent groups"
@@ -319,7 +377,7 @@ def from_arrays(
     ----------
     phases
         By phase, condition and name of a measure, ``steps`` or ``return``, the values
-        ``(n_seeds, n_episodes)``.
+        ``(n_seeds, n_episodes)``. Episodes that a seed does not have are not a number.
     seeds
         By condition, in the order of the arrays' rows.
     numbers, usage
@@ -339,7 +397,8 @@ def from_arrays(
                 where = {"seed": np.repeat(own, count), "phase": phase}
                 where["episode"] = np.tile(np.arange(count), len(own))
                 values = {name: array.ravel() for name, array in arrays.items()}
-                episodes.append(pd.DataFrame({**label, **where, **values}))
+                known = ~np.all([np.isnan(own) for own in values.values()], axis=0)
+                episodes.append(pd.DataFrame({**label, **where, **values})[known])
         kept = {**numbers.get(condition, {}), **usage.get(condition, {})}
         trials.append(pd.DataFrame({**label, "seed": own, "state": DONE, **kept}))
     names = [name for own in usage.values() for name in own]
@@ -444,7 +503,9 @@ def combine(
     usage = (name for part in parts for name in part.usage)
     measures = join_measures(part.measures for part in parts)
     results = assemble(episodes, trials, phases, columns, measures, usage)
-    return replace(results, step_limits=_loosest(part.step_limits for part in parts)), labels
+    limits = _loosest(part.step_limits for part in parts)
+    pairs_episodes = any(part.pairs_episodes for part in parts)
+    return replace(results, step_limits=limits, pairs_episodes=pairs_episodes), labels
 
 
 def _loosest(limits: Iterable[StepLimits]) -> StepLimits:

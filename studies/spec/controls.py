@@ -49,6 +49,20 @@ def control_of(condition: str, settings: Mapping[str, Settings]) -> str | None:
     return None
 
 
+TROUBLESHOOTING = "docs/not_learned.md"
+"""Page that says what to try if a team does not learn."""
+
+
+def random_control(condition: str, settings: Mapping[str, Settings]) -> str | None:
+    """Return the condition that acts at random in the scenario of another one, if there is one."""
+    scenario = settings[condition]["scenario"]
+    for label, own in settings.items():
+        rule = own["learner"].get("decision", {}).get("rule")
+        if own["learner"]["kind"] == "frozen" and rule == "random" and own["scenario"] == scenario:
+            return label
+    return None
+
+
 def is_drawn(settings: Settings) -> bool:
     """Return whether a condition that learns nothing draws actions at random, if only by ties."""
     learner = settings["learner"]

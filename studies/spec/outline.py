@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ...core.plugins.sources import ANSWERS, Answers, Sources, meaning
+from ...core.plugins.sources import Sources, meaning
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..store.database import DATABASE, SPEC_FILE
@@ -111,9 +111,7 @@ class StudyOutline(NamedTuple):
 
 def sources_of(store: Store) -> Sources:
     """Return the files of users that a kept study names, as they were when it began."""
-    sources = Sources(None, store.sources(), brought_by=str(store.directory))
-    sources.answers = Answers(store.directory.resolve() / ANSWERS)
-    return sources
+    return Sources(None, store.sources(), brought_by=str(store.directory))
 
 
 def other_spec(store: Store) -> str | None:

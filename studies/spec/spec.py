@@ -209,7 +209,8 @@ class Spec(Settings):
         if is_study and is_reference(value):
             STUDIES.find(value)
         elif value not in known:
-            raise ValueError(closest(value, known))
+            moved = STUDIES.moved.get(value) if is_study else None
+            raise ValueError(moved or closest(value, known))
         return value
 
     @field_validator("seeds", mode="before")

@@ -3,10 +3,25 @@
 from ...core.plugins.registry import Registry
 
 NAMES = ("learning-curve", "ablation", "wheel-failure", "scaling", "hierarchies", "experience")
-MOVED = ("chain-order", "shapes", "edges", "fit", "signals", "games", "related", "peers")
+MOVED = {
+    "chain-order": "chain_order.py:ChainOrderStudy",
+    "shapes": "shapes.py:ShapesStudy",
+    "edges": "edges.py:EdgesStudy",
+    "fit": "fit.py:FitStudy",
+    "signals": "signals.py:SignalsStudy",
+    "games": "games.py:GamesStudy",
+    "related": "related.py:RelatedStudy",
+    "peers": "peers.py:PeersStudy",
+}
+"""Studies of the repository that are not installed: file and class, in its folder
+``research/studies``."""
 STUDIES = Registry(
     "study",
-    {name: f"nested_agents.studies.catalogue.{name.replace('-', '_')}" for name in NAMES}
-    | {name: f"nested_agents.research.studies.{name.replace('-', '_')}" for name in MOVED},
+    {name: f"nested_agents.studies.catalogue.{name.replace('-', '_')}" for name in NAMES},
+    {
+        name: f"moved to research/studies/{place} of the repository; name this file in the spec, "
+        f"or one of: {', '.join(NAMES)}"
+        for name, place in MOVED.items()
+    },
 )
-"""Studies by name; what they offer is in `nested_agents.studies.catalogue.study`."""
+"""Studies by name; their attributes are those of `nested_agents.studies.catalogue.study.Study`."""

@@ -11,7 +11,8 @@ import os
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -58,8 +59,17 @@ PATIENCE = 60_000
 NEARLY_FULL = 64_000_000
 """With fewer bytes left, an error of the disk is likely one of its size."""
 
-COPIES = 5
-"""How often to copy a database that is written meanwhile, until a copy is of one state."""
+COPY_WAITS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+"""Wait before each attempt to copy a database [s]. An attempt fails if a writer interferes."""
+
+LOG_HEADER_BYTES = 32
+"""Size of the header of a write-ahead log. Its random salts change when the log starts again."""
+
+JOURNAL_NONCE = slice(12, 16)
+"""Position of the random number of a rollback journal, which differs between transactions."""
+
+DATABASE_HEADER_BYTES = 100
+"""Size of the header of a database. A commit without a log changes its change counter."""
 
 
 class DamageError(SpecError):
@@ -174,34 +184,73 @@ def open_to_read(path: Path) -> Iterator[sqlite3.Connection]:
 
 
 @contextmanager
-def open_copy(path: Path) -> Iterator[sqlite3.Connection]:
-    """Connect to a copy of a database, its log included, and leave the original as it is.
+def open_copy(path: Path, waits: Iterable[float] = COPY_WAITS_S) -> Iterator[sqlite3.Connection]:
+    """Connect to a copy of one committed state of a database, and leave the original as it is.
 
-    SQLite itself reads no log where it cannot make a file, as on a full disk.
+    SQLite cannot read a write-ahead log where it cannot create a file, as on a full disk. The copy
+    takes no lock, so a writer may change the files meanwhile. The database is copied first and its
+    log or journal after it: a log repeats and a journal reverts every change that the copy of the
+    database may contain in part, unless it was started again in between. Such an attempt is
+    discarded.
+
+    Parameters
+    ----------
+    path
+        The database.
+    waits
+        Wait before each attempt [s].
+
+    Raises
+    ------
+    SpecError
+        If a writer interfered with every attempt.
     """
     with tempfile.TemporaryDirectory() as folder:
-        for _ in range(COPIES):
-            before = _state(path)
-            for source in before:
-                with suppress(FileNotFoundError):  # a journal ends with its transaction
-                    shutil.copyfile(source, Path(folder) / source.name)
-            if _state(path) == before:
+        for wait in waits:
+            time.sleep(wait)
+            before = _generation(path)
+            for suffix in ("", "-wal", "-journal"):
+                name = path.name + suffix
+                try:
+                    shutil.copyfile(path.with_name(name), Path(folder) / name)
+                except FileNotFoundError:
+                    (Path(folder) / name).unlink(missing_ok=True)  # of an earlier attempt
+            if _generation(path) == before:
                 break
-            for copy in Path(folder).iterdir():
-                copy.unlink()
+        else:
+            raise SpecError(
+                f"{path}: another process writes to it without a pause, and it can only be copied "
+                "here; try again later"
+            )
         with closing(_connect(Path(folder) / path.name)) as connection:
             yield connection
 
 
-def _state(path: Path) -> dict[Path, tuple[int, int]]:
-    """Return by file of a database when it was changed last [ns], and its size [bytes]."""
-    state = {}
-    for suffix in ("", "-wal", "-journal"):
-        file = path.with_name(path.name + suffix)
-        with suppress(FileNotFoundError):
-            status = file.stat()
-            state[file] = status.st_mtime_ns, status.st_size
-    return state
+def _generation(path: Path) -> tuple[object, ...]:
+    """Return a value that is equal before and after a copy of the files of a database is made.
+
+    If it differs, the copied files may not belong together, see `open_copy`.
+    """
+    header = _read_start(path, DATABASE_HEADER_BYTES)
+    log = _read_start(path.with_name(f"{path.name}-wal"), LOG_HEADER_BYTES)
+    if log:
+        return (log,)
+    journal = _read_start(path.with_name(f"{path.name}-journal"), JOURNAL_NONCE.stop)
+    if journal:
+        return (journal[JOURNAL_NONCE],)
+    # Read twice: a transaction may end between the look for its journal and either reading.
+    status = path.stat()
+    again = _read_start(path, DATABASE_HEADER_BYTES)
+    return header, again, status.st_size, status.st_mtime_ns
+
+
+def _read_start(path: Path, size: int) -> bytes:
+    """Return the first bytes of a file. A missing file has none."""
+    try:
+        with path.open("rb", buffering=0) as file:
+            return file.read(size)
+    except FileNotFoundError:
+        return b""
 
 
 @contextmanager

@@ -10,12 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from time import perf_counter, process_time
-from typing import Any, Protocol
-
-import numpy as np
+from typing import Any
 
 from ...core.agents.loop import (
-    EpisodeSummary,
     StepRecord,
     control_loop,
     world_seed,
@@ -24,7 +21,6 @@ from ...core.agents.many_environments import ManyEnvironmentsLoop
 from ...core.agents.team import Team
 from ...core.interface.plain import as_scenario
 from ...core.interface.recording import EpisodeRecorder
-from ...core.interface.scenario import Scenario
 from ...core.interface.stacked import LoopedEnvironments
 from ...core.plugins.words import expect
 from ..spec.controls import LEARN_NOTHING
@@ -65,22 +61,6 @@ Observer = Callable[[StepRecord], None]
 """Is shown every step of some episodes, as it is done."""
 
 
-class WholeEpisode(Protocol):
-    """Runs whole episodes of teams that it knows in one call each, as `control_loop` would."""
-
-    def __call__(
-        self,
-        scenario: Scenario,
-        team: Team,
-        seed: np.random.SeedSequence,
-        episode: int,
-        steps: int,
-        *,
-        learn: bool,
-    ) -> EpisodeSummary | None:
-        """Leave scenario and team as the loop would; or return None and change nothing."""
-
-
 class Session:
     """A trial under way: its scenario, its team, and what has been measured so far.
 
@@ -88,8 +68,6 @@ class Session:
     ----------
     trial
         The trial; its team is untrained to begin with.
-    whole_episode
-        Runs episodes that nobody needs to see step by step, if it can; none: the loop runs all.
 
     Attributes
     ----------
@@ -101,10 +79,9 @@ class Session:
         The agents.
     """
 
-    def __init__(self, trial: Trial, whole_episode: WholeEpisode | None = None) -> None:
+    def __init__(self, trial: Trial) -> None:
         expect("a trial", Trial, trial=trial)
         self.trial = trial
-        self._whole_episode = whole_episode
         self._own = arrange(trial.settings, trial.seed)
         self.world, self.scenario, self.team = self._own
         self._stages = trial.curriculum  # those that the team has not gone through
@@ -212,15 +189,15 @@ class Session:
         time = self._watch.add if team is None else None
         record = self._record if kept else None
         self._run(
-            there, phase, [time, record], at_once=not kept, episodes=episodes,
+            there, phase, [time, record], episodes=episodes,
             steps=self.trial.steps, first_episode=first,
         )  # fmt: skip
 
     def train_until(self, decisions: int) -> int:
-        """Let the team learn until it has decided so often in all; return how often it has.
+        """Train the team up to a total number of decisions; return how many there were.
 
-        In many environments at once if its learner says so: then rows are of the first
-        environment's episodes.
+        A learner of many environments trains in all of them at once. Rows are the episodes that
+        ended, in this order; decisions in episodes that are still running at the end count, too.
         """
         environments = self.trial.settings.learner.n_environments
         if self.trial.settings.learner.kind in LEARN_NOTHING:
@@ -256,8 +233,7 @@ class Session:
         rates = [m.name for m in self._measures if m.source == "terminated"]
         done = self.trained
         while self._many.decisions < decisions:
-            ended = self._many.step()
-            if ended is not None:
+            for ended in self._many.step():
                 measured = dict.fromkeys(rates, ended.terminated)
                 row = EpisodeRow("training", done, ended.steps, measured, ended.return_)
                 self._rows.append(row)
@@ -292,6 +268,12 @@ class Session:
         self._keep_team()
         self._evaluate(self._own, phase, observe)
 
+    def evaluate_sampled(self, phase: str = SAMPLED) -> None:
+        """Evaluate by actions drawn from the policy, if the team has one of probabilities."""
+        if self.team.is_sampled:
+            with self.team.drawing_apart():
+                self._evaluate(self._own, phase, None, explore=True)
+
     def run_other_evaluations(self, observers: Mapping[str, Observer] | None = None) -> None:
         """Evaluate in each of the trial's `evaluations`, whatever the others are.
 
@@ -301,9 +283,7 @@ class Session:
         """
         self._go_through_curriculum()
         trial = self.trial
-        if self.team.is_sampled:
-            with self.team.drawing_apart():
-                self._evaluate(self._own, SAMPLED, None, explore=True)
+        self.evaluate_sampled()
         others = transfer(self._own, trial.settings, trial.evaluations, trial.seed)
         for name, there in others:
             with self.team.drawing_apart():
@@ -339,7 +319,7 @@ class Session:
         trial, first = self.trial, EVALUATION_WORLDS
         steps = trial.evaluation_steps or trial.steps
         self._run(
-            there, phase, [observe], first, at_once=observe is None, episodes=trial.evaluation,
+            there, phase, [observe], first, episodes=trial.evaluation,
             steps=steps, first_episode=first, learn=False, explore=explore,
         )  # fmt: skip
 
@@ -349,19 +329,14 @@ class Session:
         phase: str,
         observers: Sequence[Observer | None] = (),
         counted_from: int = 0,
-        *,
-        at_once: bool = False,
         **loop: Any,
     ) -> None:
         """Run a `control_loop`, show its steps to observers, and keep the row of each episode.
 
-        The number of an episode in its row is counted from `counted_from`. If nobody needs to see
-        the steps, whole episodes may be run `at_once`, compiled.
+        The number of an episode in its row is counted from `counted_from`.
         """
         measures = there.measures
         self._measures = join_measures((self._measures, measures))
-        if at_once and self._at_once(there, phase, counted_from, **loop):
-            return
         for record in control_loop(there.scenario, there.team, seed=self.trial.seed, **loop):
             if record.step == 0:
                 meter = EpisodeMeter(phase, record.episode - counted_from, measures)
@@ -372,30 +347,6 @@ class Session:
                 self._rows.append(meter.row())
                 if phase == "training" and there.team is self.team:
                     self.put_down()
-
-    def _at_once(self, there: Arrangement, phase: str, counted_from: int, **loop: Any) -> bool:
-        """Run whole episodes in one call each and keep their rows, or return that none can be."""
-        if self._whole_episode is None:
-            return False
-        first = loop["first_episode"]
-        learn = loop.get("learn", True)
-        for episode in range(first, first + loop["episodes"]):
-            begin = perf_counter()
-            seed = world_seed(self.trial.seed, episode)
-            summary = self._whole_episode(
-                there.scenario, there.team, seed, episode, loop["steps"], learn=learn
-            )
-            if summary is None:
-                return False
-            if learn and there.team is self.team:
-                spent = perf_counter() - begin
-                self._watch.seconds["decision"] += spent
-                self.deciding += [spent / summary.steps] * summary.steps
-            row = EpisodeRow(
-                phase, episode - counted_from, summary.steps, summary.measures, summary.return_
-            )
-            self._rows.append(row)
-        return True
 
     def result(
         self, numbers: Mapping[str, float] | None = None, usage: Mapping[str, float] | None = None

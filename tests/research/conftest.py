@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.research import push_n
+from research import push_n
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "studies"))

@@ -3,13 +3,13 @@
 import runpy
 from pathlib import Path
 
-from nested_agents.research import ROWS
+from research import RESULTS
 
 ARCHIVE = runpy.run_path(str(Path(__file__).resolve().parents[2] / "docs" / "archive.py"))
 
 
 def test_a_section_has_the_table_without_times() -> None:
-    (section,) = ARCHIVE["sections"]([ROWS / "arms.json"])
+    (section,) = ARCHIVE["sections"]([RESULTS / "arms.json"])
     heading, _, columns, *rows = section.splitlines()
     assert heading == "## arms"
     assert "evaluation success" in columns

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import main
 
 from nested_agents.core.numerics import pd
-from nested_agents.research import SPECS, atlas
-from nested_agents.research import atlas_faults as faults
-from nested_agents.research import atlas_predictions as predictions
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
+from research import SPECS
+from research import atlas_faults as faults
+from research import atlas_predictions as predictions
+from research import atlas_rows as atlas
 
 pytest.importorskip("pyarrow")
 
@@ -52,7 +53,9 @@ def test_what_losing_messages_costs_is_paired_by_seed() -> None:
     lines = faults.fault_costs(pd.concat([rows_of(), lost]))
     assert len(lines) == 2
     assert all(float(one.difference.value) == pytest.approx(-0.22) for one in lines)
-    assert str(lines[0]).startswith("line_up, chain, batch-td, 64 agents, lost .3: success -0.22 [")
+    assert str(lines[0]).startswith(
+        "line_up, chain, batch-td, 64 agents, lost 0.3: success -0.22 ["
+    )
 
 
 def test_rows_of_two_studies_are_not_taken_for_one() -> None:
@@ -120,7 +123,14 @@ def test_the_command_prints_what_the_page_says(capsys: pytest.CaptureFixture[str
 
 
 def test_the_page_has_the_law_of_decisions_to_success(capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["fit", str(atlas.ROWS / "scaling.json"), "--criterion", "0.8", "--predict", "32"]
+    arguments = [
+        "fit",
+        str(atlas.RESULTS / "scaling.json"),
+        "--criterion",
+        "0.8",
+        "--predict",
+        "32",
+    ]
     assert main(arguments) == 0
     page = Path(__file__).resolve().parents[2] / "docs" / "atlas.md"
     shown = capsys.readouterr().out.splitlines()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from nested_agents.core.numerics import pd
-from nested_agents.research.atlas import NO_FAULT
-from nested_agents.research.atlas_choices import HierarchyChoice, choices, shares_right
+from research.atlas_choices import HierarchyChoice, choices, shares_right
+from research.atlas_rows import NO_FAULT
 
 from .test_atlas import rows_of
 
@@ -17,7 +17,7 @@ def test_the_best_hierarchy_is_predicted_by_laws_of_small_teams() -> None:
     assert choice.p == pytest.approx(2.0 / 2**8)
     assert (choice.rivals, choice.verdict) == ((), "right")
     assert str(choice) == (
-        "line_up, batch-td, success, 64 agents: chain predicted, chain was best (p = 0.0078)"
+        "line_up, batch-td, success, 64 agents: chain predicted, chain was best (p = 0.008)"
     )
 
 
@@ -80,8 +80,8 @@ def test_shares_count_only_where_one_is_significantly_the_best() -> None:
     ]
     assert shares_right([case, *others]) == [
         "4 cases, 3 with one significantly the best: 1 right, 1 wrong, 1 not decided",
-        "decided and right: 1 of 3, 0.33 [0.06, 0.79]",
-        "the greatest prediction: 2 of 3, 0.67 [0.21, 0.94]",
-        "the best of the largest small teams: 0 of 3, 0 [0, 0.56]",
+        "decided and right: 1 of 3, 0.33 [0.06, 0.80]",
+        "the greatest prediction: 2 of 3, 0.67 [0.20, 0.94]",
+        "the best of the largest small teams: 0 of 3, 0 [0, 0.57]",
     ]
     assert shares_right(others[2:]) == ["1 cases, none with one significantly the best"]

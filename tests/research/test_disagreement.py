@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from nested_agents.research import ROWS, disagreement
+from research import RESULTS, disagreement
 
-DOCS = ROWS.parents[1] / "docs"
+DOCS = RESULTS.parents[1] / "docs"
 
 
 def test_the_page_has_the_table_that_the_rows_give(tmp_path) -> None:

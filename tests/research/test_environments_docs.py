@@ -3,17 +3,17 @@
 from pathlib import Path
 
 import pytest
+from programs import main
 from published_tables import print_table
 
 import nested_agents as na
-from nested_agents.research import ROWS, SPECS
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.results.analysis import Summary
 from nested_agents.studies.results.statistics import bootstrap
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
+from research import RESULTS, SPECS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "environments_results.md"
@@ -60,7 +60,7 @@ SPEEDS = {"speed [m/s]": "evaluation", "actions sampled": "evaluation:sampled ac
     ],
 )
 def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
-    results, lines = na.load(ROWS / f"{name}.json").results, []
+    results, lines = na.load(RESULTS / f"{name}.json").results, []
     for condition in results.of_phase("evaluation"):
         own = {t: p for t, p in phases.items() if results.has(condition, p, "total_reward")}
         each = {t: results.values(condition, "total_reward", p) for t, p in own.items()}
@@ -82,7 +82,7 @@ def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
     ],
 )
 def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixture[str]) -> None:
-    path, by = str(ROWS / f"{name}.json"), ("--phase", "evaluation", "--reference", reference)
+    path, by = str(RESULTS / f"{name}.json"), ("--phase", "evaluation", "--reference", reference)
     of = ("--measure", "total_reward", "--format", "markdown")
     assert main(["compare", path, *of, *by]) == 0
     table = capsys.readouterr().out
@@ -95,22 +95,22 @@ def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(
     ("spec", "extras", "agents"),
     [
-        ("swimmer", ("mujoco", "stable_baselines3"), {2}),
-        ("swimmer_4", ("mujoco", "stable_baselines3"), {4}),
-        ("swimmer_transfer", ("mujoco",), {4}),
-        ("swimmer_n", ("mujoco",), {2, 4, 8, 16}),
+        ("swimmer", ("mujoco",), {2}),
+        ("swimmer-4", ("mujoco",), {4}),
+        ("swimmer-transfer", ("mujoco",), {4}),
+        ("swimmer-n", ("mujoco",), {2, 4, 8, 16}),
         ("spread", ("mpe2",), {3}),
-        ("spread_ppo", ("mpe2", "stable_baselines3"), {3}),
+        ("spread-ppo", ("mpe2",), {3}),
         ("aloha", (), {10}),
-        ("aloha_ppo", ("stable_baselines3",), {10}),
-        ("aloha_copies", (), {10}),
+        ("aloha-ppo", (), {10}),
+        ("aloha-copies", (), {10}),
     ],
 )
 def test_specs_of_worlds_of_others_run(
     spec: str, extras: tuple[str, ...], agents: set[int]
 ) -> None:
     for extra in extras:
-        pytest.importorskip(extra, reason="extras mpe, mujoco, peers")
+        pytest.importorskip(extra, reason="extras mpe, mujoco")
     path = SPECS / f"{spec}.toml"
     few = ["seeds=1", "episodes=2", "steps=3", "evaluation=1"]
     teams = set()

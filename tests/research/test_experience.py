@@ -7,17 +7,17 @@ from io import StringIO
 import numpy as np
 import pandas as pd
 import pytest
+from programs import main
 
 import nested_agents as na
-from nested_agents.research import ROWS, experience
-from nested_agents.research.claims import Benefit
-from nested_agents.research.measures import Measured
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.results.notation import format_estimate
 from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.spec.spec import Spec
+from research import RESULTS, experience
+from research.claims import Benefit
+from research.measures import Measured
 
-DOCS = ROWS.parents[1] / "docs"
+DOCS = RESULTS.parents[1] / "docs"
 PEERS = (DOCS / "peers.md").read_text(encoding="utf-8")
 CHAIN = experience.CHAIN
 NETWORKS = (CHAIN, "hierarchy-ppo, no edges")

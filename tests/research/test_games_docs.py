@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.research import ROWS
-from nested_agents.research.studies.games import analyse
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
+from research import RESULTS
+from research.studies.games import analyse
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 GAMES = (DOCS / "games.md").read_text(encoding="utf-8")
@@ -18,7 +18,7 @@ GRAPHS = (DOCS / "coordination_graphs.md").read_text(encoding="utf-8")
 
 
 def games():
-    return analyse(published.load(ROWS / "games.json").results)
+    return analyse(published.load(RESULTS / "games.json").results)
 
 
 @pytest.mark.parametrize("text", [GAMES, GRAPHS], ids=["games", "coordination graphs"])

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import main
 from published_tables import print_table
 
 import nested_agents as na
-from nested_agents.research import ROWS
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.results.notation import format_estimate, format_number
 from nested_agents.studies.results.statistics import bootstrap
+from research import RESULTS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "learning.md"
@@ -48,7 +48,7 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
 
 
 def test_the_planner(capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(ROWS / "controls.json")
+    path = str(RESULTS / "controls.json")
     choice = ["--where", "preset == 'planner'", "--columns", "evaluation success"]
     assert main(["table", path, *choice, "--format", "markdown"]) == 0
     assert capsys.readouterr().out in PAGE.read_text(encoding="utf-8")
@@ -60,7 +60,7 @@ IN_A_ROW = 5
 
 
 def test_decisions_to_a_success_rate() -> None:
-    results = na.load(ROWS / "scaling.json").results
+    results = na.load(RESULTS / "scaling.json").results
     to_first: list[np.ndarray] = []
     to_last: list[np.ndarray] = []
     for robots in SIZES:
@@ -82,7 +82,7 @@ def test_decisions_to_a_success_rate() -> None:
 
 
 def test_failures_of_large_teams(capsys: pytest.CaptureFixture[str]) -> None:
-    path = ROWS / "large-failures.json"
+    path = RESULTS / "large-failures.json"
     assert main(["table", str(path), "--columns", "just after", "end", "--format", "csv"]) == 0
     rows: dict[str, list[str]] = {}
     for row in csv.DictReader(capsys.readouterr().out.splitlines()):

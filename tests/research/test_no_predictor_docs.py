@@ -4,9 +4,9 @@ import re
 from pathlib import Path
 
 import pytest
+from programs import main
 from published_tables import print_table
 
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
 

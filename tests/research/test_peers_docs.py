@@ -4,10 +4,10 @@ import re
 from pathlib import Path
 
 import pytest
+from programs import main
 
-from nested_agents.research import ROWS
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
+from research import RESULTS
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
@@ -35,7 +35,7 @@ LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    path = ROWS / f"{name}.json"
+    path = RESULTS / f"{name}.json"
     assert main(["table", str(path), "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in TEXT, f"docs/peers.md: put in\n{table}"

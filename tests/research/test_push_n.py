@@ -1,21 +1,19 @@
 """The benchmark push-n: its worlds, its rules, its entries."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
+from programs import main
 
 import nested_agents as na
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.research import commands, push_n
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
+from research import push_n
 
 pytestmark = pytest.mark.usefixtures("entries_read_once")
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,11 +34,11 @@ def entry(tmp_path: Path) -> Any:
 
 
 def test_entries_by_number_of_robots(entry: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["benchmark", "table", entry(), "--format", "csv"]) == 0
+    assert main(["push_n", "table", entry(), "--format", "csv"]) == 0
     lines = [line.split(",") for line in capsys.readouterr().out.splitlines()]
     assert [n for n in lines[0] if n.endswith("robots")] == [f"{n} robots" for n in push_n.SIZES]
     assert lines[-1][:3] == ["mine", "5", "1.0"]
-    assert main(["benchmark", "table", entry(), "--measure", "decisions"]) == 0
+    assert main(["push_n", "table", entry(), "--measure", "decisions"]) == 0
     assert "mine: by hand; is given nothing" in capsys.readouterr().out
 
 
@@ -71,7 +69,7 @@ def test_what_breaks_a_rule(
     entry: Any, changes: Any, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = entry(**changes)
-    assert main(["benchmark", "check", path]) == 2
+    assert main(["push_n", "check", path]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
@@ -85,16 +83,16 @@ def test_a_file_that_is_no_entry(tmp_path: Path, capsys: pytest.CaptureFixture[s
         ('{"name": "mine"}', "missing"),
     ):
         (tmp_path / "entry.json").write_text(text)
-        assert main(["benchmark", "check", str(tmp_path / "entry.json")]) == 2
+        assert main(["push_n", "check", str(tmp_path / "entry.json")]) == 2
         error = capsys.readouterr().err
         assert (error.count("\n"), message in error) == (1, True)
 
 
 def test_the_schema_of_the_docs(entry: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["benchmark", "check", "--schema"]) == 0
+    assert main(["push_n", "check", "--schema"]) == 0
     schema = (ROOT / "docs" / "_static" / "push-n.schema.json").read_text()
     assert capsys.readouterr().out == schema
-    assert main(["benchmark", "check", entry()]) == 0
+    assert main(["push_n", "check", entry()]) == 0
     assert "mine, 2 robots x 5 seeds" in capsys.readouterr().out
 
 
@@ -119,7 +117,7 @@ def test_a_spec_is_entered(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     (tmp_path / "mine.toml").write_text('preset = "random"\nepisodes = 1\n')
     told = ["--name", "r", "--about", "by chance", "--given", "nothing", "--robots", "2"]
     out = tmp_path / "out"
-    assert main(["benchmark", "run", str(tmp_path / "mine.toml"), "--out", str(out), *told]) == 0
+    assert main(["push_n", "run", str(tmp_path / "mine.toml"), "--out", str(out), *told]) == 0
     entered = push_n.load_entry(out / "entry.json")
     controls = next(e for e in push_n.committed_entries() if e.name == "random")
     assert entered.teams[0].steps == controls.teams[0].steps[:5]
@@ -139,28 +137,8 @@ def test_specs_that_break_a_rule(
 ) -> None:
     (tmp_path / "mine.toml").write_text(spec)
     told = ["--name", "r", "--about", "a", "--robots", "2", "4", "--out", str(tmp_path / "out")]
-    assert main(["benchmark", "run", str(tmp_path / "mine.toml"), *told]) == 2
+    assert main(["push_n", "run", str(tmp_path / "mine.toml"), *told]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.slow
-def test_a_learner_of_another_library_is_entered(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    pytest.importorskip("stable_baselines3")
-    path = tmp_path / "ppo.json"
-    script = ROOT / "examples" / "benchmark_ppo.py"
-    subprocess.run([sys.executable, script, path, "64"], check=True, timeout=280)
-    assert main(["benchmark", "check", str(path)]) == 0
-    assert "PPO of examples, 2 robots x 5 seeds" in capsys.readouterr().out
-    assert push_n.load_entry(path).teams[0].decisions == (64,) * 5
-
-
-def test_the_command_offers_what_entries_may_be() -> None:
-    options = {option.name: option for option in commands.benchmark.commands["run"].params}
-    assert tuple(map(int, options["robots"].type.choices)) == push_n.SIZES
-    allowed = get_args(push_n.Entry.model_fields["given"].annotation)
-    assert tuple(options["given"].type.choices) == allowed

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from programs import main
 
-from nested_agents.research import push_n
-from nested_agents.studies.cli.main import main
+from research import push_n
 
 pytestmark = pytest.mark.usefixtures("entries_read_once")
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "push_n.md").read_text(encoding="utf-8")
@@ -15,7 +15,7 @@ TEXT = (Path(__file__).resolve().parents[2] / "docs" / "push_n.md").read_text(en
 
 @pytest.mark.parametrize("measure", ["success", "decisions"])
 def test_tables(measure: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["benchmark", "table", "--measure", measure, "--format", "markdown"]) == 0
+    assert main(["push_n", "table", "--measure", measure, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in TEXT, f"docs/push_n.md: put in\n{table}"
 

@@ -4,12 +4,12 @@ import re
 from pathlib import Path
 
 import pytest
+from programs import main
 
-from nested_agents.research import ROWS, SPECS
-from nested_agents.research.commands import CATALOGUE
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
+from research import RESULTS, SPECS
+from research.claims import CATALOG
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "related.md").read_text(encoding="utf-8")
@@ -27,7 +27,7 @@ def test_commands_name_specs_that_can_be_built(path: str) -> None:
 
 def test_specs_that_are_named_exist() -> None:
     named = set(re.findall(r"[\w/-]+\.toml", TEXT))
-    folders = (ROOT, SPECS, CATALOGUE)
+    folders = (ROOT, SPECS, CATALOG)
     assert [p for p in named if not any((folder / p).exists() for folder in folders)] == []
 
 
@@ -42,7 +42,7 @@ def test_specs_that_are_named_exist() -> None:
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(ROWS / f"{name}.json")
+    path = str(RESULTS / f"{name}.json")
     assert main(["table", path, "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in TEXT, f"docs/related.md: put in\n{table}"

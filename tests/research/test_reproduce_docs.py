@@ -4,11 +4,11 @@ import re
 from pathlib import Path
 
 import pytest
+from programs import main
 
-from nested_agents.research import ROWS
-from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
+from research import RESULTS
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "reproduce.md").read_text(encoding="utf-8")
@@ -18,7 +18,7 @@ LINES = re.findall(
 
 
 def test_every_published_table_has_its_row() -> None:
-    committed = sorted(path.stem for path in ROWS.glob("*.json"))
+    committed = sorted(path.stem for path in RESULTS.glob("*.json"))
     assert sorted(name for name, *_ in LINES) == committed
 
 
@@ -26,12 +26,14 @@ def test_every_published_table_has_its_row() -> None:
 def row(request: pytest.FixtureRequest) -> tuple[Path, published.Published, str, str, str]:
     """A published file, what it holds, and what the page says of it."""
     name, *said = request.param
-    path = ROWS / f"{name}.json"
+    path = RESULTS / f"{name}.json"
     return path, published.load(path), *said
 
 
 def test_the_spec_gives_the_table(row: tuple[Path, published.Published, str, str, str]) -> None:
     _, rows, spec, trials, minutes = row
+    if "swimmer" in spec:
+        pytest.importorskip("mujoco", reason="extra [mujoco]")
     source = Spec.load(ROOT / spec)
     assert source.study == rows.outline.study
     table = source.table()
@@ -56,4 +58,5 @@ def test_every_committed_file_is_of_this_version_and_has_a_table(
     assert main(["table", str(path), "--format", "markdown"]) == 0
     out, err = capsys.readouterr()
     assert out.count("\n") > 2
-    assert err == ""
+    told = [line for line in err.splitlines() if not line.endswith("is trusted from now on")]
+    assert told == []

@@ -9,15 +9,14 @@ import pytest
 from published_tables import print_table
 
 import nested_agents as na
-from nested_agents.research import ROWS, equal_treatment
-from nested_agents.research.studies.chain_order import equivalence
-from nested_agents.research.studies.edges import TRAINED, analyse
-from nested_agents.studies.catalogue.hierarchies.pooled import effects
 from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.notation import format_estimate, format_number, format_p
 from nested_agents.studies.results.results import Results
 from nested_agents.studies.results.statistics import Estimate, bootstrap, paired_permutation
 from nested_agents.studies.store.database import EVALUATION
+from research import RESULTS, equal_treatment
+from research.studies.chain_order import equivalence
+from research.studies.edges import TRAINED, analyse, effects
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "edges.md"
 
@@ -44,7 +43,7 @@ SETTINGS = {
 
 def test_what_telling_is_worth_over_all_settings() -> None:
     page = PAGE.read_text(encoding="utf-8")
-    results = na.load(ROWS / "edges.json").results
+    results = na.load(RESULTS / "edges.json").results
     for name, whose in SETTINGS.items():
         lost, slower = pooled(results, whose, "considered only")
         line = f"| {name} | {shown(lost)} | {p_of(lost)} | {times(slower)} | {p_of(slower)} |"
@@ -87,7 +86,7 @@ def p_of(of_seeds: np.ndarray) -> str:
 
 
 def test_what_is_equal_to_the_chain() -> None:
-    results = na.load(ROWS / "edges.json").results
+    results = na.load(RESULTS / "edges.json").results
     page = PAGE.read_text(encoding="utf-8")
     for other, (success, decisions) in effects(results, analyse(results).cases, TRAINED).items():
         gained = format_estimate(success.estimate)
@@ -155,7 +154,7 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
 )
 def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
     for name in names:
-        for group in contrasts(na.load(ROWS / f"{name}.json").results, by="topology").groups:
+        for group in contrasts(na.load(RESULTS / f"{name}.json").results, by="topology").groups:
             rates = [line.estimates["evaluation success"].value for line in group.table]
             learner, orders, verdict, ends = re.findall(
                 r"(.+), (\d+) orders, within 0.1: (.+) (\[.+\])", equivalence(group)
@@ -168,7 +167,7 @@ def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
 
 def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
     fitted, ppo = (
-        contrasts(na.load(ROWS / f"orders-line{own}.json").results, by="topology").table
+        contrasts(na.load(RESULTS / f"orders-line{own}.json").results, by="topology").table
         for own in ("", "-ppo")
     )
     for own, other in zip(fitted, ppo, strict=True):

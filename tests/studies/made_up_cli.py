@@ -16,7 +16,6 @@ from io import TextIOWrapper
 import made_up
 import matplotlib.pyplot  # noqa: F401
 
-from nested_agents.research import commands
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.commands import reading, running  # noqa: F401
@@ -69,6 +68,5 @@ if __name__ == "__main__":
         learning_curve.measure = getattr(made_up, task["measure"])
         studies_run.check_conditions = lambda spec, **_: made_up.MEASURES
         figures.USUAL = ("svg",)  # nobody looks at them
-        commands.studies_of = lambda paper: ("learning-curve",)
     sys.argv = ["nested-agents", *task["arguments"]]
     sys.exit(main())

@@ -32,6 +32,7 @@ from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save
+from research import study_of
 
 SPREAD = Measure("spread_m", "greatest spread of the carts", "m", "spread_m", "max", "lower")
 LEVEL = Measure("level", "ever level", source="level", gathering="max", is_rate=True)
@@ -152,7 +153,7 @@ def test_the_learning_curve_and_its_publication(study):
             np.testing.assert_allclose(*ends, atol=0.003)
 
 
-@pytest.mark.parametrize("name", ["ablation", "chain-order"])
+@pytest.mark.parametrize("name", ["ablation", study_of("chain-order")])
 def test_studies_of_success_need_no_more(study, name):
     with Store.open(study) as store:
         results = read(store)
@@ -173,8 +174,8 @@ def test_scaling_leaves_out_contact(carts, tmp_path):
 
 
 def test_shapes_leaves_out_contact(carts):
-    shapes = load_study("shapes")
-    elsewhere = {"study": "shapes", "evaluations": {"other": {"box": "circle"}}}
+    shapes = load_study(study_of("shapes"))
+    elsewhere = {"study": study_of("shapes"), "evaluations": {"other": {"box": "circle"}}}
     (trial, *_) = trials_of(Spec.of(SPEC.table() | elsewhere))
     result = shapes.measure(trial)
     assert result.numbers == {}

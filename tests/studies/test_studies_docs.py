@@ -20,8 +20,7 @@ def test_every_study_is_told_with_its_spec() -> None:
     told = dict(re.findall(r"\| `([a-z-]+)` \| .* \| `([\w-]+\.toml)` \|", TEXT))
     assert set(told) == set(STUDIES.built_in)
     for study, name in told.items():
-        own = ROOT / "studies" / "catalogue" / study.replace("-", "_") / name
-        spec = own if own.exists() else ROOT / "research" / "specs" / name
+        spec = ROOT / "studies" / "catalogue" / study.replace("-", "_") / name
         assert Spec.load(spec).study == study
 
 

@@ -10,7 +10,7 @@ from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.td import FrozenSettings
-from nested_agents.core.networks.settings import DQNSettings
+from nested_agents.core.networks.settings import PPOSettings
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.studies.cli.main import main
@@ -58,7 +58,7 @@ def test_learners_that_need_predictions_are_refused_before_any_trial(
     (line,) = capsys.readouterr().err.splitlines()
     assert "learner.kind = 'batch-td': decides by predicted states" in line
     assert "the scenario Mute has no method predict" in line
-    assert "dqn" in line
+    assert "ppo" in line
     assert "learner.decision.rule = 'random'" in line
     assert [path.name for path in spec.parent.iterdir() if path.is_dir()] == []
 
@@ -74,7 +74,7 @@ def test_the_random_act_without_predictions(spec: Path, capsys: pytest.CaptureFi
 def test_settings_say_whether_they_need_predictions() -> None:
     assert FrozenSettings().needs_prediction
     assert not RANDOM.needs_prediction
-    assert not DQNSettings().needs_prediction
+    assert not PPOSettings().needs_prediction
 
 
 class Unpredicted(LineUp):

@@ -8,6 +8,8 @@ from nested_agents.core.interface.measures import NO_SUCCESS, RETURN, SUCCESS
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
+from nested_agents.studies.spec.studies import MOVED
+from research import study_of
 
 SPREAD = {
     "seeds": 6, "episodes": 2, "steps": 4, "evaluation": 2, "scenario": {"kind": "spread"},
@@ -33,7 +35,8 @@ STUDIES = {
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_studies_compare_returns(study, tmp_path, capsys) -> None:
-    table = {**SPREAD, "study": study, **STUDIES[study]}
+    reference = study_of(study) if study in MOVED else study
+    table = {**SPREAD, "study": reference, **STUDIES[study]}
     if study == "experience":
         del table["episodes"]
     kept = na.run(table, tmp_path / "kept", jobs=1)

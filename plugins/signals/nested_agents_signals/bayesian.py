@@ -62,7 +62,7 @@ class BayesianAgents(na.Agents[Beliefs]):
         cannot weigh.
     """
 
-    at_once: ClassVar[bool] = True
+    at_once = True
     is_vectorized: ClassVar[bool] = True
 
     def __init__(self, settings: Bayesian, placement: na.Placement) -> None:

@@ -81,7 +81,7 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Policy(PolicyMap):
+class BoxPolicyMap(PolicyMap):
     """What each of the first `MOST_ROBOTS` robots of a team does."""
 
     fields: tuple[Field, ...]
@@ -139,7 +139,7 @@ def policy_of(
     box: BoxSpec,
     robots: list[RobotSettings],
     start: str,
-) -> Policy:
+) -> BoxPolicyMap:
     """Return what a team does around the box.
 
     Parameters
@@ -179,7 +179,7 @@ def policy_of(
             moved.append(view.robots[0, robot] - placed[robot])
         ways, turns = np.split(np.array(moved), [2], axis=1)
         fields.append(Field(robot, points, ways, wrap(turns[:, 0]), others[:, :2]))
-    return Policy(tuple(fields), box, robots[0])
+    return BoxPolicyMap(tuple(fields), box, robots[0])
 
 
 def _behind(at: FloatArray, box: BoxSpec, robots: list[RobotSettings], start: str) -> FloatArray:

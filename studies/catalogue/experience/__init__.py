@@ -1,23 +1,34 @@
 """The experience study: what teams return after more and more decisions, on a logarithmic axis.
 
 A trial trains for `decisions` joint decisions, and stops at 1,000, 3,000, 10,000 and so on for an
-evaluation without exploration, on the same worlds every time. Learners in many environments
-count the decisions of all. Conditions that learn nothing are evaluated without training. The
-first condition is compared with all others at the end, paired by seed.
+evaluation without exploration, on the same worlds every time. Policies of probabilities are also
+evaluated by sampled actions. Learners in many environments count the decisions of all. Conditions
+that learn nothing are evaluated without training. The first condition is compared with all others
+at the end, paired by seed, by greedy actions.
 """
 
+from collections.abc import Mapping, Sequence
 from itertools import count
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core.interface.measures import RETURN, SUCCESS
+from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import EVALUATED, Analysis, Figures, Summary, differences, verdicts
+from ...results.analysis import (
+    EVALUATED,
+    Analysis,
+    Figures,
+    Summary,
+    differences,
+    estimate_of,
+    verdicts,
+)
 from ...results.results import CPU, Results
-from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate, stack_estimates
+from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, stack_estimates
 from ...spec.spec import Spec
-from ...trials.session import Session
+from ...store.database import EVALUATION
+from ...trials.session import SAMPLED, Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated
 
@@ -28,6 +39,8 @@ FIRST = 1000
 DECISIONS = "decisions"
 """Name of the number of decisions that a trial was trained for."""
 NUMBERS = (DECISIONS,)
+BY_SAMPLING = f", {SAMPLED.removeprefix(EVALUATION)}"
+"""Suffix of phases and lines of the table in which actions are sampled from the policy."""
 
 
 def stops(decisions: int) -> list[int]:
@@ -72,72 +85,100 @@ def measure(trial: Trial) -> TrialResult:
         if stop < budget and f"{AFTER}{stop}" not in session.phases:
             with session.team.drawing_apart():
                 session.evaluate(phase=f"{AFTER}{stop}")
+            session.evaluate_sampled(f"{AFTER}{stop}{BY_SAMPLING}")
             session.put_down()
     return session.finish({DECISIONS: float(done)}, session.usage)
 
 
-def evaluated_after(results: Results, condition: str) -> dict[int, str]:
+def evaluated_after(results: Results, condition: str, suffix: str = "") -> dict[int, str]:
     """Return the phases in which a condition was evaluated on its way, by how much came before."""
     phases = {
-        int(phase.removeprefix(AFTER)): phase
+        int(count): phase
         for phase in results.phases
-        if phase.startswith(AFTER) and results.has(condition, phase)
+        if phase.startswith(AFTER)
+        and (count := phase.removeprefix(AFTER).removesuffix(suffix)).isdigit()
+        and results.has(condition, phase)
     }
     return dict(sorted(phases.items()))
 
 
 class ReturnCourse(NamedTuple):
-    """How one condition fares with experience."""
+    """Evaluations of one condition in the course of its training."""
 
     condition: str
-    """Its label."""
+    """Label of the condition."""
+    place: int
+    """Number of the condition."""
+    is_sampled: bool
+    """Whether actions are sampled from the policy; otherwise they are greedy."""
     decisions: Array
     """``(k,)`` decisions experienced until each evaluation."""
     values: Estimate
-    """What the evaluations come to ``(k,)``."""
+    """``(k,)`` results of the evaluations."""
 
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("evaluation")
-    is_rate = all(results.has(condition, "evaluation", SUCCESS.name) for condition in conditions)
-    is_rate = is_rate and any(results.success(c, "evaluation").any() for c in conditions)
-    measure = SUCCESS if is_rate else RETURN
-    name = measure.name
-    title = EVALUATED if is_rate else "evaluation return"
-    unknown = next((c for c in conditions if not results.has(c, "evaluation", name)), None)
-    if unknown is not None:  # published results keep no returns
-        raise SpecError(f"study = 'experience': results of {unknown!r} have no {name}")
+    if not conditions:
+        return Analysis(())
+    measure = _measure_of(results, conditions)
+    title = f"evaluation {measure.heading}"
     table = []
     courses = []
-    for condition in conditions:
-        phases = evaluated_after(results, condition)
-        phases[int(results.numbers(condition)[DECISIONS].mean())] = "evaluation"
-        values = {}
-        for stop, phase in phases.items():
-            own = results.values(condition, name, phase)
-            values[stop] = rate(own) if is_rate else bootstrap(own.mean(axis=1))
-        estimates = {f"after {stop:,}": values[stop] for stop in [*values][:-1]}
-        estimates[title] = [*values.values()][-1]
-        numbers = results.numbers(condition)
-        seconds = [key for key in numbers if key.startswith(CPU)]
-        if seconds:
-            last = max(seconds, key=lambda key: int(key.removeprefix(CPU)))
-            estimates["CPU [s]"] = bootstrap(numbers[last], bounds=NOT_NEGATIVE)
-        table.append(Summary(condition, len(results.seeds(condition)), estimates))
-        stacked = stack_estimates([*values.values()])
-        courses.append(ReturnCourse(condition, np.array([*values], float), stacked))
-    if not courses:
-        return Analysis(())
-    means = [results.means(condition, "evaluation", name) for condition in conditions]
+    for index, condition in enumerate(conditions):
+        for is_sampled in (False, True) if results.has(condition, SAMPLED) else (False,):
+            values = _evaluations(results, condition, measure, BY_SAMPLING * is_sampled)
+            *before, last = values
+            estimates = {f"after {stop:,}": values[stop] for stop in before} | {title: values[last]}
+            if not is_sampled:
+                estimates |= _cpu_seconds(results.numbers(condition))
+            label = condition + BY_SAMPLING * is_sampled
+            table.append(Summary(label, len(results.seeds(condition)), estimates))
+            stacked = stack_estimates([*values.values()])
+            decisions = np.array([*values], float)
+            courses.append(ReturnCourse(condition, index, is_sampled, decisions, stacked))
+    means = [results.means(condition, "evaluation", measure.name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
     compared = differences({title: pairs[1:]}, measure)
     heads = {f"{title}, less that of {conditions[0]}": compared[title]}
-    notes = (
+    notes = [
         "after N: when evaluated after N joint decisions of training, of all environments.",
         *verdicts(heads, measure),
-    )
-    return Analysis(tuple(table), notes, courses, compared)
+    ]
+    if any(course.is_sampled for course in courses):
+        notes.insert(1, "Sampled actions are drawn from the policy; others are greedy.")
+    return Analysis(tuple(table), tuple(notes), courses, compared)
+
+
+def _measure_of(results: Results, conditions: Sequence[str]) -> Measure:
+    """Return success if all conditions have it and some team ever succeeds, else the return."""
+    phases = [("evaluation", c) for c in conditions]
+    phases += [(SAMPLED, c) for c in conditions if results.has(c, SAMPLED)]
+    is_rate = all(results.has(c, phase, SUCCESS.name) for phase, c in phases)
+    measure = SUCCESS if is_rate and any(results.success(c, p).any() for p, c in phases) else RETURN
+    unknown = next((c for p, c in phases if not results.has(c, p, measure.name)), None)
+    if unknown is not None:  # published results keep no returns
+        raise SpecError(f"study = 'experience': results of {unknown!r} have no {measure.name}")
+    return measure
+
+
+def _evaluations(
+    results: Results, condition: str, measure: Measure, suffix: str
+) -> dict[int, Estimate]:
+    """Return the evaluations of a condition by the decisions before each, the last one last."""
+    phases = evaluated_after(results, condition, suffix)
+    decisions = int(results.numbers(condition)[DECISIONS].mean())
+    phases[decisions] = SAMPLED if suffix else "evaluation"
+    return {stop: estimate_of(results, condition, p, measure) for stop, p in phases.items()}
+
+
+def _cpu_seconds(numbers: Mapping[str, Array]) -> dict[str, Estimate]:
+    """Return the CPU time of training as a column of the table, if it is known."""
+    counts = [int(name.removeprefix(CPU)) for name in numbers if name.startswith(CPU)]
+    if not counts:
+        return {}
+    return {"CPU [s]": bootstrap(numbers[f"{CPU}{max(counts)}"], bounds=NOT_NEGATIVE)}
 
 
 def draw(analysis: Analysis) -> Figures:
@@ -148,17 +189,25 @@ def draw(analysis: Analysis) -> Figures:
 
     figure, panels = f.panels(1, 1, (5.4, 3.6))
     axes = panels[0, 0]
-    for i, course in enumerate(analysis.cases):
-        f.draw_curve(axes, course.decisions, course.values, i, marker="o", markersize=3.5)
+    courses: Sequence[ReturnCourse] = analysis.cases
+    hollow: dict[str, Any] = {"marker": "o", "markersize": 5, "markerfacecolor": "white"}
+    filled: dict[str, Any] = {"marker": "o", "markersize": 3.5}
+    for course in courses:
+        look = hollow if course.is_sampled else filled
+        f.draw_curve(axes, course.decisions, course.values, course.place, **look)
     f.log_axis(axes, "x")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     axes.set_xlabel("joint decisions of training")
-    is_rate = EVALUATED in analysis.differences
-    axes.set_ylabel(EVALUATED if is_rate else "evaluation return")
+    (title,) = analysis.differences
+    axes.set_ylabel(title)
     axes.grid(axis="y", alpha=0.25)
-    if is_rate:
+    if title == EVALUATED:
         f.as_rates(axes)
-    f.name_curves(figure, [c.condition for c in analysis.cases], marker="o", markersize=3.5)
+    labels = [course.condition for course in courses if not course.is_sampled]
+    handles = [f.handle(label, **f.look(i), lw=1.6, **filled) for i, label in enumerate(labels)]
+    if len(labels) < len(courses):
+        handles.append(f.handle("sampled actions", color="#444444", lw=0, **hollow))
+    f.add_legend(figure, handles, ncols=max(1, 90 // (max(map(len, labels)) + 8)))
     return {"experience": figure}
 
 

@@ -13,7 +13,6 @@ hierarchy that succeeds only where it is easy looks quick.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,7 +36,6 @@ from ...spec.tables import label_but
 from ..scaling import NUMBERS, measure
 from ..study import check_evaluated, distinct
 from .cases import HierarchyCase
-from .pooled import effects, lines_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,9 +81,7 @@ def analyse(results: Results) -> Analysis:
             results, condition, "evaluation", numbers["decision_median"], numbers["messages"]
         )
         cases.append(HierarchyCase(condition, hierarchy, value_of, robots, sizes, values))
-    analysis = analysis_of(results, cases, REFERENCE)
-    pooled = lines_of(effects(results, cases, REFERENCE), REFERENCE)
-    return replace(analysis, notes=(*analysis.notes, *pooled))
+    return analysis_of(results, cases, REFERENCE)
 
 
 def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str) -> Analysis:

@@ -9,9 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
+from ...results.contrasts import mean_estimate, values_by_seed
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rates
 from ..study import measure as measure
@@ -23,6 +26,7 @@ BLOCK = 5
 """Episodes at each end of training that the table averages over."""
 BLOCKS = {"first": slice(BLOCK), "last": slice(-BLOCK, None), "evaluation": slice(None)}
 """The episodes that the table averages over, of training or of evaluation, by name."""
+UNEQUAL = "Seeds trained for different numbers of episodes; curves end with the shortest."
 COLUMNS = 3
 """Panels of the figure that stand beside each other, but for four, which are a square."""
 
@@ -84,7 +88,7 @@ def analyse(results: Results) -> Analysis:
     main = results.main
     for condition in conditions:
         estimates: dict[str, Estimate] = {}
-        episodes = results.values(condition, measures[0].name).shape[1]
+        episodes = results.by_seed(condition, "training", main.name).shape[1]
         for title, m, block in metrics_of(measures, main, results.steps("evaluation"), episodes):
             phase = "evaluation" if block == "evaluation" else "training"
             if results.has(condition, phase, m.name):  # published results keep a part
@@ -97,8 +101,10 @@ def analyse(results: Results) -> Analysis:
     for m in dict.fromkeys((main, *measures)):
         own = [c for c in conditions if results.has(c, "training", m.name)]
         if own and (m == main or not m.is_rate):
-            followed.append((m, {c: results.values(c, m.name) for c in own}))
-    return Analysis(tuple(table), cases=followed)
+            values = {c: results.values(c, m.name) for c in own}
+            followed.append((m, values))
+    is_ragged = any(np.isnan(v).any() for _, values in followed for v in values.values())
+    return Analysis(tuple(table), (UNEQUAL,) * is_ragged, followed)
 
 
 def _leave_out_same(table: Sequence[Summary]) -> None:
@@ -114,14 +120,15 @@ def _leave_out_same(table: Sequence[Summary]) -> None:
 
 
 def _of_evaluations(results: Results) -> Analysis:
-    """Estimate what was measured after training: results of others may have no more."""
-    table = []
-    for condition in results.of_phase("evaluation"):
-        estimates = {}
-        for m in results.measures:
-            estimates[m.heading] = estimate_of(results, condition, "evaluation", m)
-        table.append(Summary(condition, len(results.seeds(condition)), estimates))
-    return Analysis(tuple(table))
+    """Estimate what was measured after training: results of other tools may have no more."""
+    estimates: dict[str, dict[str, Estimate]] = {c: {} for c in results.conditions}
+    for m in results.measures:
+        _, values, _ = values_by_seed(results, m.name)
+        for condition, own in values.items():
+            estimates[condition][m.heading] = mean_estimate(m, own)
+    return Analysis(
+        tuple(Summary(c, len(results.seeds(c)), own) for c, own in estimates.items() if own)
+    )
 
 
 def draw(analysis: Analysis) -> Figures:
@@ -139,7 +146,8 @@ def draw(analysis: Analysis) -> Figures:
     figure, panels = f.grid(len(followed), columns, (2.8, 2.1), (0.0, 1.0), 7.2, sharex=True)
     seeds = {line.condition: line.seeds for line in analysis.table}
     for axes, (measured, training) in zip(panels.flat, followed, strict=False):
-        for condition, curve in curves_of(measured, training).items():
+        complete = {c: v[:, ~np.isnan(v).any(axis=0)] for c, v in training.items()}
+        for condition, curve in curves_of(measured, complete).items():
             episodes = range(len(curve.value))  # counted from 0, as in rows and specs
             marker = "o" if len(curve.value) == 1 else None
             band = 0.12 if curve.value.any() else 0.0  # those that never succeed share one band

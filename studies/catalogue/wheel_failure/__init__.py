@@ -273,7 +273,7 @@ def draw(analysis: Analysis) -> Figures:
         handles.append(f.handle("transient failure", color=FAILING, alpha=SHADE, linewidth=8))
     seeds = f.count_seeds(len(course.measured.success) for course in courses)
     title = f"what adapts\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95% bands"
-    f.add_legend(figure, handles, title, ncols=len(handles))
+    f.add_legend(figure, handles, title, ncols=4 if len(handles) == 4 else 3)
     return {"wheel-failure": figure}
 
 

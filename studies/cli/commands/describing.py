@@ -227,27 +227,6 @@ def profile(spec: Path, seconds: float, form: str, changes: tuple[str, ...]) -> 
     return 0
 
 
-@click.command()
-@click.argument("learners", metavar="[LEARNER]...", nargs=-1)
-@options.formats("table", "markdown")
-def combine(learners: tuple[str, ...], form: str) -> int:
-    """Try every learner with every part of a condition; takes a minute.
-
-    A trial of a few decisions is run of each pair: with every topology, what agents are told and
-    consider, failures, other evaluations, curricula, kept teams, predictors.
-
-    LEARNER is a kind of learner; default: all that are built in.
-    """
-    from ...explain.combination_tables import write
-    from ...explain.combinations import cells
-    from ...presentation.progress import say
-
-    say("running a few decisions of every combination, first compiling what is not")
-    for line in write(cells(learners), markdown=form == "markdown"):
-        print_text(line)
-    return 0
-
-
 TOPOLOGY = {"kind", "members", "edges"}
 """Keys of a file that holds a topology and no more."""
 

@@ -1,6 +1,7 @@
 """Commands that read a study, or several: what it measured, how far it is, what was learned."""
 
 import io
+import json
 import sys
 import time
 from pathlib import Path
@@ -27,7 +28,14 @@ from ..display import (
     print_table,
     print_text,
 )
-from ..loading import load_results, open_study, trust_files, untrusted
+from ..loading import (
+    load_results,
+    open_study,
+    read_results,
+    say_remarks,
+    trust_files,
+    untrusted,
+)
 
 PERIOD = 2.0
 """How often a study that is watched is looked at [s]."""
@@ -142,9 +150,7 @@ class Compared(TypedDict):
 @click.option(
     "--better",
     type=click.Choice(["higher", "lower"]),
-    default="higher",
-    show_default=True,
-    help="Which scores of a table are better.",
+    help="Which scores of other tools are better; by default higher ones.",
 )
 @options.flag("--legend", "Say below the table what its columns are.")
 @options.out("A page to write: verdicts, table, statistics and figure.", "FILE.html")
@@ -153,7 +159,7 @@ class Compared(TypedDict):
 def compare(
     sources: tuple[Path, ...],
     columns: tuple[str, ...],
-    better: Literal["higher", "lower"],
+    better: Literal["higher", "lower"] | None,
     out: Path | None,
     statistics: bool,
     legend: bool,
@@ -171,7 +177,7 @@ def compare(
     FILE may also be a table of scores that others have measured, .csv, .jsonl or .parquet: a row
     for each score of a condition, by run (seed), or on an item, or both.
     """
-    loaded = load_results(sources, where=where, trust=trust, columns=columns, better=better)
+    loaded = read_results(sources, where=where, trust=trust, columns=columns, better=better)
     comparison = loaded.compare(**compared)
     if plot is not None:
         from ...presentation.figures import write
@@ -181,6 +187,7 @@ def compare(
     if out is not None:
         comparison.report(out, ", ".join(map(str, sources)))
     if form != "table":
+        say_remarks(loaded)
         print_data(in_form(comparison.table, form))
         if statistics:
             print_data(f"\n{in_form(comparison.aggregated, form)}")
@@ -278,7 +285,7 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
 def _contents(store: Store, form: Files) -> dict[str, bytes]:
     """Return the content of each file by its name, see `results.published`."""
     from ...catalogue.study import select_published
-    from ...presentation.tables import in_csv
+    from ...presentation.tables import in_csv, in_parquet
     from ...results import marl_eval, published
     from ...results.results import read
 
@@ -288,17 +295,16 @@ def _contents(store: Store, form: Files) -> dict[str, bytes]:
         with sources_of(store).active():
             kept = select_published(outline.study, results)
         return {"results.json": published.dumps(outline, kept).encode()}
+    header = json.dumps(published.header(outline, results), indent=1)
+    described = {published.HEADER: f"{header}\n".encode()}
     if form == "marl-eval":
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
-        return {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study).encode()}
+        text = marl_eval.dumps(results, kinds, outline.study)
+        return {"marl-eval.json": text.encode()} | described
     frames = {"episodes": results.episodes, "trials": results.trials}
     if form == "csv":
-        return {f"{name}.csv": in_csv(frame).encode() for name, frame in frames.items()}
-    try:
-        return {f"{name}.parquet": frame.to_parquet() for name, frame in frames.items()}
-    except ImportError:
-        install = command_line("install", "pyarrow", program="pip")
-        raise SpecError(f"--format parquet: pyarrow is not installed; {install}") from None
+        return {f"{n}.csv": in_csv(frame).encode() for n, frame in frames.items()} | described
+    return {f"{n}.parquet": in_parquet(frame) for n, frame in frames.items()} | described
 
 
 @click.command()

@@ -11,8 +11,10 @@ from .. import options
 from ..display import print_data, print_table, print_text, show_results
 
 
-class Rerun(options.RunOptions, options.AnswerOptions):
-    """The options of ``run`` and ``retry`` that say how trials are run."""
+class Rerun(options.RunOptions):
+    """Options of ``run`` and ``retry``."""
+
+    checkpoint: float
 
 
 @click.command()
@@ -68,7 +70,7 @@ def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
     required=True,
 )
 @options.running
-@options.recorded
+@options.checkpoint
 @options.trust
 @options.figures
 @options.changes
@@ -198,7 +200,7 @@ def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Unpack[S
 @click.command()
 @options.directory
 @options.running
-@options.recorded
+@options.checkpoint
 @options.trust
 def retry(directory: Path, trust: bool, **running: Unpack[Rerun]) -> int:
     """Run the failed trials of a study again, and whatever is left of it.

@@ -121,7 +121,9 @@ def test_a_team_without_some_decides_as_the_smaller_team(evaluator: str) -> None
 
 
 def test_functions_that_have_left_are_not_called_and_pay_nothing() -> None:
-    source = "def decide(observation, told, agent):\n    return {'action': 0, 'message': agent}\n"
+    source = (
+        "def decide(observation, received, agent):\n    return {'action': 0, 'message': agent}\n"
+    )
     with Sources(texts={"f.py": source}).active():
         left = LeftAgents(agents="cart1", episode=1, repair="next")
         team, world = carts([left], {"kind": "f.py:decide"}, 3)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents.core.plugins import trust
-from nested_agents.core.plugins.sources import Sources, active, former_kept_name, kept_name
+from nested_agents.core.plugins.sources import Sources, active, kept_name
 
 TEXT = "LINKS = 3\n\n\ndef twice(x):\n    return 2 * x\n"
 
@@ -127,6 +127,48 @@ def test_a_file_that_needs_another_one_is_refused(tmp_path: Path, beside: str) -
         Sources(tmp_path).load("links.py:links")
 
 
+def test_an_installed_module_is_imported_whatever_stands_beside_a_file(tmp_path: Path) -> None:
+    (tmp_path / "links.py").write_text("import random, numpy\nLINKS = numpy.pi, random.random")
+    for beside in ("random.py", "numpy.py"):
+        (tmp_path / beside).write_text("raise ImportError")
+    assert Sources(tmp_path).load("links.py:LINKS")[0] > 3
+
+
+KERNEL = """
+from numba import njit
+
+
+@njit(cache=True)
+def double(x):
+    return 2 * x
+"""
+
+
+def test_no_compiled_code_beside_a_file_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    assert Sources(tmp_path).load("kernel.py:double")(2) == 4
+    assert not (tmp_path / "__pycache__").exists()
+    assert list((tmp_path / "cache").rglob("*.nbi"))
+    # Kept with a study, the file lies nowhere.
+    assert Sources(None, {"other.py": KERNEL}).load("other.py:double")(2) == 4
+
+
+def test_without_a_folder_to_write_to_nothing_compiled_is_kept_or_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    (tmp_path / "homeless.py").write_text(KERNEL)
+    with pytest.raises(ValueError, match="no locator available"):
+        Sources(tmp_path).load("homeless.py:double")
+    (tmp_path / "homeless.py").write_text(KERNEL.replace("(cache=True)", ""))
+    assert Sources(tmp_path).load("homeless.py:double")(2) == 4
+    assert not (tmp_path / "__pycache__").exists()
+
+
 @given(st.lists(st.text("ab_/%\\", min_size=1, max_size=8), min_size=2, max_size=2, unique=True))
 def test_copies_of_different_files_have_different_names(names: list[str]) -> None:
     one, other = map(kept_name, names)
@@ -139,22 +181,3 @@ def test_a_long_path_has_a_copy_of_a_name_that_file_systems_take() -> None:
     assert len(set(names)) == 3
     assert all(len(name.encode()) <= 200 and name.endswith("arm.py") for name in names)
     assert names[0].count("folder__") == 10
-
-
-def test_a_copy_under_the_name_of_an_earlier_version_is_read(tmp_path: Path) -> None:
-    copies = tmp_path / "sources"
-    copies.mkdir()
-    (copies / former_kept_name("arms/my__arm.py")).write_text(TEXT)
-    assert kept_name("arms/my__arm.py") != former_kept_name("arms/my__arm.py")
-    assert Sources(tmp_path).text("arms/my__arm.py") == TEXT
-    (copies / kept_name("arms/my__arm.py")).write_text("LINKS = 4")
-    assert Sources(tmp_path).text("arms/my__arm.py") == "LINKS = 4"
-
-
-def test_one_copy_of_two_files_is_none(tmp_path: Path) -> None:
-    (tmp_path / "sources").mkdir()
-    (tmp_path / "sources" / "a__b.py").write_text(TEXT)
-    sources = Sources(tmp_path)
-    assert sources.text("a__b.py") == TEXT
-    with pytest.raises(ValueError, match=r"^a/b\.py: the copy a__b\.py in .* is that of a__b\.py"):
-        sources.text("a/b.py")

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import chain_order as chain_order
-from nested_agents.research.studies.chain_order import analyse, draw
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.results.analysis import Analysis, Difference
 from nested_agents.studies.spec.spec import Spec
+from research import SPECS
+from research.studies import chain_order as chain_order
+from research.studies.chain_order import analyse, draw
 
 ORDERS = ["chain:" + ",".join(order) for order in permutations(("r1.a", "r1.b", "r2.a"))]
 

@@ -5,15 +5,15 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, SEEDS, Arrays, shapes
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import edges as module
-from nested_agents.research.studies.edges import TRAINED, analyse, check, draw, measure
 from nested_agents.studies.catalogue.hierarchies import DECIDING
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS, study_of
+from research.studies import edges as module
+from research.studies.edges import TRAINED, analyse, check, draw, measure
 
 SILENT = {"topology": {"told": "none"}}
 ALONE = {"topology": {"told": "none", "considers": "none"}}
@@ -82,12 +82,12 @@ def test_told_by_considered_is_drawn_as_four_fields_for_each_size() -> None:
 
 
 def test_a_spec_without_another_hierarchy_is_refused() -> None:
-    with pytest.raises(SpecError, match="evaluations: missing; edges needs one at least"):
-        check(Spec.of({"study": "edges"}))
+    with pytest.raises(SpecError, match=r"evaluations: missing; .*EdgesStudy needs one at least"):
+        check(Spec.of({"study": study_of("edges")}))
 
 
 def test_one_team_acts_under_every_hierarchy() -> None:
-    table = {"study": "edges", "seeds": [7], "episodes": 1, "steps": 6, "evaluation": 2}
+    table = {"study": study_of("edges"), "seeds": [7], "episodes": 1, "steps": 6, "evaluation": 2}
     evaluations = {"same": {"topology": {"told": "ancestors"}}, "silent": SILENT, "alone": ALONE}
     (trial,) = trials_of(Spec.of(table | {"evaluations": evaluations}))
     result = measure(trial)
@@ -104,7 +104,7 @@ def test_one_team_acts_under_every_hierarchy() -> None:
 
 def test_the_same_team_acts_as_if_it_had_been_built_under_the_other_hierarchy() -> None:
     """A chain that tells and considers nothing decides as independent agents do."""
-    table = {"study": "edges", "seeds": [3], "episodes": 1, "steps": 6, "evaluation": 2}
+    table = {"study": study_of("edges"), "seeds": [3], "episodes": 1, "steps": 6, "evaluation": 2}
     evaluations = {"parted": ALONE, "independent": {"topology": "independent"}}
     (trial,) = trials_of(Spec.of(table | {"evaluations": evaluations}))
     rows = measure(trial).rows

@@ -3,14 +3,14 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, SEEDS, Arrays, games
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import fit as module
-from nested_agents.research.studies.fit import analyse, check, draw, measure
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS, study_of
+from research.studies import fit as module
+from research.studies.fit import analyse, check, draw, measure
 
 EDGES = {"own edges": 0.95, "wrong edges": 0.3, "none": 0.3}
 
@@ -52,7 +52,7 @@ def test_every_spec_can_be_run(path: Path) -> None:
 
 def test_a_study_without_a_condition_of_no_edges_is_refused() -> None:
     with pytest.raises(SpecError, match='name = "none", there is none'):
-        check(Spec(study="fit", evaluation=1))
+        check(Spec(study=study_of("fit"), evaluation=1))
 
 
 def test_a_trial_counts_agents_and_messages() -> None:

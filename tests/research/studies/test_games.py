@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import games as module
-from nested_agents.research.studies.games import AFTER_ONE, analyse, check, draw, measure
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS, study_of
+from research.studies import games as module
+from research.studies.games import AFTER_ONE, analyse, check, draw, measure
 
 SPEC = SPECS / "games.toml"
 SEEDS = 40
@@ -51,8 +51,8 @@ def test_systems_stand_side_by_side(tmp_path: Path) -> None:
 
 
 def test_without_evaluation_it_is_refused() -> None:
-    with pytest.raises(SpecError, match="evaluation = 0: games compares"):
-        check(Spec.of({"study": "games", "evaluation": 0}))
+    with pytest.raises(SpecError, match=r"evaluation = 0: .*GamesStudy compares"):
+        check(Spec.of({"study": study_of("games"), "evaluation": 0}))
 
 
 def test_the_first_evaluation_leaves_no_trace() -> None:

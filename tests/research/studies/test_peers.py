@@ -1,7 +1,4 @@
-"""The peers study: evaluations on the way, comparison and figure; of ours alone, as they are quick.
-
-What stable-baselines3 learns is in tests/core/networks.
-"""
+"""The peers study: evaluations on the way, comparison and figure."""
 
 from pathlib import Path
 
@@ -9,17 +6,17 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import peers as module
-from nested_agents.research.studies.peers import analyse, check, draw, measure, stops
 from nested_agents.studies.catalogue.study import draw_figures, load_study
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS, study_of
+from research.studies import peers as module
+from research.studies.peers import analyse, check, draw, measure, stops
 
-PATHS = sorted(path for path in SPECS.glob("*.toml") if 'study = "peers"' in path.read_text())
+PATHS = sorted(path for path in SPECS.glob("*.toml") if "peers.py:PeersStudy" in path.read_text())
 SEEDS = 10
 
 
@@ -64,7 +61,7 @@ def test_success_against_experience(tmp_path: Path) -> None:
 
 def test_evaluations_on_the_way_leave_no_trace() -> None:
     table = {
-        "study": "peers", "seeds": [7], "episodes": 5, "steps": 20, "evaluation": 2,
+        "study": study_of("peers"), "seeds": [7], "episodes": 5, "steps": 20, "evaluation": 2,
         "scenario": {"kind": "line-up"},
     }  # fmt: skip
     (trial,) = trials_of(Spec.of(table))
@@ -76,11 +73,11 @@ def test_evaluations_on_the_way_leave_no_trace() -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(SpecError, match="evaluation = 0: peers compares"):
-        check(Spec.of({"study": "peers", "evaluation": 0}))
+    with pytest.raises(SpecError, match=r"evaluation = 0: .*PeersStudy compares"):
+        check(Spec.of({"study": study_of("peers"), "evaluation": 0}))
 
 
-@pytest.mark.parametrize("study", ["wheel-failure", "related"])
+@pytest.mark.parametrize("study", ["wheel-failure", study_of("related")])
 def test_studies_of_rule_bases_refuse_peers_before_they_begin(study: str, tmp_path: Path) -> None:
     path = tmp_path / "spec.toml"
     path.write_text(f'study = "{study}"\n[learner]\nkind = "ppo"\n')

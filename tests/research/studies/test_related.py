@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import related as module
-from nested_agents.research.studies.related import analyse, check, draw, measure
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS, study_of
+from research.studies import related as module
+from research.studies.related import analyse, check, draw, measure
 
 CHANGES = ["seeds=2", "episodes=1", "steps=20", "evaluation=1"]
 
@@ -73,5 +73,5 @@ def test_its_specs_have_the_systems_of_the_paper(name: str) -> None:
 
 
 def test_without_evaluation_it_is_refused() -> None:
-    with pytest.raises(SpecError, match="evaluation = 0: related compares"):
-        check(Spec.of({"study": "related", "evaluation": 0}))
+    with pytest.raises(SpecError, match=r"evaluation = 0: .*RelatedStudy compares"):
+        check(Spec.of({"study": study_of("related"), "evaluation": 0}))

@@ -3,13 +3,14 @@ from pathlib import Path
 import pytest
 from made_up_results import NOTHING, shapes
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies.shapes import analyse, check, draw, measure
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.study import run_trial as measure
+from research import SPECS, study_of
+from research.studies.shapes import analyse, check, draw
 
 CHANCES = {"circle": 0.95, "hexagon": 0.9, "L": 0.3}
 
@@ -34,12 +35,12 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
 
 
 def test_a_spec_without_another_box_is_refused() -> None:
-    with pytest.raises(SpecError, match="evaluations: missing; shapes needs one at least"):
-        check(Spec.of({"study": "shapes"}))
+    with pytest.raises(SpecError, match=r"evaluations: missing; .*ShapesStudy needs one at least"):
+        check(Spec.of({"study": study_of("shapes")}))
 
 
 def test_one_team_is_evaluated_with_every_box() -> None:
-    table = {"study": "shapes", "seeds": [7], "episodes": 1, "steps": 4, "evaluation": 2}
+    table = {"study": study_of("shapes"), "seeds": [7], "episodes": 1, "steps": 4, "evaluation": 2}
     (trial,) = trials_of(Spec.of(table | {"evaluations": {"circle": {"box": "circle"}}}))
     result = measure(trial)
     assert result.rows == run_trial(trial).rows

@@ -6,14 +6,14 @@ from made_up_results import NOTHING, SEEDS, Arrays
 from nested_agents_signals.scenario import MEASURES
 from nested_agents_signals.theory import cascade, majority
 
-from nested_agents.research import SPECS
-from nested_agents.research.studies import signals as module
-from nested_agents.research.studies.signals import analyse, check, draw, measure
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS, study_of
+from research.studies import signals as module
+from research.studies.signals import analyse, check, draw, measure
 
 PATHS = sorted(SPECS.glob("signals*.toml"))
 
@@ -25,7 +25,7 @@ def test_every_spec_can_be_run(path: Path) -> None:
 
 def test_another_world_is_refused() -> None:
     with pytest.raises(SpecError, match="'box-pushing': signals needs 'signals'"):
-        check(Spec(study="signals", evaluation=1))
+        check(Spec(study=study_of("signals"), evaluation=1))
 
 
 def test_a_trial_has_its_theory() -> None:

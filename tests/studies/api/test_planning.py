@@ -100,7 +100,9 @@ def test_doubtful_sizes_are_told_before_anything_is_spent(tmp_path, capsys) -> N
 
 
 def test_what_functions_cost_is_told_by_condition(tmp_path) -> None:
-    program = "def decide(observation, told):\n    return {'action': 0, 'costs': {'tokens': 2}}\n"
+    program = (
+        "def decide(observation, received):\n    return {'action': 0, 'costs': {'tokens': 2}}\n"
+    )
     (tmp_path / "f.py").write_text(program)
     spec = {
         "seeds": 2, "episodes": 1, "steps": 5, "evaluation": 1,

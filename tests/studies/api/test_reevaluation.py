@@ -222,8 +222,9 @@ def test_a_learner_that_acts_by_itself_is_kept_if_it_can_be_restored(tmp_path):
     spec = Spec.of(table, Sources(texts={"mine.py": PEER + RESTORE}))
     with spec.sources.active():
         study = na.load(kept_at(tmp_path, spec))
-    _, team = study.team()
-    assert team.arrays()["taken"] == team.act(None).joint_action[0]
+    scenario, team = study.team()
+    seen = na.Observation(scenario.reset(0), scenario)
+    assert team.arrays()["taken"] == team.act(seen).joint_action[0]
     own = study.episodes.query("phase == 'evaluation'")["return"]
     assert na.reevaluate(study, ["chain"], jobs=1)["return"].tolist() == own.tolist()
     with pytest.raises(na.SpecError, match="Mine has no continue_from"):

@@ -93,7 +93,7 @@ def test_every_condition_is_in_the_legend(tmp_path):
 
 def test_the_interval_of_a_cell():
     assert Cell.of(Estimate(*map(np.asarray, (0.5, np.nan, np.nan)))).interval == ""
-    assert Cell.of(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))).interval == "[0.25, 1.0]"
+    assert Cell.of(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))).interval == "[0.25, 1.00]"
     assert Cell.of(Estimate(*map(np.asarray, (-0.6, -0.72, -0.53)))).interval == "[-0.72, -0.53]"
     assert format_number(float("nan")) == "?"
 

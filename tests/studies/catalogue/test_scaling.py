@@ -4,7 +4,6 @@ from typing import Any
 import pytest
 from made_up_results import NOTHING, Arrays, scaling
 
-from nested_agents.research import SPECS
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
 from nested_agents.studies.catalogue.study import draw_figures, load_study
@@ -13,6 +12,7 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import arrange, check_conditions
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
 
 SIZES = {2: 0.9, 8: 0.9, 64: 0.5}
 
@@ -117,14 +117,11 @@ SHORT = {"rollout": 4, "batch_size": 4, "epochs": 1, "hidden": [8]}
         ({"kind": "hierarchy-ppo", **SHORT}, "actuator", {"messages": 1, "joint_actions": 8}),
         ({"kind": "mappo", **SHORT}, "actuator", {"messages": 0, "joint_actions": 8}),
         ({"kind": "ppo", **SHORT}, "actuator", {"messages": 0, "joint_actions": 8}),
-        ({"kind": "dqn", "hidden": [8]}, "team", {"messages": 0, "agents": 1}),
     ],
 )
 def test_agents_of_every_kind_are_counted(
     learner: dict[str, Any], agents: str, expected: dict[str, float]
 ) -> None:
-    if "hidden" in learner:
-        pytest.importorskip("stable_baselines3", reason="extra [peers]")
     table = {
         "study": "scaling",
         "seeds": [7],
@@ -146,7 +143,6 @@ def test_agents_of_every_kind_are_counted(
 
 
 def test_weights_of_networks_by_hand() -> None:
-    pytest.importorskip("stable_baselines3", reason="extra [peers]")
     table = {
         "scenario": {"kind": "line-up", "carts": 2},
         "learner": {"kind": "hierarchy-ppo", "critic": "own", **SHORT},

@@ -7,7 +7,6 @@ from acting import fuzzy
 from made_up_results import NOTHING, ablation, wheel_failure
 from matplotlib.patches import Rectangle
 
-from nested_agents.research import SPECS
 from nested_agents.studies.catalogue import wheel_failure as module
 from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.catalogue.wheel_failure import (
@@ -26,6 +25,7 @@ from nested_agents.studies.results.results import KEPT
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
 
 ENDS = {
     "4 wheels, seized": {"nothing": 0.05, "weights": 0.4, "self-model": 0.7, "both": 0.95},

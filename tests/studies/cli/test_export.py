@@ -41,8 +41,8 @@ def read(path):
 def test_csv_holds_every_episode_and_every_trial_with_every_swept_key(study, tmp_path, capsys):
     assert main(["export", str(study), "--out", str(tmp_path / "new" / "folder")]) == 0
     paths = [Path(line) for line in capsys.readouterr().out.splitlines()]
-    assert [path.name for path in paths] == ["episodes.csv", "trials.csv"]
-    episodes, trials = map(read, paths)
+    assert [path.name for path in paths] == ["episodes.csv", "trials.csv", "study.json"]
+    episodes, trials = map(read, paths[:2])
     assert len(episodes) == 7 * (4 + 2)
     assert list(episodes[0])[:6] == [
         "condition", "preset", "scenario.action_repeat", "seed", "phase", "episode",
@@ -169,7 +169,7 @@ def test_parquet_holds_the_same_with_types(study, tmp_path, capsys):
     pytest.importorskip("pyarrow", reason="extra [parquet]")
     assert main(["export", str(study), "--format", "parquet", "--out", str(tmp_path)]) == 0
     names = [Path(line).name for line in capsys.readouterr().out.splitlines()]
-    assert names == ["episodes.parquet", "trials.parquet"]
+    assert names == ["episodes.parquet", "trials.parquet", "study.json"]
     episodes = pd.read_parquet(tmp_path / "episodes.parquet")
     expected = load(study).episodes
     assert episodes["success"].dtype == bool

@@ -94,22 +94,6 @@ def test_a_killed_retry_is_continued_by_the_same_command(spec_file, whole, tmp_p
 
 
 @pytest.mark.slow
-def test_killed_claims_are_continued_by_the_same_command(tmp_path):
-    line = ["claims", "--quick", "--out", tmp_path / "claims"]
-    process = Command("slow", *line)
-    wait_for_results(tmp_path / "claims" / "learning-curve", process)
-    process.kill()
-    process.communicate(timeout=60)
-    with Store.open(tmp_path / "claims" / "learning-curve") as store:
-        store.verify()
-        done = store.counts()["done"]
-    status, _, error = finish(Command("measure", *line))
-    assert status == 0, error
-    assert f"{done} of" in error
-    assert "were run before" in error
-
-
-@pytest.mark.slow
 def test_a_killed_explanation_is_begun_again(tmp_path):
     spec = made_up.Spec.of({"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 0})
     (tmp_path / "spec.toml").write_text(dumps(spec.table()))

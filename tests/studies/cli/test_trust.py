@@ -196,6 +196,7 @@ def test_a_report_says_what_it_leaves_out(
 
 
 PAYLOAD = """
+from networkx import DiGraph
 from nested_agents.core.decision.exploration import BurstExploration
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 
@@ -211,6 +212,10 @@ class Bursts(BurstExploration):
 
 def ring(agents, bodies):
     return list(zip(agents, agents[1:]))
+
+
+def graph(agents, bodies):
+    return DiGraph(ring(agents, bodies))
 """
 SMALL = """
 seeds = 2
@@ -307,6 +312,30 @@ def test_no_command_imports_what_somebody_elses_study_names(
         assert main([name, str(study), *options, "--trust"]) == 0
         assert f"payload.parts, which {study} names, is trusted" in capsys.readouterr().err
         assert main([name, str(study), *options]) == 0
+
+
+def test_a_module_that_a_file_of_a_hierarchy_names_is_trusted_with_the_study(
+    naming: tuple[str, Path],
+    reader: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    _, folder = naming
+    monkeypatch.syspath_prepend(folder)
+    (reader / "teams.toml").write_text('kind = "payload.parts:graph"\n')
+    (reader / "spec.toml").write_text(f"topology = 'teams.toml'\n{SMALL}scenario.kind='line-up'")
+    study = reader / "study"
+    line = ["run", str(reader / "spec.toml"), "--out", str(study), "--jobs", "1"]
+    with monkeypatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(folder))
+        patch.setenv("XDG_STATE_HOME", str(folder / "state"))
+        assert main(line) == 0
+    monkeypatch.setattr(trust, "_noted", set())
+    forget_payload()
+    assert main(["explain", str(study)]) == 2
+    assert "--trust imports it" in capsys.readouterr().err
+    assert "payload.parts" not in sys.modules
+    assert main(["explain", str(study), "--trust"]) == 0
 
 
 @pytest.mark.parametrize("command", ["table", "compare"])

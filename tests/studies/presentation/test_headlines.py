@@ -1,25 +1,45 @@
 """Sentences on what the teams of a study have learned."""
 
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 from nested_agents.core.interface.measures import SUCCESS
-from nested_agents.studies.presentation.headlines import headlines
-from nested_agents.studies.results.results import from_arrays
+from nested_agents.studies.presentation.headlines import below_random, headlines
+from nested_agents.studies.results.results import Results, from_arrays
+from nested_agents.studies.spec.controls import TROUBLESHOOTING
 from nested_agents.studies.spec.spec import Spec
 
+Lines = Callable[[Results, Mapping[str, Mapping[str, Any]]], tuple[str, ...]]
 RATES = {"default": 9, "frozen": 0, "random": 0, "planner": 10}
 
 
-def lines_of(rates: dict[str, int], seeds: int = 8) -> str:
-    """Return what is said of conditions by the successes of ten evaluation episodes."""
+def lines_of(rates: dict[str, int], seeds: int = 8, lines: Lines = headlines) -> str:
+    """Return the lines about conditions, given the successes of ten evaluation episodes."""
     spec = Spec.of({"sweep": {"preset": list(rates)}})
     arrays = {c: {"success": np.tile(np.arange(10) < n, (seeds, 1))} for c, n in rates.items()}
     of_seeds = {c: range(seeds) for c in rates}
     columns = {c: {"preset": c} for c in rates}
     results = from_arrays({"evaluation": arrays}, of_seeds, {}, {}, columns, (SUCCESS,))
     settings = {c.label: c.settings.model_dump() for c in spec.conditions()}
-    return " ".join(headlines(results, settings))
+    return " ".join(" ".join(lines(results, settings)).split())
+
+
+def test_a_learner_below_random_actions_is_remarked() -> None:
+    text = lines_of({"default": 1, "random": 3}, lines=below_random)
+    assert text.startswith("Below random actions in evaluation success: default 0.10 [")
+    assert "; random 0.30 [" in text
+    assert "docs/not_learned.md" in text
+    assert lines_of({"default": 3, "random": 3}, lines=below_random) == ""
+    assert lines_of({"default": 1, "planner": 9}, lines=below_random) == "", "no random control"
+    assert lines_of({"frozen": 1, "random": 3}, lines=below_random) == "", "it does not learn"
+
+
+def test_the_page_that_the_remark_names_exists() -> None:
+    assert (Path(__file__).parents[3] / TROUBLESHOOTING).is_file()
 
 
 def test_a_team_has_learned_if_it_is_better_than_its_untrained_weights() -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from nested_agents import studies
-from nested_agents.research import SPECS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.page import extremes, page, rate_of, unfolded
@@ -15,6 +14,7 @@ from nested_agents.studies.results.statistics import exactly
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
 
 
 @pytest.fixture(scope="module")

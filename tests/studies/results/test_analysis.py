@@ -1,17 +1,103 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from made_up_results import ablation
+from scipy import stats
 
+from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.studies.results.analysis import (
     Difference,
     difference,
     differences,
+    estimate_of,
+    estimate_over_seeds,
+    paired_difference,
     ratio,
     select_shared,
     verdicts,
 )
-from nested_agents.studies.results.results import Results
-from nested_agents.studies.results.statistics import Estimate
+from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.results import (
+    STEPS,
+    Results,
+    StepLimits,
+    describe_number,
+    from_arrays,
+)
+from nested_agents.studies.results.statistics import NOT_NEGATIVE, Estimate, bootstrap
+
+
+def within(estimate: Estimate, bounds: tuple[float, float]) -> bool:
+    """Return whether an interval lies within bounds and contains its value."""
+    least, greatest = bounds
+    value, low, high = map(float, estimate)
+    return least <= low <= value + 1e-9 and value - 1e-9 <= high <= greatest
+
+
+MEASURES = (
+    Measure("share", "share", least=0.0, greatest=1.0),
+    Measure("distance", "distance", "m", least=0.0),
+    Measure("angle", "angle", "rad", least=-3.0, greatest=3.0),
+)
+
+
+@given(st.data(), st.sampled_from(MEASURES), st.integers(2, 12))
+def test_no_interval_leaves_the_range_of_its_measure(data, measure, n_seeds) -> None:
+    least, greatest = measure.bounds
+    values = st.lists(st.floats(least, min(greatest, 1e6)), min_size=n_seeds, max_size=n_seeds).map(
+        np.array
+    )
+    own, base = data.draw(values), data.draw(values)
+    assert within(estimate_over_seeds(own, measure), measure.bounds)
+    reach = greatest - least
+    assert within(paired_difference(own, base, measure), (-reach, reach))
+
+
+@given(st.lists(st.booleans(), min_size=2, max_size=12), st.data())
+def test_no_interval_of_rates_leaves_their_range(own, data) -> None:
+    base = data.draw(st.lists(st.booleans(), min_size=len(own), max_size=len(own)))
+    one, other = np.array(own, float), np.array(base, float)
+    assert within(estimate_over_seeds(one, SUCCESS), (0.0, 1.0))
+    assert within(paired_difference(one, other, SUCCESS), (-1.0, 1.0))
+
+
+def lengths(steps: list[list[int]], limits: StepLimits) -> Results:
+    phases = {"evaluation": {"a": {"steps": steps, "success": np.zeros(np.shape(steps))}}}
+    results = from_arrays(phases, {"a": range(len(steps))}, {}, {}, {"a": {}}, (SUCCESS,))
+    return replace(results, step_limits=limits)
+
+
+def test_lengths_of_episodes_end_at_the_longest_allowed() -> None:
+    """Of 150, 150 and 100 steps Student's interval would reach from 62 to 205."""
+    results = lengths([[150], [150], [100]], StepLimits(450, 150))
+    estimate = estimate_of(results, "a", "evaluation", STEPS)
+    assert float(estimate.high) == 150.0
+    assert float(estimate.low) == pytest.approx(400 / 3 - 4.3027 * 28.868 / 3**0.5, abs=0.1)
+    assert float(contrasts(results, "steps").table[0].estimates["evaluation steps"].high) == 150.0
+    equal = estimate_of(lengths([[25], [25]], StepLimits(25, 25)), "a", "evaluation", STEPS)
+    assert tuple(map(float, equal)) == (25.0, 25.0, 25.0)
+
+
+@pytest.mark.parametrize(
+    ("spec", "training", "evaluation"),
+    [({"steps": 90}, 90, 90), ({"steps": 90, "evaluation_steps": 150}, 90, 150), ({}, None, None)],
+)
+def test_the_longest_episode_is_that_of_the_spec(spec, training, evaluation) -> None:
+    results = lengths([[1], [2]], StepLimits.of(spec))
+    phases = ("training", "training:first", "weights kept", "evaluation", "evaluation:b", "after 9")
+    limits = [training] * 3 + [evaluation] * 3
+    assert [results.steps(phase).greatest for phase in phases] == limits
+
+
+@pytest.mark.parametrize("name", ["seconds.learning", "cpu.1000", "messages", "decision_median"])
+def test_times_and_counts_are_never_negative(name) -> None:
+    measure, _ = describe_number(name)
+    estimate = bootstrap([0.1, 1.1], bounds=measure.bounds)
+    assert measure.bounds == NOT_NEGATIVE
+    assert float(estimate.low) == 0.0
 
 
 def with_first(results: Results) -> tuple[Difference, ...]:
@@ -41,8 +127,21 @@ def test_only_seeds_that_both_have_are_compared() -> None:
     one, other = select_shared(means)
     assert (one == means[0].to_numpy()[15:]).all()
     assert (other == means[1].to_numpy()[:5]).all()
+
+
+def test_without_common_seeds_the_samples_are_independent() -> None:
+    arrays = ablation({"a": 0.5, "b": 0.5})
     arrays.seeds["b"] = tuple(range(100, 120))
-    assert with_first(arrays.frames()) == ()
+    results = arrays.frames()
+    (found,) = with_first(results)
+    own, base = (results.means(condition, "evaluation") for condition in ("b", "a"))
+    expected = stats.ttest_ind(own, base, equal_var=False).confidence_interval()
+    assert not found.paired
+    assert (found.estimate.low, found.estimate.high) == pytest.approx(tuple(expected))
+    assert "independent samples" in found.shown
+    assert "permutation of labels" in " ".join(verdicts({"all": [found]}))
+    arrays.seeds["b"] = (0, *range(100, 119))  # one common seed cannot be paired
+    assert not with_first(arrays.frames())[0].paired
 
 
 def outcomes(rng: np.random.Generator, chance: float) -> np.ndarray:
@@ -95,5 +194,5 @@ def test_an_interval_that_seems_to_contradict_p_is_explained_once(
     sample = np.linspace(0.0, 0.4, 8)
     found = Difference("a", "evaluation success", 8, estimate, p, p, sample)
     text = " ".join(" ".join(verdicts({"all": [found, found]})).split())
-    assert text.count("where they seem to disagree about 0, p decides.") == is_explained
+    assert text.count("seem to disagree about 0, p decides.") == is_explained
     assert "probability 0.80 in evaluation success." in text

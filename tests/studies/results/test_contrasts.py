@@ -74,7 +74,9 @@ def test_what_there_is_not_is_refused(options: dict, complaint: str) -> None:
 
 def test_too_few_shared_seeds_leave_nothing_to_compare() -> None:
     results = hierarchies(CHANCES, seeds=1).frames()
-    assert contrasts(results).notes == ("Nothing to compare: no two conditions share two seeds.",)
+    assert contrasts(results).notes == (
+        "Nothing to compare: no two conditions have two seeds each.",
+    )
 
 
 def test_what_is_compared_goes_by_any_of_its_names() -> None:

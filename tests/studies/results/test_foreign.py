@@ -1,4 +1,4 @@
-"""Tables of scores that others have measured: read, checked, compared."""
+"""Tables of scores that other tools have measured: read, checked, compared."""
 
 from pathlib import Path
 
@@ -9,15 +9,21 @@ import pytest
 import nested_agents as na
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.results.foreign import ScoreColumns, results_of
+from nested_agents.studies.results.foreign import Foreign, ScoreColumns, results_of
+from nested_agents.studies.results.score_files import table_of
 
-TOPOLOGIES = {"chain": 0.2, "star": 0.5, "ring": 0.8}
+TOPOLOGIES = {"chain": 0.2, "ring": 0.8, "star": 0.5}
 NAMES = ScoreColumns(("topology",), ("right",), "run", "question")
+ROLES = {"condition": "topology", "seed": "run", "item": "question"}
+
+
+def read(frame: pd.DataFrame, columns: ScoreColumns = NAMES) -> Foreign:
+    return results_of(table_of(frame), columns)
 
 
 @pytest.fixture(scope="module")
 def scores() -> pd.DataFrame:
-    """Five runs of three topologies on four questions."""
+    """Eight runs of three topologies on four questions."""
     rng = np.random.default_rng(0)
     rows = [
         (topology, run, f"q{k}", int(rng.random() < rate), 10.0 * rate + run)
@@ -29,15 +35,13 @@ def scores() -> pd.DataFrame:
 
 
 def test_a_table_is_compared_as_a_study_is(scores) -> None:
-    results = results_of(scores, NAMES).results
-    assert results.conditions == ("chain", "star", "ring")
+    results = read(scores).results
+    assert results.conditions == ("chain", "ring", "star")
     assert results.measures[0].is_rate
     for topology, own in scores.groupby("topology"):
         by_run = own.pivot(index="run", columns="question", values="right").to_numpy()
         assert (results.values(topology, "right", "evaluation") == by_run).all()
-    comparison = na.compare_table(
-        scores, condition="topology", score="right", seed="run", item="question"
-    )
+    comparison = na.compare_table(scores, score="right", **ROLES)
     means = scores.groupby(["topology", "run"])["right"].mean()
     for d in comparison.differences:
         own = (means[d.condition] - means["chain"]).to_numpy()
@@ -46,9 +50,9 @@ def test_a_table_is_compared_as_a_study_is(scores) -> None:
 
 
 def test_rows_in_another_order_are_the_same_results(scores) -> None:
-    before = results_of(scores, NAMES).results
-    shuffled = scores.sample(frac=1.0, random_state=1)
-    after = results_of(shuffled, NAMES).results
+    before = read(scores).results
+    after = read(scores.sample(frac=1.0, random_state=1)).results
+    assert before.conditions == after.conditions
     for topology in TOPOLOGIES:
         values = (r.values(topology, "right", "evaluation") for r in (before, after))
         assert np.array_equal(*values)
@@ -56,33 +60,33 @@ def test_rows_in_another_order_are_the_same_results(scores) -> None:
 
 def test_without_seeds_items_are_compared_one_by_one(scores) -> None:
     few = scores[scores["run"] == 0]
-    foreign = results_of(few, ScoreColumns(("topology",), ("right",), None, "question"))
-    assert foreign.results.seeds("chain") == (0, 1, 2, 3)
-    assert "compared on these" in foreign.remarks[0]
+    foreign = read(few, NAMES._replace(seed=None))
+    assert foreign.results.seeds("chain") == ("q0", "q1", "q2", "q3")
+    assert "one value of 'question'" in foreign.notes[0]
 
 
-def test_without_either_every_row_is_a_run(scores) -> None:
-    results = results_of(scores, ScoreColumns(("topology",), ("tokens",))).results
-    assert len(results.seeds("chain")) == 32
+def test_without_either_samples_are_independent(scores) -> None:
+    few = scores[scores["question"] == "q0"][["topology", "tokens"]]
+    comparison = na.compare_table(few, condition="topology", score="tokens")
+    assert not any(d.paired for d in comparison.differences)
+    assert "difference (independent samples)" in comparison.table.csv
+    assert "difference (independent samples)" in comparison.table.latex
+    assert "independent samples" in str(comparison)
+    assert "--columns seed=COLUMN" in str(comparison)
+    shuffled = few.sample(frac=1.0, random_state=1)
+    assert str(na.compare_table(shuffled, condition="topology", score="tokens")) == str(comparison)
 
 
-def test_several_rows_of_a_run_are_averaged(scores) -> None:
-    (measure,) = results_of(scores, ScoreColumns(("topology",), ("right",), "run")).results.measures
-    assert not measure.is_rate
-    assert measure.bounds == (0.0, 1.0)
+def test_several_rows_of_a_run_are_refused_unless_their_items_are_named(scores) -> None:
+    with pytest.raises(SpecError, match=r"row 1: topology = 'chain', run = '0'.*item=COLUMN"):
+        read(scores, NAMES._replace(item=None))
 
 
 def test_columns_of_conditions_are_crossed(scores) -> None:
     table = scores.assign(model=np.where(scores["run"] < 4, "small", "large"))
-    comparison = na.compare_table(
-        table,
-        condition=["topology", "model"],
-        score="tokens",
-        seed="run",
-        item="question",
-        by="topology",
-    )
-    assert [group.setting for group in comparison.contrasts.groups] == ["small", "large"]
+    roles = ROLES | {"condition": ["topology", "model"]}
+    comparison = na.compare_table(table, score="tokens", by="topology", **roles)
+    assert [group.setting for group in comparison.contrasts.groups] == ["large", "small"]
     assert len(comparison.differences) == 4
 
 
@@ -90,27 +94,29 @@ def test_what_is_unknown_may_be_blank(scores) -> None:
     table = pd.concat(
         [scores, pd.DataFrame({"topology": ["published"], "right": [0.9]})], ignore_index=True
     )
-    foreign = results_of(table, NAMES)
-    assert foreign.results.seeds("published") == (8,)
+    foreign = read(table)
+    assert len(foreign.results.seeds("published")) == 1
     blank = table.assign(right=table["right"].where(table["run"] != 3))
-    assert results_of(blank, NAMES).remarks == ("12 of 97 rows have no score: left out",)
+    assert read(blank).notes == ("12 of 97 rows have no 'right': left out",)
 
 
-def test_items_that_not_all_runs_have_are_left_out_and_told(scores) -> None:
-    fewer = scores.drop(index=scores.index[5])
-    foreign = results_of(fewer, NAMES)
-    assert foreign.remarks == ("1 of 4 values of 'question' are not of all runs: left out",)
-    assert foreign.results.values("star", "right", "evaluation").shape == (8, 3)
+def test_scores_are_paired_by_seed_and_item(scores) -> None:
+    fewer = scores.drop(index=scores.index[[5, 40]])
+    comparison = na.compare_table(fewer, score="tokens", **ROLES)
+    assert [float(d.estimate.value) for d in comparison.differences] == pytest.approx([6.0, 3.0])
+    said = " ".join(" ".join(comparison.verdicts).split())
+    assert "ring, 2 of 62 scores; star, 1 of 63 scores" in said
+    killed = scores[(scores["topology"] != "star") | (scores["run"] > 0)]
+    comparison = na.compare_table(killed, score="tokens", **ROLES)
+    assert [d.seeds for d in comparison.differences] == [8, 7]
 
 
-@pytest.mark.parametrize("name", ["steps", "return", "seed", "phase"])
+@pytest.mark.parametrize("name", ["steps", "return", "seed", "phase", "step", "condition"])
 def test_scores_may_have_names_that_mean_something_in_studies(scores, name) -> None:
     table = scores.rename(columns={"tokens": name})
-    comparison = na.compare_table(
-        table, condition="topology", score=name, seed="run", item="question"
-    )
+    comparison = na.compare_table(table, score=name, reference="chain", **ROLES)
     assert comparison.contrasts.title == f"evaluation {name}"
-    assert comparison.differences[0].estimate.value == pytest.approx(3.0)
+    assert comparison.differences[0].estimate.value == pytest.approx(6.0)
 
 
 @pytest.mark.parametrize(
@@ -118,49 +124,100 @@ def test_scores_may_have_names_that_mean_something_in_studies(scores, name) -> N
     [
         ({}, NAMES._replace(score=("rihgt",)), r"score = 'rihgt': no such column; did you mean"),
         ({}, NAMES._replace(score=("run",)), r"score = 'run': is named twice"),
-        ({"right": "x"}, NAMES, r"right = 'x' in row 0: must be a finite number"),
-        ({"right": np.inf}, NAMES, r"right = inf in row 0: must be a finite number"),
-        ({"topology": None}, NAMES, r"topology is blank in row 0"),
-        ({"question": "q1"}, NAMES, r"row 1: condition 'chain', run and question stand in a row"),
-        ({"run": None}, NAMES, r"condition 'chain': some of its rows have a seed"),
+        ({"right": "x"}, NAMES, r"row 0: right = 'x': must be a finite number"),
+        ({"right": "0,5"}, NAMES, r"row 0: right = '0,5': must be a finite number"),
+        ({"right": np.inf}, NAMES, r"row 0: right = inf: must be a finite number"),
+        ({"topology": None}, NAMES, r"row 0: topology is blank"),
+        ({"topology": b"chain"}, NAMES, r"row 0: topology = .*: must be text or a number"),
+        ({"question": None}, NAMES, r"row 0: question is blank"),
+        ({"question": "q1"}, NAMES, r"row 1: .*question = 'q1': stands in row 0, too"),
+        ({"run": None}, NAMES, r"row 0: run is blank, but other rows of condition 'chain'"),
+        ({"run": "1"}, NAMES, r"run = 1: must be text everywhere or a number everywhere"),
     ],
 )
 def test_what_is_wrong_is_told_in_one_line(scores, changes, names, said) -> None:
-    table = scores.astype({"right": object, "run": object}).copy()
+    table = scores.astype(dict.fromkeys(("right", "run", "topology"), object))
     for name, value in changes.items():
         table.loc[0, name] = value
     with pytest.raises(SpecError, match=said) as caught:
-        results_of(table, names)
+        read(table, names)
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".jsonl", ".parquet"])
+@pytest.mark.parametrize("kind", ["string", "category", "Int64", "boolean", "Float64", object])
+def test_columns_of_pandas_are_read_whatever_their_type(scores, kind) -> None:
+    column = {"boolean": "right", "Float64": "tokens", "Int64": "run"}.get(kind, "topology")
+    table = scores.astype({column: kind})
+    expected = na.compare_table(scores, score="right", **ROLES)
+    assert str(na.compare_table(table, score="right", **ROLES)) == str(expected)
+
+
+def test_phases_are_not_pooled(scores, tmp_path, capfd) -> None:
+    table = scores[["topology", "run", "question", "tokens"]].assign(phase="train")
+    test = table.assign(phase="test", tokens=table["tokens"] ** 2)
+    path = tmp_path / "scores.csv"
+    pd.concat([table, test]).to_csv(path, index=False)
+    command = ["compare", str(path), "--columns"]
+    command.append("condition=topology,seed=run,item=question,score=tokens")
+    assert main(command) == 2
+    assert "phase: name one, known: test, train" in capfd.readouterr().err
+    assert main([*command, "--phase", "train"]) == 0
+    assert "train tokens, less that of chain" in capfd.readouterr().out
+    assert main([*command, "--phase", "tset"]) == 2
+    assert "phase = 'tset': did you mean 'test'" in capfd.readouterr().err
+
+
+def test_series_are_compared_at_the_last_common_step() -> None:
+    rows = [(c, s, 10 * k, s + k * (c == "b")) for c in "ab" for s in range(8) for k in range(4)]
+    table = pd.DataFrame(rows, columns=["condition", "seed", "step", "score"])
+    whole = na.compare_table(table)
+    assert float(whole.differences[0].estimate.value) == 3.0
+    killed = table[(table["condition"] != "b") | (table["seed"] > 0) | (table["step"] < 20)]
+    comparison = na.compare_table(killed)
+    assert (comparison.differences[0].seeds, float(comparison.differences[0].estimate.value)) == (
+        7, 3.0,
+    )  # fmt: skip
+    assert "step 30, the last" in " ".join(comparison.verdicts)
+    assert "1 of 16 runs" in " ".join(comparison.verdicts)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".jsonl", ".json", ".parquet"])
 def test_every_form_gives_the_same_table(scores, suffix, tmp_path, capfd) -> None:
     path = tmp_path / f"scores{suffix}"
     if suffix == ".csv":
         scores.to_csv(path, index=False)
-    elif suffix == ".jsonl":
-        scores.to_json(path, orient="records", lines=True)
-    else:
+    elif suffix == ".parquet":
         pytest.importorskip("pyarrow", reason="pip install pyarrow")
         scores.to_parquet(path)
+    else:
+        scores.to_json(path, orient="records", lines=suffix == ".jsonl")
     page = tmp_path / "page.html"
     columns = "condition=topology,seed=run,item=question,score=right+tokens"
     command = ["compare", str(path), "--columns", columns, "--statistics"]
     assert main([*command, "--measure", "tokens", "--better", "lower", "--out", str(page)]) == 0
     out, err = capfd.readouterr()
-    assert "worse: ring, +6 [" in out
+    assert "worse: ring, +6 " in out
     assert "interquartile mean" in out
     assert not err
     html = page.read_text(encoding="utf-8")
     assert "<svg" in html
     assert "worse: ring" in html
+    assert main(["table", str(path)]) == 2  # no column is called score
+
+
+def test_a_file_and_a_frame_have_the_same_defaults(scores, tmp_path) -> None:
+    table = scores.rename(columns={"topology": "condition", "run": "seed", "tokens": "score"})
+    table = table.drop(columns="right").rename(columns={"question": "item"})
+    path = tmp_path / "scores.csv"
+    table.sample(frac=1.0, random_state=2).to_csv(path, index=False)
+    assert str(na.compare_table(path)) == str(na.load(path).compare())
+    assert str(na.compare_table(table)) == str(na.compare_table(path))
 
 
 @pytest.mark.parametrize(
     ("text", "columns", "said"),
     [
-        ("", "", "holds no table of scores: No columns"),
+        ("", "", "holds no table of scores: no columns"),
         ("a,b\n1,2\n", "", "columns: condition = 'condition': no such column; known: a, b"),
         ("condition,score\na,1\n", "colour=b", "must be ROLE=COLUMN"),
         ("condition,score\na,\n", "", "score = 'score': no row has one"),
@@ -173,6 +230,11 @@ def test_files_that_hold_none_are_refused(text, columns, said, tmp_path, capfd) 
     assert said in capfd.readouterr().err
 
 
-def test_columns_are_of_tables_alone(tmp_path: Path, capfd) -> None:
-    assert main(["compare", str(tmp_path), "--columns", "score=a"]) == 2
+def test_columns_and_better_are_of_other_tools_alone(tmp_path: Path, capfd) -> None:
+    study = tmp_path / "out"
+    spec = {"seeds": 1, "episodes": 1, "steps": 1, "evaluation": 1, "preset": "random"}
+    na.run(spec, study, jobs=1, progress=False)
+    assert main(["compare", str(study), "--columns", "score=a"]) == 2
     assert "columns: are of tables, .csv, .jsonl, .parquet" in capfd.readouterr().err
+    assert main(["compare", str(study), "--better", "lower"]) == 2
+    assert "better: is of results of other tools" in capfd.readouterr().err

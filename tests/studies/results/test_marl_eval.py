@@ -1,12 +1,17 @@
 """The JSON of marl-eval: written, read back, and read as BenchMARL writes it."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_results import ablation
 
 import nested_agents as na
+from nested_agents.studies.api.comparison import Comparison
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.errors import SpecError
+from nested_agents.studies.results import marl_eval
 
 BENCHMARL = {
     "vmas": {
@@ -31,7 +36,7 @@ def test_results_of_benchmarl_stand_beside_ours(tmp_path, capsys) -> None:
     study = na.load(path)
     assert study.conditions == ("ippo", "mappo")
     assert study.results.values("mappo", "return").tolist() == [[0.5, 3.0]] * 3
-    assert study.results.values("mappo", "steps").tolist() == [[60.0, 60.0]] * 3
+    assert study.results.means("mappo", "last step", "return").tolist() == [3.0] * 3
     assert study.results.values("mappo", "return", "evaluation").tolist() == [[4.0]] * 3
     assert "evaluation steps" not in study.table().titles
     compare = ["compare", str(path), "--measure", "return", "--statistics"]
@@ -62,7 +67,7 @@ def test_what_is_exported_is_read_back(tmp_path, capsys) -> None:
     study = na.run(spec, tmp_path, jobs=1, progress=False)
     assert main(["export", str(tmp_path), "--format", "marl-eval"]) == 0
     path = tmp_path / "export" / "marl-eval.json"
-    assert capsys.readouterr().out.strip() == str(path)
+    assert capsys.readouterr().out.splitlines()[0] == str(path)
     table = json.loads(path.read_text())
     # Names as marl-eval 0.0.4 accepts them: it refuses commas.
     (run, _) = table["line-up"]["learning-curve"]["frozen; carts=2"].values()
@@ -71,10 +76,96 @@ def test_what_is_exported_is_read_back(tmp_path, capsys) -> None:
     for phase in ("training", "evaluation"):
         for name in ("success", "return", "steps"):
             own = study.results.values("frozen, carts=2", name, phase)
-            read = back.results.values("frozen; carts=2", name, phase)
+            read = back.results.values("frozen, carts=2", name, phase)
             np.testing.assert_array_equal(own, read)
     own, read = (s.table(["evaluation success"]).markdown for s in (study, back))
-    assert read.replace(";", ",") == own
+    assert read == own
+
+
+SERIES = {f"step_{k}": {"step_count": 100 * k, "return": [float(k)]} for k in range(1, 5)}
+
+
+def compare(tmp_path: Path, runs: dict, **options: str) -> Comparison:
+    """Return the comparison of runs by algorithm, of one task."""
+    path = tmp_path / "runs.json"
+    path.write_text(json.dumps({"env": {"task": runs}}))
+    return na.load(path).compare(**options)
+
+
+def test_runs_are_paired_by_name(tmp_path: Path) -> None:
+    scores = np.random.default_rng(0).normal(size=10)
+    runs = {
+        name: {f"run_{k}": {"absolute_metrics": {"return": [s + shift]}} for k, s in own}
+        for name, shift, own in (
+            ("A", 0.0, list(enumerate(scores))),
+            ("B", 0.5, list(enumerate(scores))[:0:-1]),
+        )
+    }
+    comparison = compare(tmp_path, runs)
+    (found,) = comparison.differences
+    assert (found.seeds, found.sample.tolist()) == (9, pytest.approx([0.5] * 9))
+    assert "B, 1 of 19 runs" in " ".join(comparison.verdicts)
+
+
+def test_a_run_that_was_killed_is_left_out_and_counted(tmp_path: Path) -> None:
+    short = {"step_1": SERIES["step_1"]}
+    runs = {
+        "A": {f"seed_{k}": SERIES for k in range(4)},
+        "B": {f"seed_{k}": SERIES if k else short for k in range(4)},
+    }
+    comparison = compare(tmp_path, runs)
+    (found,) = comparison.differences
+    assert comparison.contrasts.title == "last step return"
+    assert (found.seeds, float(found.estimate.value)) == (3, 0.0)
+    said = " ".join(comparison.verdicts)
+    assert "step_count 400" in said
+    assert "1 of 8 runs" in said
+    assert "B, seed_0" in said
+
+
+def test_series_are_aligned_by_step_count_whatever_their_keys(tmp_path: Path) -> None:
+    other = {
+        f"STEP_{k}": {"step_count": 50 * k, "return": [k / 2.0], "rare": [1.0]}
+        for k in range(1, 10)
+    }
+    runs = {name: {str(k): own for k in range(4)} for name, own in (("A", SERIES), ("B", other))}
+    for k in (2, 3):  # a metric that is measured rarely shortens no other
+        runs["A"]["0"] = SERIES | {"step_1": SERIES["step_1"] | {"rare": [0.0]}}
+        comparison = compare(tmp_path, runs)
+        assert comparison.contrasts.measure.name == "return"
+        assert float(comparison.differences[0].estimate.value) == 0.0, k
+        assert "step_count 400" in " ".join(comparison.verdicts)
+
+
+def test_a_run_without_absolute_metrics_does_not_switch_what_is_compared(tmp_path: Path) -> None:
+    whole = SERIES | {"absolute_metrics": {"return": [9.0]}}
+    runs = {name: {f"seed_{k}": whole for k in range(4)} for name in ("A", "B")}
+    runs["B"]["seed_0"] = SERIES
+    comparison = compare(tmp_path, runs)
+    assert comparison.contrasts.title == "evaluation return"
+    assert "1 of 8 runs" in " ".join(comparison.verdicts)
+    assert compare(tmp_path, runs, phase="last step").differences[0].seeds == 4
+
+
+def test_one_file_a_run_is_put_together(tmp_path: Path) -> None:
+    runs = BENCHMARL["vmas"]["balance"]
+    paths = []
+    for algorithm, own in runs.items():
+        for name, run in own.items():
+            paths.append(tmp_path / f"{algorithm}_{name}.json")
+            paths[-1].write_text(json.dumps({"vmas": {"balance": {algorithm: {name: run}}}}))
+    study = na.load(*reversed(paths))
+    assert study.conditions == ("ippo", "mappo")
+    assert study.compare(measure="return").differences[0].sample.tolist() == [1.0] * 3
+    again = tmp_path / "again.json"
+    again.write_bytes(paths[0].read_bytes())
+    assert len(na.load(paths[0], again).conditions) == 2  # equal names are told apart by file
+
+
+def test_names_without_commas_that_become_equal_are_refused(tmp_path: Path) -> None:
+    arrays = ablation({"a, b": 0.5, "a; b": 0.5})
+    with pytest.raises(SpecError, match=r"'a, b' and 'a; b'"):
+        marl_eval.dumps(arrays.frames(), dict.fromkeys(("a, b", "a; b"), "env"), "task")
 
 
 def change(table, path, value):
@@ -102,7 +193,10 @@ RUN = ("vmas", "balance", "ippo", "seed_1")
         ((*RUN, "step_1", "step_count"), -1, "seed_1.step_1.step_count = -1"),
         ((*RUN, "step_1", "step_count"), "60", "seed_1.step_1.step_count = '60'"),
         ((*RUN, "step_1", "step_count"), True, "seed_1.step_1.step_count = true"),
-        ((*RUN, "step_7"), {"step_count": 1}, "seed_1.step_2: is missing"),
+        ((*RUN, "step_7"), {"return": [1.0]}, "seed_1.step_7.step_count: is missing"),
+        ((*RUN, "STEP_01"), {"step_count": 7}, "seed_1.STEP_01: is step_1, too"),
+        ((*RUN, "Absolute_Metrics"), {}, "Absolute_Metrics: is absolute_metrics, too"),
+        ((*RUN, "step_1", "step_count"), 60, "seed_1.step_1.step_count = 60"),
         ((*RUN, "absolute_metrics", "return"), [10**30], "absolute_metrics.return[0] = 1000"),
         ((*RUN, "absolute_metrics"), [1.0], "seed_1.absolute_metrics = [1.0]"),
         (RUN, 3, "ippo.seed_1 = 3: must be a table"),

@@ -5,12 +5,12 @@ import pytest
 
 import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS
-from nested_agents.research import ROWS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.growth import growth_figures
 from nested_agents.studies.results.results import from_arrays
 from nested_agents.studies.results.scaling_law import scaling_law
+from research import RESULTS
 
 SIZES = (2, 4, 8)
 
@@ -92,7 +92,7 @@ def test_figures_of_a_report_are_of_measures_with_a_law() -> None:
 
 
 def test_the_published_study_of_scaling_by_command_and_in_python(capsys, tmp_path) -> None:
-    file = ROWS / "scaling.json"
+    file = RESULTS / "scaling.json"
     figure = tmp_path / "law.svg"
     command = ["fit", str(file), "--criterion", "0.8", "--predict", "32", "--plot", str(figure)]
     assert main(command) == 0

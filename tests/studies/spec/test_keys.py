@@ -4,10 +4,10 @@ from pkgutil import resolve_name
 
 import pytest
 
+from nested_agents.core.agents.peer import PeerSettings
 from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.learners import LEARNERS
-from nested_agents.core.networks.settings import PeerSettings
 from nested_agents.core.plugins.registry import Plugged, Registry
 from nested_agents.core.plugins.settings import Settings
 from nested_agents.scenarios import SCENARIOS

@@ -1,6 +1,7 @@
 /* Stands in for a network file system: whatever lies below a folder called no_locks.
    FOLDER=shared: locks of shared memory fail. FOLDER=busy: they are always taken.
-   FOLDER=memory: memory cannot be shared. FOLDER=locks: no file has locks. */
+   FOLDER=memory: memory cannot be shared. FOLDER=locks: no file has locks.
+   SQLite tries again for up to ten seconds; its waits end at once. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -72,3 +73,9 @@ FCNTL(fcntl64)
     }
 MMAP(mmap)
 MMAP(mmap64)
+
+int usleep(useconds_t microseconds)
+{
+    (void)microseconds;
+    return 0;
+}

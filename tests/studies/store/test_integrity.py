@@ -179,7 +179,7 @@ def test_no_flipped_bit_anywhere_changes_what_a_study_ends_with(sound, tmp_path)
     rng = random.Random(7)
     expected = content(sound)
     files = [DATABASE] * 4 + [f"recordings/{t.identity}.npz" for t in made_up.TRIALS[:2]]
-    for number in range(60):
+    for number in range(20):
         study = shutil.copytree(sound, tmp_path / str(number))
         path = study / rng.choice(files)
         data = bytearray(path.read_bytes())
@@ -304,8 +304,8 @@ def test_no_flipped_bit_is_passed_over_in_silence(tmp_path, capsys):
     sound = (study / DATABASE).read_bytes()
     # Pages are mostly empty: what is not empty, and some that is.
     used = [at for at, byte in enumerate(sound) if byte]
-    flipped_bits_are_told(study, lambda n: used[::47], rng, capsys)
-    flipped_bits_are_told(study, lambda n: range(0, n, 1999), rng, capsys)
+    flipped_bits_are_told(study, lambda n: used[::97], rng, capsys)
+    flipped_bits_are_told(study, lambda n: range(0, n, 3989), rng, capsys)
 
 
 def test_everything_that_was_kept_is_checked(study, capsys):
@@ -466,7 +466,7 @@ import sqlite3, sys
 from nested_agents.studies.cli.main import main
 of_all = sqlite3.connect(":memory:")
 try:
-    for limit in range(400_000, 0, -10_000):  # it cannot be raised again
+    for limit in range(340_000, 0, -10_000):  # it cannot be raised again
         of_all.execute(f"PRAGMA hard_heap_limit = {limit}")
         print(main(sys.argv[1:]))
 except MemoryError:

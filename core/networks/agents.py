@@ -1,0 +1,339 @@
+"""Agents that act by policies trained with PPO.
+
+Agents act in the order of the hierarchy, and see the actions that superiors tell them as one-hot
+inputs. All agents and environments of a turn act in one call. An action is sampled by adding Gumbel
+noise to the logits. Axes are E environments, n agents and A actions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from ..hierarchy.hierarchy import Hierarchy
+from ..hierarchy.turns import Turn
+from ..interface.agents import Agents, Counts, Memory, Placement, under
+from ..interface.environments import Transitions
+from ..interface.experience import Experience, Observation
+from ..interface.scenario import Scenario
+from ..numerics import AnyArray, BoolArray, FloatArray, IntArray, set_words, words_of
+from .inputs import InputEncoder
+from .policy import InputNames, Policy
+from .rollout import PolicyShape
+from .settings import MultiAgentPPOSettings, PPOSettings
+
+
+@dataclass
+class PolicyInputs:
+    """Inputs of a joint decision, and the logits that policies computed from them."""
+
+    batch_shape: tuple[int, ...]
+    """Axes of the states before agents: ``(E,)``, or empty for one environment."""
+    actor: FloatArray
+    """``(E, rows, k)`` inputs of actors: actions told, one-hot, then the agent's state."""
+    joint: FloatArray
+    """``(E, n_joint)`` states of all agents, for central critics."""
+    noise: FloatArray
+    """``(E, n, A)`` noise that is added to logits."""
+    logits: FloatArray
+    """``(E, n, A)``, filled in turn by turn."""
+
+
+class PPOAgents(Agents[PolicyInputs]):
+    """One policy for every agent, by its own state and the actions that it is told.
+
+    Parameters
+    ----------
+    settings
+        Settings of PPO.
+    placement
+        Scenario, hierarchy and members.
+
+    Attributes
+    ----------
+    members
+        ``(k,)`` agents that act by these policies.
+    policies
+        Policies by name; each has weights of its own.
+
+    Raises
+    ------
+    ValueError
+        If some agents are neighbors, or messages may fail in many environments; one line.
+    """
+
+    is_sampled = True
+    is_vectorized = True
+
+    def __init__(self, settings: MultiAgentPPOSettings | PPOSettings, placement: Placement) -> None:
+        scenario = placement.scenario
+        hierarchy = placement.hierarchy
+        if not settings.uses_hierarchy:
+            hierarchy = Hierarchy(scenario.agents, [])
+        if hierarchy.neighbours:
+            raise ValueError(
+                f"learner.kind = {settings.kind!r}: neighbors act at the same time and tell each "
+                "other nothing; use a topology without neighbors"
+            )
+        if placement.messages_fail and settings.environments > 1:
+            raise ValueError(
+                f"learner.environments = {settings.environments}: messages may fail in one "
+                "environment only; use learner.environments = 1 or no topology.failures"
+            )
+        self.rng = np.random.Generator(np.random.PCG64(placement.seed))
+        self.settings = settings
+        self.scenario = scenario
+        self.members = placement.members
+        self.encoder = InputEncoder(scenario, numbered=settings.numbered)
+        self._n_actions = len(scenario.action_set)
+        # Messages that fail may reach an agent from anyone who acts before it, one after the other.
+        is_unreliable = placement.messages_fail and settings.uses_hierarchy
+        self.at_once = not is_unreliable
+        senders = sorted(hierarchy.order[:-1]) if is_unreliable else senders_of(hierarchy)
+        self._told_columns: IntArray = np.zeros(len(scenario.agents), dtype=np.int64)
+        self._told_columns[senders] = self._n_actions * np.arange(len(senders))
+        self.told_names = [
+            f"{scenario.agents[sender]} did {action}"
+            for sender in senders
+            for action in scenario.action_set.names
+        ]
+        self._rows = self._rows_by_policy()
+        self.policies = {
+            name: Policy(settings, len(rows), self._policy_shape(), self.rng)
+            for name, rows in self._rows.items()
+        }
+        self._groups: dict[bytes, list[tuple[Policy, IntArray]]] = {}
+        self._counts = Counts()
+        if is_unreliable:  # initial weights and random numbers as without failures
+            self.continue_from(type(self)(settings, replace(placement, messages_fail=False)))
+
+    def _rows_by_policy(self) -> dict[str, IntArray]:
+        """Return by policy the rows ``(k,)`` of `PolicyInputs.actor` for which it acts."""
+        owners: Mapping[str, Sequence[str]] = {
+            "all": ("all",) * len(self.scenario.agents),
+            "role": self.scenario.roles,
+            "own": self.scenario.agents,
+        }
+        names = np.take(owners[self.settings.weights], self.members)
+        return {str(name): self.members[names == name] for name in np.unique(names)}
+
+    def _policy_shape(self) -> PolicyShape:
+        """Return the sizes of inputs and actions of every policy."""
+        widths = len(self.told_names), len(self.encoder.own_names), self._n_joint
+        return PolicyShape(*widths, n_heads=1, n_actions=self._n_actions)
+
+    @property
+    def _n_joint(self) -> int:
+        return len(self.encoder.joint_names) if self.settings.critic == "central" else 0
+
+    @property
+    def counts(self) -> Counts:
+        """Number of actions evaluated."""
+        return self._counts
+
+    @property
+    def weight_bytes(self) -> int:
+        """Memory of the weights of all policies and critics [bytes]."""
+        return sum(policy.weight_bytes for policy in self.policies.values())
+
+    @property
+    def input_names(self) -> InputNames:
+        """Names of the inputs of actors and critics."""
+        own = self.encoder.own_names
+        joint = self.encoder.joint_names if self._n_joint else []
+        return InputNames([*self.told_names, *own], [*own, *joint])
+
+    def _encode(self, states: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return own inputs ``(E, rows, n_own)`` and joint inputs ``(E, n_joint)`` of states."""
+        own = self.encoder.own(states)
+        if self._n_joint:
+            return own, self.encoder.joint(own)
+        return own, np.zeros((len(own), 0), np.float32)
+
+    def perceive(self, seen: Observation, *, explore: bool) -> PolicyInputs:
+        """Return the inputs of a decision, with noise if the agents explore."""
+        states = seen.present
+        own, joint = self._encode(states.reshape(-1, *states.shape[-2:]))
+        n_told = len(self.told_names)
+        actor = np.zeros((*own.shape[:2], n_told + own.shape[2]), np.float32)
+        actor[..., n_told:] = own
+        shape = len(own), len(self.scenario.agents), self._n_actions
+        noise = self.rng.gumbel(size=shape) if explore else np.zeros(shape)
+        return PolicyInputs(states.shape[:-2], actor, joint, noise, np.zeros(shape, np.float32))
+
+    def decide(self, inputs: PolicyInputs, turn: Turn) -> IntArray:
+        """Return the actions ``(..., k)`` of a turn: sampled, or the most probable ones."""
+        count = len(inputs.actor)
+        if self.told_names and len(turn.senders):
+            columns = self._told_columns[turn.senders] + turn.actions.reshape(count, -1)
+            inputs.actor[np.arange(count)[:, None], turn.receivers, columns] = 1.0
+        for policy, agents in self._grouped(turn.agents):
+            actor = inputs.actor[:, agents].reshape(count * len(agents), -1)
+            inputs.logits[:, agents] = policy.logits(actor).reshape(count, len(agents), -1)
+        return self._choose(inputs, turn)
+
+    def _grouped(self, agents: IntArray) -> list[tuple[Policy, IntArray]]:
+        """Return the policies by which some agents act, each with its agents."""
+        key = agents.tobytes()
+        if key not in self._groups:
+            groups = [(name, np.intersect1d(agents, rows)) for name, rows in self._rows.items()]
+            self._groups[key] = [(self.policies[name], own) for name, own in groups if len(own)]
+        return self._groups[key]
+
+    def _choose(self, inputs: PolicyInputs, turn: Turn) -> IntArray:
+        """Return the actions of a turn, whose logits are known."""
+        logits = inputs.logits[:, turn.agents]
+        self._counts.joint_actions += logits.size
+        chosen: IntArray = (logits + inputs.noise[:, turn.agents]).argmax(axis=2)
+        return chosen.reshape(*inputs.batch_shape, -1)
+
+    def learn(self, experience: Experience, inputs: PolicyInputs) -> None:
+        """Learn from a step of one environment."""
+        transition = experience.transition
+        n = len(self.scenario.agents)
+        transitions = Transitions(
+            transition.states[None],
+            np.broadcast_to(np.asarray(transition.reward, float), n)[None],
+            np.array([transition.terminated]),
+            np.array([transition.truncated]),
+        )
+        joint_actions = experience.decision.joint_action[None]
+        self.learn_batch(joint_actions, inputs, transitions, np.array([experience.last]))
+
+    def learn_batch(
+        self, joint: IntArray, inputs: PolicyInputs, steps: Transitions, last: BoolArray
+    ) -> None:
+        """Append a step of all environments, and update the policies when rollouts are full."""
+        rewards = steps.rewards
+        if self.settings.value_of == "team":
+            rewards = np.broadcast_to(rewards.mean(axis=1, keepdims=True), rewards.shape)
+        for name, policy in self.policies.items():
+            rows = self._rows[name]
+            logits, actions = self._by_head(inputs.logits, joint, rows)
+            own = inputs.actor[:, rows]
+            policy.append((own, inputs.joint), logits, actions, rewards[:, rows], last)
+        truncated = last & ~steps.terminated
+        if truncated.any():
+            own, joint_inputs = self._encode(steps.states[truncated])
+            for name, policy in self.policies.items():
+                policy.bootstrap(truncated, own[:, self._rows[name]], joint_inputs)
+        if any(policy.rollout.is_full for policy in self.policies.values()):
+            own, joint_inputs = self._encode(steps.states)
+            for name, policy in self.policies.items():
+                policy.update(own[:, self._rows[name]], joint_inputs)
+
+    def _by_head(
+        self, logits: FloatArray, joint: IntArray, rows: IntArray
+    ) -> tuple[FloatArray, IntArray]:
+        """Return logits ``(E, k, h, A)`` and actions ``(E, k, h)`` of the rows of a policy."""
+        return logits[:, rows, None], joint[:, rows, None]
+
+    def check_world(self, scenario: Scenario) -> None:
+        """Refuse a scenario with other states or actions."""
+        if scenario.state_space != self.scenario.state_space:
+            raise ValueError(f"{self._trained(scenario)}: the state spaces differ")
+        if scenario.action_set != self.scenario.action_set:
+            raise ValueError(f"{self._trained(scenario)}: the actions differ")
+
+    def _trained(self, scenario: Scenario) -> str:
+        there, here = (
+            f"{len(s.agents)} agents over {s.state_space.name!r}" for s in (self.scenario, scenario)
+        )
+        return f"a team trained with {there} cannot act with {here}"
+
+    def continue_from(self, former: Self) -> None:
+        """Start with the weights of agents with the same settings elsewhere.
+
+        Raises
+        ------
+        ValueError
+            If states, actions, or the owners of weights differ; one line.
+        """
+        former.check_world(self.scenario)
+        if self.policies.keys() != former.policies.keys():
+            raise ValueError(
+                f"{former._trained(self.scenario)}: learner.weights = {self.settings.weights!r}; "
+                "with 'all', all agents share theirs"
+            )
+        for name, policy in self.policies.items():
+            policy.warm_start(former.policies[name], self.input_names, former.input_names)
+        self.rng.bit_generator.state = former.rng.bit_generator.state
+
+    def memory(self) -> Memory:
+        """Return the state of the generator and of all policies."""
+        state: Memory = {"generator": words_of(self.rng)}
+        for name, policy in self.policies.items():
+            state |= {f"{name}.{key}": array for key, array in policy.state_dict().items()}
+        return state
+
+    def restore(self, memory: Mapping[str, AnyArray]) -> None:
+        """Continue from what `memory` returned.
+
+        Raises
+        ------
+        ValueError
+            If it is that of other agents; one line.
+        """
+        saved = {name: under(f"{name}.", memory) for name in self.policies}
+        missing = [name for name, own in saved.items() if not own]
+        if missing:
+            raise ValueError(f"team: no weights of {missing[0]!r} have been saved")
+        if sum(len(own) for own in saved.values()) < len(memory) - 1:
+            raise ValueError(f"team: more has been saved than of {', '.join(saved)}")
+        for name, policy in self.policies.items():
+            policy.load_state_dict(saved[name])
+        set_words(self.rng, memory["generator"])
+
+
+class CentralPPOAgents(PPOAgents):
+    """One policy that sees all states and acts for all members, with a head for each."""
+
+    def _rows_by_policy(self) -> dict[str, IntArray]:
+        """Return the only row of the only policy."""
+        return {"all": np.arange(1)}
+
+    def _policy_shape(self) -> PolicyShape:
+        """Return the sizes of inputs and actions."""
+        heads = len(self.members)
+        return PolicyShape(0, len(self.encoder.joint_names), 0, heads, self._n_actions)
+
+    @property
+    def input_names(self) -> InputNames:
+        """Names of the inputs of actor and critic."""
+        return InputNames(self.encoder.joint_names, self.encoder.joint_names)
+
+    def _encode(self, states: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the inputs ``(E, 1, n_own)`` of the policy; there are no others."""
+        own = self.encoder.joint(self.encoder.own(states))[:, None]
+        return own, np.zeros((len(own), 0), np.float32)
+
+    def perceive(self, seen: Observation, *, explore: bool) -> PolicyInputs:
+        """Return the inputs of a decision, and the logits of all members."""
+        inputs = super().perceive(seen, explore=explore)
+        inputs.logits[:, self.members] = self.policies["all"].logits(inputs.actor[:, 0])
+        return inputs
+
+    def decide(self, inputs: PolicyInputs, turn: Turn) -> IntArray:
+        """Return the actions ``(..., k)`` of the agents of a turn."""
+        return self._choose(inputs, turn)
+
+    def _by_head(
+        self, logits: FloatArray, joint: IntArray, rows: IntArray
+    ) -> tuple[FloatArray, IntArray]:
+        """Return logits ``(E, 1, h, A)`` and actions ``(E, 1, h)``."""
+        return logits[:, None, self.members], joint[:, None, self.members]
+
+    def check_world(self, scenario: Scenario) -> None:
+        """Refuse a scenario with other states, actions or agents."""
+        super().check_world(scenario)
+        if tuple(scenario.agents) != tuple(self.scenario.agents):
+            raise ValueError(f"{self._trained(scenario)}: one policy acts for all of them")
+
+
+def senders_of(hierarchy: Hierarchy) -> list[int]:
+    """Return the agents whose actions some agent is told, in agent order."""
+    superiors = (hierarchy.above(agent) for agent in range(len(hierarchy)))
+    return sorted({sender for senders in superiors for sender in senders})

@@ -1,0 +1,114 @@
+"""Estimates, tests and notation for analyses of results.
+
+A study's `analyse` and programs that read kept or published results are written with these names;
+`nested_agents.figures` draws what they return.
+"""
+
+from .core.interface.measures import RETURN, SUCCESS
+from .studies.catalogue.ablation import compared_with_first as compare_with_first
+from .studies.catalogue.experience import AFTER, evaluated_after
+from .studies.catalogue.hierarchies import analysis_of as compare_hierarchies
+from .studies.catalogue.hierarchies import estimates as estimates_of_hierarchy
+from .studies.catalogue.hierarchies.cases import HierarchyCase
+from .studies.catalogue.study import analyse_as, distinct, system_of
+from .studies.catalogue.wheel_failure import courses_of
+from .studies.results import laws
+from .studies.results.analysis import (
+    EVALUATED,
+    Analysis,
+    BySeed,
+    Case,
+    Difference,
+    Figures,
+    Summary,
+    adjust,
+    difference,
+    differences,
+    estimate_of,
+    evaluated,
+    judged,
+    paired_difference,
+    phases_of,
+    ratio,
+    select_shared,
+)
+from .studies.results.contrasts import Group, contrasts
+from .studies.results.notation import format_estimate, format_number, format_p, wrapped
+from .studies.results.power import deviation_of, power_lines
+from .studies.results.results import CPU, NOTHING, Results, Sizes
+from .studies.results.statistics import (
+    LEVEL,
+    NOT_NEGATIVE,
+    Array,
+    Estimate,
+    Friedman,
+    bootstrap,
+    exactly,
+    friedman,
+    holm,
+    paired_permutation,
+    paired_tests,
+    rate,
+    stack_estimates,
+)
+from .studies.spec.tables import label, label_but
+
+__all__ = [
+    "AFTER",
+    "CPU",
+    "EVALUATED",
+    "LEVEL",
+    "NOTHING",
+    "NOT_NEGATIVE",
+    "RETURN",
+    "SUCCESS",
+    "Analysis",
+    "Array",
+    "BySeed",
+    "Case",
+    "Difference",
+    "Estimate",
+    "Figures",
+    "Friedman",
+    "Group",
+    "HierarchyCase",
+    "Results",
+    "Sizes",
+    "Summary",
+    "adjust",
+    "analyse_as",
+    "bootstrap",
+    "compare_hierarchies",
+    "compare_with_first",
+    "contrasts",
+    "courses_of",
+    "deviation_of",
+    "difference",
+    "differences",
+    "distinct",
+    "estimate_of",
+    "estimates_of_hierarchy",
+    "evaluated",
+    "evaluated_after",
+    "exactly",
+    "format_estimate",
+    "format_number",
+    "format_p",
+    "friedman",
+    "holm",
+    "judged",
+    "label",
+    "label_but",
+    "laws",
+    "paired_difference",
+    "paired_permutation",
+    "paired_tests",
+    "phases_of",
+    "power_lines",
+    "rate",
+    "ratio",
+    "select_shared",
+    "stack_estimates",
+    "system_of",
+    "wrapped",
+]

@@ -1,0 +1,138 @@
+"""Exported tables of a study, read back: its episodes, or its trials.
+
+They are recognized by their columns. The file ``study.json`` beside them says what the columns are;
+without it, conditions are in the order of the rows, and which values are better is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from ...core.interface.measures import NO_SUCCESS, RETURN, SUCCESS, Measure
+from ...core.numerics import pd
+from ..spec.tables import SpecTable
+from .foreign import score_kind
+from .long_form import KEYS, pack, plain_levels, refuse_repeated, whole_names
+from .results import DONE, TRIAL_COLUMNS, Results, assemble
+from .score_files import ScoreTable
+from .spreadsheet import harmless
+
+EPISODES = ("condition", "seed", "phase", "episode", "steps")
+"""Columns by which a table of episodes is recognized."""
+TRIALS = ("condition", "seed", "state", "identity")
+"""Columns by which a table of trials is recognized."""
+
+
+class Description(NamedTuple):
+    """What is known of an exported study, besides its rows."""
+
+    conditions: Mapping[str, SpecTable]
+    """Swept keys by condition, in the order of the study."""
+    measures: Sequence[Measure]
+
+
+class Exported(NamedTuple):
+    """Results of an exported table, and what must be said of them."""
+
+    results: Results
+    conditions: Mapping[str, SpecTable]
+    notes: tuple[str, ...]
+
+
+def is_exported(table: ScoreTable) -> bool:
+    """Tell whether a table is one that a study exports."""
+    names = {*table.columns}
+    return "score" not in names and ({*EPISODES} <= names or {*TRIALS} <= names)
+
+
+def results_of(table: ScoreTable, known: Description | None) -> Exported:
+    """Return the results of an exported table.
+
+    Raises
+    ------
+    SpecError
+        If a cell is not what was exported; one line names its line and column.
+    """
+    conditions, labels = _conditions(table, known)
+    if {*TRIALS} <= {*table.columns}:
+        return _trials(table, conditions, labels)
+    frame = pd.DataFrame(
+        {
+            "condition": labels,
+            "phase": table.filled("phase"),
+            "seed": whole_names(table.filled("seed")),
+            "episode": _whole(table, "episode"),
+        }
+    )
+    names = table.columns[table.columns.index("steps") + 1 :]
+    values = {name: table.numbers(name) for name in names}
+    frame = frame.assign(steps=_whole(table, "steps"), **values)
+    refuse_repeated(table, frame, {key: key for key in KEYS})
+    notes: list[str] = []
+    if known is None:
+        measures, notes = _measures(frame, names)
+    else:
+        measures = [m for m in known.measures if m.name in names]
+    return Exported(pack(frame, conditions, measures), conditions, tuple(notes))
+
+
+def _trials(table: ScoreTable, conditions: Mapping[str, SpecTable], labels: pd.Series) -> Exported:
+    """Return the numbers of whole trials; those of trials that have not finished are left out."""
+    names = table.columns
+    swept = names[names.index("condition") + 1 : names.index("seed")]
+    frame = pd.DataFrame({"condition": labels, "seed": whole_names(table.filled("seed"))})
+    numbers = [n for n in names if n not in (*TRIAL_COLUMNS, *swept)]
+    frame = frame.assign(
+        state=table.filled("state"), **{name: table.numbers(name) for name in numbers}
+    )
+    refuse_repeated(table, frame, {key: key for key in ("condition", "seed")})
+    results = assemble([], [frame], (), conditions, (), ())
+    unfinished = int((frame["state"] != DONE).sum())
+    note = f"{unfinished} of {len(frame)} trials have not finished: left out"
+    return Exported(results, conditions, (note,) if unfinished else ())
+
+
+def _conditions(
+    table: ScoreTable, known: Description | None
+) -> tuple[Mapping[str, SpecTable], pd.Series]:
+    """Return the conditions with their swept keys, and the label of each row."""
+    labels = table.filled("condition")
+    if known is not None:
+        written = {str(harmless(condition)): condition for condition in known.conditions}
+        strange = ~labels.isin(list(written)).to_numpy()
+        if strange.any():
+            row = int(strange.argmax())
+            allowed = "a condition of study.json beside it"
+            raise table.refusal(row, "condition", labels[row], allowed)
+        return known.conditions, labels.map(written)
+    names = table.columns
+    swept = names[names.index("condition") + 1 : names.index("seed")]
+    levels = pd.DataFrame({key: plain_levels(table.text(key)) for key in swept}, labels.index)
+    rows = levels.assign(condition=labels).drop_duplicates("condition").to_dict("records")
+    return {row.pop("condition"): row for row in rows}, labels
+
+
+def _whole(table: ScoreTable, column: str) -> pd.Series:
+    """Return a column of whole numbers, none below 0."""
+    numbers = table.numbers(column)
+    wrong = ~((numbers >= 0) & (numbers % 1 == 0)).to_numpy()
+    if wrong.any():
+        row = int(wrong.argmax())
+        raise table.refusal(row, column, table.frame[column].iloc[row], "a whole number from 0 on")
+    return numbers.astype(int)
+
+
+def _measures(frame: pd.DataFrame, names: Sequence[str]) -> tuple[list[Measure], list[str]]:
+    """Return the measures of an export whose study is not known."""
+    notes = ["study.json is not beside it: which values are better is known of success and return"]
+    measures = []
+    for name in names:
+        if name == SUCCESS.name:
+            is_possible = frame[name].any() or RETURN.name not in names
+            measures.append(SUCCESS if is_possible else NO_SUCCESS)
+        elif name != RETURN.name:
+            measures.append(Measure(name, name, is_rate=score_kind(frame, name) == "rate"))
+    if measures and measures[0] == NO_SUCCESS:
+        notes.append("success: never in any episode; returns are compared")
+    return measures, notes
