@@ -52,13 +52,15 @@ class Store:
         Where it is.
     notes
         What is damaged, and what was done about it; one line each.
+    code_digest
+        Digest of the code that computes the trials that are saved; empty if the store only reads.
     """
 
     def __init__(self, directory: Path, connection: sqlite3.Connection) -> None:
         self.directory = directory
         self.notes: list[str] = []
         self._db = connection
-        self._code = ""  # what computes what is saved
+        self.code_digest = ""
 
     @classmethod
     @contextmanager
@@ -292,7 +294,7 @@ class Store:
                 kept.parent.mkdir(exist_ok=True)
                 if not kept.exists() or durable.read_bytes(kept) != content:
                     durable.write(kept, content)
-            store._code = study.code_digest
+            store.code_digest = study.code_digest
             yield store
 
     def states(self) -> dict[str, str]:
@@ -407,7 +409,7 @@ class Store:
         # By table: what is left of a trial whose row is gone hangs on nothing.
         for table in ("trials", *database.OF_A_TRIAL):
             self._db.execute(f"DELETE FROM {table} WHERE identity = ?", (trial.identity,))
-        row = (trial.identity, trial.condition, trial.seed, state, error, digest, self._code)
+        row = (trial.identity, trial.condition, trial.seed, state, error, digest, self.code_digest)
         self._insert("trials", [row])
 
 

@@ -73,7 +73,7 @@ def open_to_run(
         damage, code, before = _examine(directory, spec, notes, accept_code=accept_code)
         computed = replace(
             notes,
-            code=present(code),
+            code=present(code, notes.spec, notes.sources),
             planned=[*notes.planned, *_planned_before(spec, trials, before)],
         )
         copies = spec.sources.texts.items()  # to be read and run again, as is the spec
