@@ -14,7 +14,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from ...core.plugins.printing import printable
-from ...core.plugins.words import command_line
+from ...core.shell import command_line
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,7 +16,8 @@ from io import TextIOWrapper
 import click
 
 from ...core.plugins.printing import printable
-from ...core.plugins.words import closest, command_line
+from ...core.plugins.words import closest
+from ...core.shell import command_line
 from ..errors import SpecError
 from .options import complete
 

@@ -18,7 +18,8 @@ from typing import Literal
 from ...core.agents.cost import Problem, is_chain
 from ...core.evaluators.enumeration import AutoSettings
 from ...core.numerics import pd
-from ...core.plugins.words import command_line, expect, expect_each
+from ...core.plugins.words import expect, expect_each
+from ...core.shell import command_line
 from ...topologies.view import align, format_count
 from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex

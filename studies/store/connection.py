@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 
 from ...core import locks
-from ...core.plugins.words import command_line
+from ...core.shell import command_line
 from ..errors import SpecError
 
 CIRCUMSTANCES = (

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.interface.measures import Measure
-from ...core.plugins.words import command_line
+from ...core.shell import command_line
 from ..errors import SpecError
 from . import database, durable, integrity
 from .checksums import find_altered, trial_checksums

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from ...core.interface.measures import Measure
 from ...core.plugins.sources import FOLDER, Sources, kept_name
-from ...core.plugins.words import closest, command_line, show
+from ...core.plugins.words import closest, show
+from ...core.shell import command_line
 from ..errors import SpecError
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec

@@ -19,7 +19,8 @@ from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from ...core.isolation import safe_path
-from ...core.plugins.words import closest, command_line
+from ...core.plugins.words import closest
+from ...core.shell import command_line
 from ..errors import SpecError
 from ..trials.trial import Trial
 from .nursery import Answer, call_for, describe_exit

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
-from ....core.plugins.words import command_line
+from ....core.shell import command_line
 from ...errors import SpecError, refused
 from .. import options
 from ..display import print_data, print_text, print_wrapped

@@ -10,7 +10,7 @@ from typing import Literal, TypedDict, Unpack
 import click
 
 from ....core.plugins.printing import printable
-from ....core.plugins.words import command_line
+from ....core.shell import command_line
 from ...api.status import describe, failures, progress
 from ...errors import SpecError, refused
 from ...presentation.progress import say

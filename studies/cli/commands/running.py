@@ -6,7 +6,7 @@ from typing import TypedDict, Unpack
 
 import click
 
-from ....core.plugins.words import command_line
+from ....core.shell import command_line
 from .. import options
 from ..display import print_data, print_table, print_text, show_results
 

@@ -1,11 +1,11 @@
-"""Words of messages: commands are printed as they can be typed."""
+"""Shell: commands are printed as they can be typed."""
 
 import shlex
 from pathlib import Path
 
 import pytest
 
-from nested_agents.core.plugins.words import DEV, command_line
+from nested_agents.core.shell import DEV, command_line
 
 
 @pytest.mark.parametrize("dev", ["./dev", "../a checkout/dev", "/src/nested-agents/dev"])
