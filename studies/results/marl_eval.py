@@ -292,7 +292,7 @@ def _phases(
         rows = own[own["step"] == step]
         if {*absolute["condition"]} == {*every["condition"]}:
             phases += _final(absolute)
-            text = f"{ABSOLUTE} are compared{_best_note(own, absolute)}"
+            text = f"{ABSOLUTE} are compared by default{_best_note(own, absolute)}"
             text += left_out_note(every, absolute)
             text += f"; --phase '{LAST_STEP}' compares step_count {step:.0f}" if step else ""
         elif step is None:
