@@ -16,6 +16,7 @@ import pytest
 from made_up_commands import Command, finish, heeding_interrupts, run_here, wait_for_results
 
 from nested_agents.studies.api import running as studies_run
+from nested_agents.studies.api.study import StudyResults
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import commands
 from nested_agents.studies.cli.main import COMMANDS, main
@@ -193,13 +194,37 @@ def test_the_demo_draws_what_is_learned_first_and_then_the_first_episode(
     )
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
     monkeypatch.setattr(studies_run, "check_conditions", lambda spec, **_: made_up.MEASURES)
+    report = tmp_path / "report.html"
+    monkeypatch.setattr(StudyResults, "report", lambda study: report)
     assert main(["demo", "--out", str(tmp_path), "--jobs", "1"]) == 0
-    seen = capsys.readouterr().err
+    printed, seen = capsys.readouterr()
     assert seen.index("what the first trial has learned: ") < seen.index("of 32 trials")
     assert len(drawn) == 2
+    assert f"report  {report}\n" in printed
     assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [
         "first-episode.gif", "last-episode.gif",
     ]  # fmt: skip
+
+
+def test_commands_are_printed_as_they_can_be_typed(monkeypatch, capsys):
+    monkeypatch.setenv("NESTED_AGENTS_DEV", "./dev")
+    assert main(["keys"]) == 0
+    assert "./dev exec nested-agents keys PREFIX" in capsys.readouterr().out
+    assert main(["keys", "--wrong"]) == 2
+    assert "see ./dev exec nested-agents keys --help" in capsys.readouterr().err
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("nested-agents ")
+
+
+def test_every_command_that_a_study_prints_can_be_typed(spec_file, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NESTED_AGENTS_DEV", "../dev")
+    status, out, _ = run_here(made_up.measure, "run", spec_file, "--out=-out")
+    printed = re.findall(r"^\w+ +\.\./dev exec nested-agents (.*)$", out, re.MULTILINE)
+    assert status == 0
+    assert len(printed) == 2
+    for arguments in printed:
+        assert main(shlex.split(arguments)) == 0
 
 
 def test_the_demos_spec_is_valid_toml(capsys, tmp_path):
