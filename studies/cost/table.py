@@ -19,6 +19,7 @@ from ...core.agents.cost import Problem, is_chain
 from ...core.evaluators.enumeration import AutoSettings
 from ...core.numerics import pd
 from ...core.plugins.words import expect, expect_each
+from ...core.shell import command_line
 from ...topologies.view import align, format_count
 from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex
@@ -178,7 +179,7 @@ def _of_another_evaluator(rows: Sequence[CostRow]) -> list[str]:
         f"They count the evaluator exact. The default, auto, is exact up to {auto.exact_up_to} "
         f"agents (one and those below it), up to {auto.sampling_up_to} sampling if agents "
         "decide by their own value, else best-response, which try fewer joint actions: "
-        f"nested-agents profile counts and times them. Rows: {', '.join(own)}.",
+        f"{command_line('profile')} counts and times them. Rows: {', '.join(own)}.",
         WIDTH,
         break_on_hyphens=False,
     )

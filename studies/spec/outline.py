@@ -230,14 +230,6 @@ def changed(known: Mapping[str, tuple[str, str]], here: Code) -> list[str]:
     return sorted(known.keys() ^ here.keys()) + edited
 
 
-SAME_RESULTS = frozenset({"ec3ae786e8e72118cee514710d9d67f1"})
-"""Fingerprints of earlier code of this package whose results are those of this code, to the bit.
-
-An earlier one enters when its results have been compared; a change of results, which raises
-`RESULTS_VERSION`, empties the list.
-"""
-
-
 def fingerprint(code: Mapping[str, tuple[str, str]]) -> str:
     """Return one digest of what all modules of this package mean; of other packages none."""
     own = [f"{name} {code[name][1]}" for name in sorted(code) if _is_ours(name)]
@@ -252,8 +244,6 @@ def outdated(store: Store) -> str | None:
     """Return why this code would not go on with a study, in one line; None if it would."""
     known = store.code()
     modules = changed(known, present(known, store.spec(), store.sources()))
-    if fingerprint(known) in SAME_RESULTS:
-        modules = [name for name in modules if not _is_ours(name)]
     if not modules:
         return None
     more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.interface.measures import Measure
+from ...core.shell import command_line
 from ..errors import SpecError
 from . import database, durable, integrity
 from .checksums import find_altered, trial_checksums
@@ -81,8 +82,8 @@ class Store:
             raise DamageError(
                 path,
                 "its log is there without it",
-                f"{path}-wal: is the log of a database that is not there any more; nested-agents "
-                "run sets it aside",
+                f"{path}-wal: is the log of a database that is not there any more; "
+                f"{command_line('run')} sets it aside",
             )
         if not path.exists():
             raise NoStudyError(f"{directory}: holds no study (no {DATABASE})")
@@ -146,7 +147,7 @@ class Store:
     def verify(self) -> None:
         """Raise `SpecError` if the rows of a trial that was run are not what was written."""
         for where in self._damaged_rows().values():
-            raise SpecError(f"{where}; nested-agents run runs it again")
+            raise SpecError(f"{where}; {command_line('run')} runs it again")
 
     def _damaged_rows(self) -> dict[str, str]:
         """Return by identity whose rows are not what was written, one line each."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
+from ....core.shell import command_line
 from ...errors import SpecError, refused
 from .. import options
 from ..display import print_data, print_text, print_wrapped
@@ -58,7 +59,9 @@ def keys(prefix: str | None) -> int:
     if prefix is None:
         for name, parts in outline().items():
             print_wrapped(", ".join(parts), f"[{name}]  " if name else "top of the spec  ")
-        print_text("", "To list the keys of a table or of one key: nested-agents keys PREFIX")
+        print_text(
+            "", f"To list the keys of a table or of one key: {command_line('keys', 'PREFIX')}"
+        )
         return 0
     tables = keys_below(prefix)
     if not tables:
