@@ -1,6 +1,7 @@
 """What pytest leaves out and how it names modules whose docstrings have examples."""
 
 import gc
+import os
 import sys
 from importlib import import_module
 from importlib.util import find_spec
@@ -13,6 +14,8 @@ NEEDED = {
 }
 """Modules that need an extra."""
 collect_ignore_glob = [pattern for extra, pattern in NEEDED.items() if not find_spec(extra)]
+
+os.environ.pop("NESTED_AGENTS_DEV", None)  # set by ./dev: commands would be printed with ./dev exec
 
 
 def pytest_collect_file(file_path: Path) -> None:

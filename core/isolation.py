@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -81,6 +82,30 @@ def safe_path() -> Iterator[None]:
             os.environ.pop(SAFE_PATH, None)
         else:
             os.environ[SAFE_PATH] = former
+
+
+def restore_child_signal() -> None:
+    """Make this process learn how its children end, also if its own parent ignores SIGCHLD.
+
+    Processes inherit an ignored signal. The system then keeps no exit status for `os.waitpid`.
+    """
+    if sys.platform != "win32" and signal.getsignal(signal.SIGCHLD) is signal.SIG_IGN:
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+
+
+@contextlib.contextmanager
+def same_folder() -> Iterator[None]:
+    """Return to the current folder when code of users ends, which may have changed it."""
+    try:
+        folder = os.getcwd()
+    except OSError:  # it has been deleted
+        folder = None
+    try:
+        yield
+    finally:
+        if folder is not None:
+            with contextlib.suppress(OSError):
+                os.chdir(folder)
 
 
 def drop_empty_entries() -> None:

@@ -11,8 +11,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Wedge
+from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 
+from nested_agents.core.agents.cost import Problem
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.studies.presentation import figures
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
@@ -99,56 +100,63 @@ def agent(axes: Axes, place: Sequence[float], name: int, radius: float = 0.22) -
 
 
 def nested_decision() -> Figure:
-    """Draw four agents in a chain: who passes what down, and who tries how many joint actions."""
-    figure, axes = canvas(7.2, 2.1)
+    """Draw four agents in a chain: who tells whom, and the state-action pairs of each."""
+    figure, axes = canvas(7.2, 2.5)
     names = ("robot1.left", "robot1.right", "robot2.left", "robot2.right")
     places = np.linspace(0.85, 6.35, 4)
+    tried = [Problem().actions ** (4 - i) for i in range(4)]
     for i, (x, name) in enumerate(zip(places, names, strict=True)):
-        box(axes, x, 1.25, name, BLUE)
-        tried = 4 ** (4 - i)
-        axes.text(x, 0.75, f"tries {tried} joint\nactions of {4 - i}", ha="center", va="center")
+        box(axes, x, 1.65, name, BLUE)
+        axes.text(x, 1.15, f"tries {tried[i]} joint\nactions of {4 - i}", ha="center", va="center")
         if i:
-            arrow(axes, (places[i - 1] + 0.7, 1.25), (x - 0.7, 1.25), PASSED[i - 1], ORANGE)
-    axes.text(3.6, 1.88, "superior → subordinate: actions that have been decided are passed down",
+            arrow(axes, (places[i - 1] + 0.7, 1.65), (x - 0.7, 1.65), PASSED[i - 1], ORANGE)
+    axes.text(3.6, 2.28, "superior → subordinate: actions that have been decided are passed down",
               ha="center", color=ORANGE)  # fmt: skip
-    axes.text(3.6, 0.3, "340 joint actions in all; one agent for all four wheels has 256, and "
-              "a rule base over every variable", ha="center", color=GREY)  # fmt: skip
+    rules = Problem().rules
+    sums = (
+        ("four nested agents", "5^7", sum(tried), rules * sum(tried), BLUE),
+        ("one agent for all four wheels", "5^{28}", tried[0], rules**4 * tried[0], GREY),
+    )
+    axes.text(3.6, 0.68, "rules × joint actions (paper, Section VII)", ha="center")
+    for y, (who, power, joint, pairs, colour) in zip((0.4, 0.12), sums, strict=True):
+        digits, exponent = f"{pairs:.1e}".split("e+")
+        text = f"${power}$ × {joint} = ${digits} \\times 10^{{{int(exponent)}}}$"
+        axes.text(3.5, y, who, ha="right", color=colour)
+        axes.text(3.7, y, text, color=colour)
     return figure
 
 
 def perception() -> Figure:
-    """Draw what an agent knows of a situation: its own wheel, its robot, the box, the others."""
-    figure, axes = canvas(7.2, 2.9)
-    robot, goal, centre = np.array([1.5, 0.8]), np.array([6.4, 1.75]), np.array([3.3, 1.3])
+    """Draw the state variables of the preset `default`, as one agent of a robot observes them."""
+    figure, axes = canvas(7.2, 3.1)
+    robot, centre, goal = np.array([1.4, 1.9]), np.array([3.3, 1.45]), np.array([6.4, 1.75])
     square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.42
-    turn = np.array([[np.cos(0.25), -np.sin(0.25)], [np.sin(0.25), np.cos(0.25)]])
+    turn = np.array([[np.cos(0.2), -np.sin(0.2)], [np.sin(0.2), np.cos(0.2)]])
     axes.add_patch(Polygon(square @ turn.T + centre, facecolor="#DDDDDD", edgecolor="black"))
     axes.add_patch(Polygon(square + goal, fill=False, linestyle="--", edgecolor=GREY))
-    axes.text(goal[0], goal[1] + 0.48, "goal", ha="center", color=GREY)
-    for place, colour in ((robot, BLUE), (np.array([2.1, 2.2]), GREY)):
+    axes.text(goal[0], goal[1] - 0.62, "goal", ha="center", color=GREY)
+    pusher = centre + np.array([-0.735, -0.1]) @ turn.T
+    for place, colour in ((robot, BLUE), (pusher, GREY)):
         axes.add_patch(Circle(place, 0.3, facecolor="white", edgecolor=colour, linewidth=1.5))
-        axes.plot(*zip(place, np.add(place, (0.3, 0.05)), strict=True), color=colour)
-    wheel = np.add(robot, (-0.12, 0.28)), np.add(robot, (0.14, 0.26))
+        axes.plot(*zip(place, np.add(place, (0.28, 0.1)), strict=True), color=colour)
+    wheel = np.add(robot, (-0.19, 0.24)), np.add(robot, (0.06, 0.31))
     axes.plot(*zip(*wheel, strict=True), color=ORANGE, linewidth=5)
-    line = {"arrowstyle": "-", "color": ORANGE}
-    axes.annotate(
-        "wheel speed\n(the agent's own wheel)", np.add(robot, (0, 0.3)), (0.95, 1.5),
-        color=ORANGE, ha="center", arrowprops=line,
-    )  # fmt: skip
-    axes.plot(*zip(robot, centre, strict=True), color=BLUE, linestyle=":")
-    axes.add_patch(Wedge(robot, 0.85, 9, 15, facecolor=BLUE, alpha=0.5))
-    axes.text(2.5, 0.72, "bearing of the box\nand gap to it", color=BLUE, ha="center", va="top")
+    axes.text(1.4, 2.35, "speed of the\nagent's own wheel", color=ORANGE, ha="center")
+    face = centre + np.array([-0.42, 0.2]) @ turn.T
+    axes.plot(*zip(robot, face, strict=True), color=BLUE, linestyle=":")
+    axes.text(0.1, 1.3, "gap to the nearest face,\nits bearing, and on which\nside it stands",
+              color=BLUE, va="top")  # fmt: skip
+    axes.text(2.6, 0.55, "other robots: share that\nis away from the box", color=GREY, ha="center",
+              va="top")  # fmt: skip
     axes.annotate("", goal, centre, arrowprops={"arrowstyle": "<->", "color": GREEN})
-    axes.text(
-        4.9, 1.12, "distance from the goal,\nand how fast it shrinks", color=GREEN, ha="center"
-    )
-    push = centre + (centre - robot) / np.linalg.norm(centre - robot) * 3.0
+    axes.text(4.9, 1.0, "distance of the box from the goal,\nand how fast it shrinks",
+              color=GREEN, ha="center")  # fmt: skip
+    push = centre + (centre - pusher) / np.linalg.norm(centre - pusher) * 2.7
     axes.plot(*zip(centre, push, strict=True), color=ORANGE, linestyle="--", linewidth=1)
-    axes.text(4.6, 2.2, "where a push would pass the goal:\ncross-track error", color=ORANGE,
-              ha="center")  # fmt: skip
-    axes.text(2.1, 2.6, "the others: greatest gap", color=GREY, ha="center")
-    axes.text(5.3, 0.35, "not seen: the shape of the box, failed wheels,\nactions that nobody has "
-              "told it of", ha="center", color=GREY)  # fmt: skip
+    axes.text(4.4, 2.42, "push of the robots in contact: its bearing, and by\nhow much it misses "
+              "the goal (cross-track error)", color=ORANGE, ha="center")  # fmt: skip
+    axes.text(5.3, 0.25, "not observed: the outline of the box, failed\nwheels, actions that the "
+              "agent has not been told", ha="center", color=GREY)  # fmt: skip
     return figure
 
 

@@ -3,8 +3,8 @@ A tank that pumps fill or empty
 ===============================
 
 A whole scenario of one's own: its settings, the scenario and its prediction. Run it as a study by
-``nested-agents run examples/tank.toml --out out/tank``, check it by
-``nested-agents check examples/tank.py:Tank``.
+``./dev exec nested-agents run examples/tank.toml --out out/tank``, check it by
+``./dev exec nested-agents check examples/tank.py:Tank``.
 """
 
 import numpy as np

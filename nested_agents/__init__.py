@@ -1,4 +1,4 @@
-"""Hierarchies of fuzzy reinforcement-learning agents, and how they scale.
+"""Define hierarchies of learning agents and measure how learning, failure recovery and cost scale.
 
 The names below are imported when they are first used, so that ``import nested_agents`` is quick.
 

@@ -13,7 +13,7 @@ import signal
 from functools import partial
 from types import FrameType
 
-from .core.isolation import drop_empty_entries, open_standard_streams
+from .core.isolation import drop_empty_entries, open_standard_streams, restore_child_signal
 
 
 def main() -> int:
@@ -28,6 +28,7 @@ def main() -> int:
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     open_standard_streams()
     drop_empty_entries()
+    restore_child_signal()
     from .studies.cli.main import main as run
 
     try:

@@ -12,7 +12,7 @@ from .studies.catalogue.hierarchies import estimates as estimates_of_hierarchy
 from .studies.catalogue.hierarchies.cases import HierarchyCase
 from .studies.catalogue.study import analyse_as, distinct, system_of
 from .studies.catalogue.wheel_failure import courses_of
-from .studies.results import laws
+from .studies.results import laws, samples
 from .studies.results.analysis import (
     EVALUATED,
     Analysis,
@@ -107,6 +107,7 @@ __all__ = [
     "power_lines",
     "rate",
     "ratio",
+    "samples",
     "select_shared",
     "stack_estimates",
     "system_of",

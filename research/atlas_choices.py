@@ -17,6 +17,7 @@ import pandas as pd
 
 from nested_agents import rate
 from nested_agents.analysis import LEVEL, format_estimate, format_p, laws, paired_tests
+from nested_agents.analysis import samples as samples_of_laws
 
 from .atlas_predictions import largest_small
 from .atlas_rows import MEASURES, NO_FAULT, quality, sample_of
@@ -105,9 +106,11 @@ def _choice(
     return HierarchyChoice(case, measure, size, predicted, tuple(rivals), str(nearest), best, p)
 
 
-def _is_above(samples: Mapping[str, laws.Sample], one: str, other: str, size: int) -> bool:
+def _is_above(
+    samples: Mapping[str, samples_of_laws.Sample], one: str, other: str, size: int
+) -> bool:
     """Return whether one hierarchy is better than another, by the 90% interval of its lead."""
-    lead = laws.choose(laws.apart(samples[one], samples[other]))
+    lead = laws.choose(samples_of_laws.apart(samples[one], samples[other]))
     return lead.distribution(size).quantile(TAIL) > 0.0
 
 

@@ -52,12 +52,12 @@ def checks(rows: pd.DataFrame, most: int = SMALL) -> list[Check]:
             continue
         m = int((sample.sizes <= largest_small(str(team[0]), most)).sum())
         first = sample.first(m)
-        if m < laws.FEWEST or m == len(sample.sizes) or np.ptp(first.values) == 0.0:
+        if m < laws.FEWEST or m == len(sample.sizes) or np.ptp(first.observed) == 0.0:
             continue
         law = laws.choose(first)
         for k in range(m, len(sample.sizes)):
             size = int(sample.sizes[k])
-            measured = float(sample.scale.back(sample.values[:, k].mean()))
+            measured = float(sample.means[k])
             predicted = law.predict(size)
             lines.append(Check(TeamKind(*team), measure, size, law.curve.name, predicted, measured))
     return lines
@@ -84,7 +84,8 @@ def coverage(checked: Sequence[Check]) -> list[str]:
             by_law.setdefault((check.team, check.measure), []).append(check.is_inside)
         shares = np.array([np.mean(inside) for inside in by_law.values()])
         inside = sum(check.is_inside for check in own)
-        factor = np.median([np.sqrt(c.predicted.high / c.predicted.low) for c in own])
+        with np.errstate(divide="ignore"):  # the interval of a rate may begin at 0
+            factor = np.median([np.sqrt(c.predicted.high / c.predicted.low) for c in own])
         text = f"{name}: {inside} of {len(own)} inside, {len(shares)} laws"
         if len(shares) > 1:
             text += f", share {format_estimate(bootstrap(shares, bounds=(0.0, 1.0)))}"
@@ -99,7 +100,7 @@ def exponents(rows: pd.DataFrame, measure: str) -> dict[TeamKind, Estimate]:
         sample = sample_of(own, measure)
         if sample is None or len(sample.sizes) < laws.FEWEST or len(sample.values) < 2:
             continue
-        if np.ptp(sample.values) == 0.0:
+        if np.ptp(sample.observed) == 0.0:
             continue
         law = laws.fit(sample.scale.curves[0], sample)
         by_team[TeamKind(*team)] = law.exponents()["exponent"]

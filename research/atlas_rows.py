@@ -15,7 +15,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from nested_agents import SpecError, load, run
-from nested_agents.analysis import Results, label_but, laws
+from nested_agents.analysis import Results, label_but, samples
 from nested_agents.terminal import closest
 
 from . import RESULTS, SPECS
@@ -166,7 +166,7 @@ def read_rows(folder: Path = COMMITTED) -> pd.DataFrame:
     return rows.assign(loss=-rows["return"]) if "return" in rows else rows
 
 
-def sample_of(rows: pd.DataFrame, measure: str) -> laws.Sample | None:
+def sample_of(rows: pd.DataFrame, measure: str) -> samples.Sample | None:
     """Return what one team's rows have of a measure; None if no law can be of it.
 
     Those are values that are not positive.
@@ -181,8 +181,8 @@ def sample_of(rows: pd.DataFrame, measure: str) -> laws.Sample | None:
     sizes = values.columns.to_numpy(dtype=float)
     if measure in RATES:
         episodes = int(rows["episodes"].iloc[0])
-        return laws.of_rates(sizes, array * episodes, episodes)
-    return laws.of_numbers(sizes, array) if (array > 0.0).all() else None
+        return samples.of_rates(sizes, array, episodes)
+    return samples.of_numbers(sizes, array) if (array > 0.0).all() else None
 
 
 def quality(task: str) -> str:

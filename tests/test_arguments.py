@@ -29,7 +29,7 @@ VALID: dict[str, dict[str, object]] = {
     "build_hierarchy": {"settings": "tree:2", "agents": ["a", "b", "c"], "bodies": None},
     "check_scenario": {"factory": na.LineUpSettings().build, "steps": 3, "seeds": (0, 1)},
     "compare_table": {"table": "none.csv"},
-    "cost_table": {"topologies": ["chain"], "agents": [2], "problem": None},
+    "cost_table": {"topologies": ["chain"], "agents": [2], "actions": [4], "memberships": [3]},
     "control_loop": {
         "scenario": SCENARIO, "team": None, "episodes": 1, "steps": 1, "seed": 0,
     },
@@ -112,6 +112,8 @@ SEQUENCES: dict[tuple[str, str], tuple[object, ...]] = {
     ("compare_table", "score"): ("score",),
     ("cost_table", "topologies"): ("chain",),
     ("cost_table", "agents"): (2,),
+    ("cost_table", "actions"): (4,),
+    ("cost_table", "memberships"): (3,),
     ("Hierarchy", "agents"): ("a",),
     ("Hierarchy", "edges"): (("a", "b"),),
     ("Hierarchy", "neighbours"): (("a", "b"),),

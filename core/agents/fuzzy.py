@@ -107,14 +107,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.is_private = is_private(settings, scenario)
         self.views: Views | None = None
         self.evaluator = self._evaluator()
-        self._searches_jointly = (
-            self.evaluator is not None
-            and placement.is_whole
-            and not self.is_private
-            and type(self.evaluator).decide is not Evaluator.decide
-            and not placement.messages_fail
-            and all_hear_all(hierarchy)
-        )
+        self._searches_jointly = self._can_search_jointly(placement)
         self._neutral = np.full(n, self.action_set.neutral)
         own_rows = dict(zip(self.members.tolist(), self.rows.tolist(), strict=True))
         self._row_of = [own_rows.get(agent) for agent in range(n)]
@@ -137,6 +130,17 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         learned = self.learner if isinstance(self.learner, Evaluator) else None
         present = Present(self.hierarchy, self._left)
         return evaluator_of(self.settings, self.rules, learned, self._placement, present)
+
+    def _can_search_jointly(self, placement: Placement) -> bool:
+        """Return whether one search may find the actions of all agents, see `decide`."""
+        return (
+            self.evaluator is not None
+            and placement.is_whole
+            and not self.is_private
+            and type(self.evaluator).decide is not Evaluator.decide
+            and not placement.messages_fail
+            and all_hear_all(placement.hierarchy)
+        )
 
     def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
         """Consider from now on whom another hierarchy has below; who has left is known to all."""

@@ -219,7 +219,7 @@ class JointPrediction(Prediction, Tables):
         """Return the next states ``(m, d)`` of who acts for a block, for actions ``(m, M)``."""
         actions = self._joint.actions(joint_actions)
         block = self._joint.blocks[agent]
-        return self._joint.joined([self._prediction.states(i, actions) for i in block])
+        return self._joint.joined([np.array(self._prediction.states(i, actions)) for i in block])
 
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
         """Return the rewards of actions ``(m, M)``, if the scenario predicts them."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..interface.experience import Experience, Observation
 from ..interface.plain import as_scenario
-from ..interface.scenario import Transition, check_reward
+from ..interface.scenario import Transition, checked_transition
 from ..numerics import FloatArray, IntArray
 from ..plugins.words import expect
 from .team import Team
@@ -94,7 +94,7 @@ def control_loop(
     ------
     ValueError
         If the scenario does not predict what the team decides by, see `Team.check`, or its states
-        or rewards cannot be learned from, see `StateSpace.checked` and `check_reward`.
+        or rewards cannot be learned from, see `checked_transition`.
     """
     expect("a team", Team, team=team)
     expect("whole numbers", Integral, episodes=episodes, steps=steps, seed=seed)
@@ -114,10 +114,9 @@ def control_loop(
             begin = perf_counter()
             decision = team.act(seen, explore=explore)
             decided = perf_counter()
-            transition = world.step(decision.joint_action)
+            returned = world.step(decision.joint_action.copy())
+            transition = checked_transition(returned, space, world.agents)
             last = transition.terminated or transition.truncated or step == steps - 1
-            space.checked(transition.states, world.agents)
-            check_reward(transition.reward, world.agents)
             moved = perf_counter()
             if learn:
                 team.learn(Experience(seen, decision, transition, last))

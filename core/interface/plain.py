@@ -16,6 +16,7 @@ import numpy as np
 from ..numerics import FloatArray, IntArray
 from .prediction import Blocks, Prediction, Tables
 from .scenario import Scenario, Transition
+from .spaces import real_copy
 
 NECESSARY = ("agents", "state_space", "action_set", "reset", "step")
 """What a scenario cannot do without."""
@@ -185,18 +186,22 @@ class PlainPrediction(Prediction, Tables):
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent`."""
-        states: FloatArray = self.plain.states(agent, joint_actions)
-        return states
+        return real_copy(self.plain.states(agent, joint_actions), "predicted states")
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray] | None:
         """Return own and shared variables of all, if the user's object knows a way."""
         own_way = offered(self.plain, "states_by_group", None)
-        return None if own_way is None else own_way(joint_actions)
+        if own_way is None or (parts := own_way(joint_actions)) is None:
+            return None
+        own, shared = parts
+        return real_copy(own, "predicted states"), real_copy(shared, "predicted states")
 
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
         """Return rewards, if the user's object predicts them."""
         own_way = offered(self.plain, "rewards", None)
-        return None if own_way is None else own_way(joint_actions)
+        if own_way is None or (rewards := own_way(joint_actions)) is None:
+            return None
+        return real_copy(rewards, "predicted rewards")
 
     def after(self, joint_action: IntArray) -> Prediction | None:
         """Return the prediction from where a joint action leads, if it goes on."""
@@ -214,5 +219,4 @@ class PlainPrediction(Prediction, Tables):
 
     def reward_table(self) -> FloatArray:
         """Return the rewards of all joint actions."""
-        rewards: FloatArray = self.plain.reward_table()
-        return rewards
+        return real_copy(self.plain.reward_table(), "predicted rewards")

@@ -194,6 +194,6 @@ def states_by_group(
     if states is not None:
         return states
     agents = range(joint_actions.shape[1])
-    each = np.stack([prediction.states(i, joint_actions) for i in agents])
+    each = np.stack([np.array(prediction.states(i, joint_actions)) for i in agents])
     firsts = [group[0] for group in groups]
     return each[:, :, :n_own], each[firsts, :, n_own:]

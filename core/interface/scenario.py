@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
@@ -72,8 +73,38 @@ class Transition:
     if not, its reward is received once, as in Gymnasium."""
 
 
-def check_reward(reward: object, agents: Sequence[str]) -> None:
-    """Check that the reward of some agents can be learned from.
+def checked_transition(transition: object, space: StateSpace, agents: Sequence[str]) -> Transition:
+    """Return a copy of a transition if agents can learn from it.
+
+    A scenario may reuse its arrays: learners keep transitions, so each enters as a copy.
+
+    Raises
+    ------
+    ValueError
+        If it is no `Transition`, or its states or its reward cannot be learned from; one line.
+    """
+    if not isinstance(transition, Transition):
+        given = type(transition).__name__
+        raise ValueError(f"step returns {given}, allowed: nested_agents.Transition")
+    twists: Twists = vars(transition)["twists"]
+    return Transition(
+        states=space.checked(transition.states, agents),
+        reward=checked_reward(transition.reward, agents),
+        terminated=bool(transition.terminated),
+        truncated=bool(transition.truncated),
+        info={name: _copied(value) for name, value in transition.info.items()},
+        twists=_copied(twists),  # type: ignore[arg-type]  # given, or a function that returns them
+        absorbing=bool(transition.absorbing),
+    )
+
+
+def _copied(value: object) -> object:
+    """Return a copy of what code of users might change in place."""
+    return deepcopy(value) if isinstance(value, np.ndarray | list | dict) else value
+
+
+def checked_reward(reward: object, agents: Sequence[str]) -> float | FloatArray:
+    """Return a copy of the reward of agents if it can be learned from.
 
     Raises
     ------
@@ -81,14 +112,15 @@ def check_reward(reward: object, agents: Sequence[str]) -> None:
         If it is neither a finite number nor one for each of them.
     """
     if isinstance(reward, float) and isfinite(reward):
-        return  # what most scenarios pay
-    array = np.asarray(reward)
+        return reward  # most scenarios return a float
+    array = np.array(reward)
     is_numeric = array.dtype.kind in "biuf" and array.shape in ((), (len(agents),))
     if not (is_numeric and np.isfinite(array).all()):
         raise ValueError(
             f"reward = {reward!r:.60}, allowed: a finite number, or one for each of "
             f"{len(agents)} agents"
         )
+    return array if array.ndim else array.item()
 
 
 class Embodiment(ABC):

@@ -24,6 +24,26 @@ import numpy as np
 from ..numerics import FloatArray, IntArray
 from ..plugins.words import expect_each
 
+
+def real_copy(values: object, what: str, allowed: str = "real numbers") -> FloatArray:
+    """Return numbers of users' code as a new array, which that code cannot change later.
+
+    Raises
+    ------
+    ValueError
+        If they are complex or no numbers; `what` names them, and `allowed` what they may be.
+    """
+    given = type(values).__name__
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "biufO":
+            return np.array(array, float)
+        given = array.dtype.name
+    except (TypeError, ValueError):
+        pass
+    raise ValueError(f"{what}: {given}, allowed: {allowed}")
+
+
 FARTHEST = 1000.0
 """Ranges of a variable beyond which its value cannot be meant."""
 
@@ -126,22 +146,20 @@ class StateSpace:
                 raise ValueError(f"state space {self.name!r}: action {name!r} is no variable")
 
     def checked(self, states: FloatArray, agents: Sequence[str]) -> FloatArray:
-        """Return the states of some agents, if they can be learned from.
+        """Return a copy of the states of agents if they can be learned from.
 
         Raises
         ------
         ValueError
-            If they are no ``(n, d)`` finite numbers, or one is farther than `FARTHEST` times the
-            range of its variable from its lower end; the first that is wrong is named.
+            If they are not finite real numbers of shape ``(n, d)``, or one is farther than
+            `FARTHEST` times the range of its variable from its lower end; the first wrong value is
+            named.
         """
         wanted = len(agents), self.n_variables
-        try:
-            array = np.asarray(states, float)
-        except (TypeError, ValueError):
-            array = np.empty(0)
+        array = real_copy(states, "states of agents", f"real numbers of shape {wanted}")
         if array.shape != wanted:
             given = f"shape {array.shape}" if array.ndim == 2 else type(states).__name__
-            raise ValueError(f"states of agents: {given}, allowed: numbers of shape {wanted}")
+            raise ValueError(f"states of agents: {given}, allowed: real numbers of shape {wanted}")
         low, width = self.ranges
         near = np.abs((array - low) / width) <= FARTHEST
         if not near.all():

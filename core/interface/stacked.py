@@ -10,7 +10,7 @@ import numpy as np
 
 from ..numerics import FloatArray, IntArray
 from .environments import Environments, Transitions
-from .scenario import Scenario
+from .scenario import Scenario, checked_transition
 
 S = TypeVar("S", bound=Scenario)
 
@@ -80,12 +80,18 @@ class LoopedEnvironments(Environments):
     ) -> FloatArray:
         """Start an episode in some environments."""
         episodes = enumerate(zip(indices, seeds, strict=True), first_episode)
-        return np.stack([self.instances[index].reset(seed, k) for k, (index, seed) in episodes])
+        started = [(self.instances[index], seed, k) for k, (index, seed) in episodes]
+        return np.stack(
+            [s.state_space.checked(s.reset(seed, k), s.agents) for s, seed, k in started]
+        )
 
     def step(self, joint_actions: IntArray) -> Transitions:
         """Carry out joint actions, one environment after the other."""
         pairs = zip(self.instances, joint_actions, strict=True)
-        transitions = [instance.step(joint_action) for instance, joint_action in pairs]
+        transitions = [
+            checked_transition(s.step(joint_action.copy()), s.state_space, s.agents)
+            for s, joint_action in pairs
+        ]
         n = joint_actions.shape[1]
         return Transitions(
             states=np.stack([transition.states for transition in transitions]),

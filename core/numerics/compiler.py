@@ -31,12 +31,11 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache, cached_property, update_wrapper, wraps
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import IO, Any, TypeVar, cast
 
-from .. import locks
 from ..isolation import python_command
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -46,9 +45,6 @@ IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
 
 LOCK = "compiling.lock"
 """The file beside cached kernels that a process holds while it compiles."""
-
-CACHE_LOCK = "cache.lock"
-"""The file beside them that a process holds while it reads or writes one."""
 
 INNER = "-inner"
 """What tells cached kernels for kernels from those for Python."""
@@ -129,11 +125,10 @@ class Kernel:
         compiled = numba.njit(**self._options, **options)(copy)
         file = _cache_file(compiled)
         if file is not None:  # interpreted kernels, NUMBA_DISABLE_JIT=1, have none
+            from .kernel_cache import CheckedCacheFile
+
             source = Path(function.__code__.co_filename)
-            # Compared before the rest of an index is read, which may name classes that are gone.
-            file._version = (file._version, stamp(source))
-            file.load = _in_turns(file, file.load)
-            file.save = _in_turns(file, file.save)
+            compiled._cache._cache_file = CheckedCacheFile(file, stamp(source))
         return compiled
 
     def __call__(self, *args: object) -> Any:
@@ -144,9 +139,11 @@ class Kernel:
             compiled = self.compiled
             file = _cache_file(compiled)
             if file is not None:
+                from .kernel_cache import lock_beside
+
                 types = tuple(map(compiled.typeof_pyval, args))
                 if not _is_cached(compiled, types):
-                    with _alone(file, LOCK):
+                    with lock_beside(file, LOCK):
                         self._compile_apart(compiled, types)
             result = compiled(*args)
             self._ready = compiled
@@ -228,32 +225,9 @@ def _cache_file(compiled: Any) -> Any:
 
 
 def _is_cached(compiled: Any, types: tuple[object, ...]) -> bool:
-    """Return whether the cache has a function for arguments of these types."""
+    """Return whether the cache has an undamaged function for arguments of these types."""
     key = compiled._cache._index_key(types, compiled.targetctx.codegen())
-    return key in compiled._cache._cache_file._load_index()
-
-
-@contextlib.contextmanager
-def _alone(file: Any, name: str) -> Iterator[None]:
-    """Hold a lock beside a cached kernel; without a folder that can be written to, none."""
-    with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):
-            folder = Path(file._cache_path)
-            folder.mkdir(parents=True, exist_ok=True)
-            lock = stack.enter_context((folder / name).open("w"))
-            locks.lock(lock, wait=True)
-        yield
-
-
-def _in_turns(file: Any, access: F) -> F:
-    """Return what reads or writes a cached kernel while no other process does."""
-
-    @wraps(access)
-    def alone(*args: object) -> Any:
-        with _alone(file, CACHE_LOCK):
-            return access(*args)
-
-    return cast(F, alone)
+    return bool(compiled._cache._cache_file.is_sound(key))
 
 
 def stamp(path: Path) -> str:

@@ -1,8 +1,6 @@
 """Text of others, written so that a terminal obeys nothing of it."""
 
 import unicodedata
-from pathlib import Path
-from shlex import quote
 
 
 def printable(text: str) -> str:
@@ -26,15 +24,3 @@ def _written_out(character: str) -> str:
     if character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs":
         return character
     return character.encode("unicode_escape").decode("ascii")
-
-
-def shell_word(path: Path) -> str:
-    """Return a path as typed in a shell, where it is never taken for an option.
-
-    Examples
-    --------
-    >>> shell_word(Path("out/mine")), shell_word(Path("-dash")), shell_word(Path("my out"))
-    ('out/mine', './-dash', "'my out'")
-    """
-    text = str(path)
-    return quote(f"./{text}" if text.startswith("-") else text)

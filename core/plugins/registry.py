@@ -129,7 +129,9 @@ class Registry:
         """
         if sources.is_reference(name):
             return sources.active().load(name)
-        place = self.built_in.get(name) or self.installed().get(name)
+        place = self.built_in.get(name)
+        if place is None and (place := self.installed().get(name)) is not None:
+            sources.active().offered_by(place.partition(":")[0])
         if place is None:
             module = module_named(name)
             if "." not in module:

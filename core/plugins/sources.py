@@ -25,6 +25,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from ..isolation import same_folder
 from .compiled import compiled_name
 from .printing import printable
 from .syntax import imported, tree_text
@@ -101,6 +102,7 @@ class Sources:
         self._brought = dict.fromkeys(self._texts, brought_by) if brought_by else {}
         self._brought_by = brought_by
         self._was_sent = False
+        self._modules: set[str] = set()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sources) and self._texts == other._texts
@@ -118,11 +120,21 @@ class Sources:
         """The files that have been asked for so far, by name."""
         return dict(self._texts)
 
+    @property
+    def runs_foreign_code(self) -> bool:
+        """Whether Python files or modules of users have been asked for so far."""
+        return bool(self._modules) or any(name.endswith(".py") for name in self._texts)
+
+    def offered_by(self, module: str) -> None:
+        """Note that an installed package offers what is used, by an entry point."""
+        self._modules.add(module)
+
     def only(self, names: set[str]) -> Sources:
         """Return the files of some names alone."""
         sources = Sources(None, {name: self.text(name) for name in sorted(names)})
         sources._brought = {name: by for name, by in self._brought.items() if name in names}
         sources._brought_by = self._brought_by
+        sources._modules = set(self._modules)
         return sources
 
     def text(self, name: str) -> str:
@@ -191,6 +203,7 @@ class Sources:
         ValueError
             If it may not be imported; one line.
         """
+        self._modules.add(module)
         text = module_text(module)
         if self._brought_by is not None and not is_trusted(text):
             raise ValueError(
@@ -202,10 +215,14 @@ class Sources:
 
     @contextlib.contextmanager
     def active(self) -> Iterator[None]:
-        """Resolve names by these files for as long as the context lasts."""
+        """Resolve names by these files for as long as the context lasts.
+
+        Code of users that runs meanwhile may change the current folder; the end restores it.
+        """
         token = _ACTIVE.set(self)
         try:
-            yield
+            with same_folder():
+                yield
         finally:
             _ACTIVE.reset(token)
 
@@ -261,7 +278,8 @@ class Sources:
         linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
         sys.modules[key] = module  # dataclasses look their own module up
         try:
-            exec(compile(text, file, "exec"), module.__dict__)
+            with same_folder():
+                exec(compile(text, file, "exec"), module.__dict__)
         except (Exception, SystemExit) as error:
             del sys.modules[key]
             raise ValueError(f"{name} cannot be run: {format_error(error)}") from None

@@ -29,7 +29,13 @@ _noted: set[str] = set()
 
 
 def trusted_list() -> Path:
-    """Return where the list is."""
+    """Return where the list is.
+
+    Raises
+    ------
+    RuntimeError
+        If there is no home folder.
+    """
     state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
     return Path(state) / "nested-agents" / "trusted"
 
@@ -39,7 +45,7 @@ def is_trusted(text: str) -> bool:
     digest = sha256(text)
     if digest in _noted:
         return True
-    with contextlib.suppress(OSError, ValueError):
+    with contextlib.suppress(OSError, RuntimeError, ValueError):  # no list, or no home
         return digest in trusted_list().read_text(encoding="ascii").split()
     return False
 
@@ -50,8 +56,8 @@ def trust(text: str) -> None:
         return
     digest = sha256(text)
     _noted.add(digest)
-    path = trusted_list()
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, RuntimeError):
+        path = trusted_list()
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(path, "a", encoding="ascii") as file:
             file.write(f"{digest}\n")

@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
+from numbers import Real
 from types import UnionType
 
 
@@ -72,6 +73,36 @@ def expect(allowed: str, kind: type | UnionType, /, **arguments: object) -> None
     """
     for name, value in arguments.items():
         if not isinstance(value, kind):
+            raise ValueError(f"{name} = {show(value)}, allowed: {allowed}")
+
+
+def expect_within(allowed: str, low: float, high: float, /, **arguments: float) -> None:
+    """Refuse numbers outside a closed interval; NaN lies in none.
+
+    Parameters
+    ----------
+    allowed
+        The interval in words.
+    low, high
+        Its bounds.
+    **arguments
+        Numbers by name.
+
+    Raises
+    ------
+    ValueError
+        If a number is not a number or out of range; it names the argument, its value and what is
+        allowed.
+
+    Examples
+    --------
+    >>> expect_within("0 to 1", 0.0, 1.0, level=2.0)
+    Traceback (most recent call last):
+    ValueError: level = 2.0, allowed: 0 to 1
+    """
+    expect(allowed, Real, **arguments)
+    for name, value in arguments.items():
+        if not low <= value <= high:
             raise ValueError(f"{name} = {show(value)}, allowed: {allowed}")
 
 

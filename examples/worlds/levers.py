@@ -5,7 +5,7 @@ Levers: a world whose states hold what was done
 All agents see which lever is lit, and are paid for each that pulls it. A state is a pair of a
 situation and a choice, as `StateSpace.actions` says: so its value is the action value of
 Q-learning, ``learner.kind = "q-learning"``, and what an agent does is all that it can foresee.
-Check it by ``nested-agents check examples/worlds/levers.py:Levers``.
+Check it by ``./dev exec nested-agents check examples/worlds/levers.py:Levers``.
 """
 
 import numpy as np

@@ -156,7 +156,8 @@ OWN_HIERARCHY = Lab(
     {
         "chain": Numeric(
             "How many joint actions does a decision of the four wheels of two e-Pucks try in a"
-            " chain?", _tried("chain", 4), hint="run nested-agents topology show chain --robots 2",
+            " chain?", _tried("chain", 4),
+            hint="run ./dev exec nested-agents topology show chain --robots 2",
         ),
         "independent": Numeric(
             "And if nobody sees anybody?", _tried("independent", 4),

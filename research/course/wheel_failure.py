@@ -70,8 +70,8 @@ figure.savefig("out/course/wheel-failure.png", dpi=80)
 # %%
 # The replay
 # ----------
-# ``nested-agents report out/course/wheel-failure`` makes a page with replays of the episodes around
-# the failure. The failed wheel is crossed out.
+# ``./dev exec nested-agents report out/course/wheel-failure`` makes a page with replays of the
+# episodes around the failure. The failed wheel is crossed out.
 #
 # Questions
 # ---------

@@ -28,7 +28,7 @@ from ...core.hierarchy.failures import MessageFailure
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.hierarchy.messages import Messages
 from ...core.numerics import FloatArray, IntArray
-from .simulators import flags_by_agent
+from .simulators import Player, flags_by_agent
 
 
 class PassingDownEnv(parallel_to_aec_wrapper):
@@ -73,8 +73,8 @@ class PassingDownEnv(parallel_to_aec_wrapper):
     ('robot1.right', [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     """
 
-    terminations: Any
-    truncations: Any
+    terminations: dict[Player, bool]
+    truncations: dict[Player, bool]
 
     def __init__(
         self,

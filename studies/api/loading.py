@@ -18,7 +18,7 @@ from ..results.parts import join_parts
 from ..results.results import combine
 from ..results.score_files import SUFFIXES, ScoreTable, read_table, table_of
 from ..spec.outline import StudyOutline
-from ..spec.tables import TomlTable
+from ..spec.tables import SpecTable, TomlTable
 from ..store.durable import read_text
 from ..store.store import Store
 from .comparison import Comparison
@@ -259,6 +259,7 @@ def _check_distinct(paths: Sequence[Path]) -> None:
 def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResults:
     """Return the results of several studies, or of parts of one, as those of one."""
     whole = join_parts([(study.outline, study.results) for study in studies])
+    tables = dict[str, SpecTable]()
     if whole is not None:
         outline, results = whole
         labels = [{c: c for c in results.columns}] * len(studies)
@@ -271,6 +272,7 @@ def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResul
             [study._settings for study in studies],
         )
         outline = studies[0].outline._replace(columns=results.columns)
+        tables = {n: study.outline.table for n, study in zip(names, studies, strict=True)}
     settings = dict[str, TomlTable]()
     failed = list[tuple[str, int, str]]()
     for study, new in zip(studies, labels, strict=True):
@@ -284,5 +286,6 @@ def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResul
         _sources=studies[0]._sources,
         _settings=settings,
         _directories=tuple(path for study in studies for path in study._directories),
+        _tables=tables,
         _is_whole=False,
     )

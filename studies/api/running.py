@@ -18,7 +18,6 @@ from ...core.plugins.words import expect
 from ..catalogue.study import load_study, measure_by_name
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
-from ..spec.outline import fingerprint, present
 from ..spec.spec import Spec
 from ..store.database import CHECKPOINTS
 from ..store.store import Store
@@ -132,7 +131,7 @@ def _checkpoints(store: Store, seconds: float, observer: Observer) -> Iterator[C
         folder.mkdir(exist_ok=True)
         for remark in sweep(folder):
             observer.note(remark)
-    code = json.dumps([fingerprint(present(store.code())), versions()])
+    code = json.dumps([store.code_digest, versions()])
     try:
         yield Checkpoints(folder, seconds, code)
     finally:

@@ -33,12 +33,12 @@ from ..errors import SpecError
 from ..presentation.headlines import below_random, headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.choices import choose_trials
-from ..results.contrasts import contrasts, power_with_first
+from ..results.contrasts import contrasts, missing_reference, power_with_first
 from ..results.notation import wrapped
 from ..results.results import Results, read
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, other_spec, sources_of
-from ..spec.tables import TomlTable
+from ..spec.tables import SpecTable, TomlTable
 from ..store import durable
 from ..store.store import Store
 from .comparison import Comparison
@@ -81,6 +81,8 @@ class StudyResults:
     _sources: Sources = field(default_factory=Sources, repr=False)
     _settings: Mapping[str, TomlTable] = field(default_factory=dict, repr=False)
     _directories: tuple[Path, ...] = ()
+    _tables: Mapping[str, SpecTable] = field(default_factory=dict, repr=False)
+    """Specs of several studies by name, if these are not parts of one."""
     _is_whole: bool = True
     _defaults: Defaults = field(default_factory=Defaults)
 
@@ -133,7 +135,12 @@ class StudyResults:
     def notes(self) -> tuple[str, ...]:
         """What the study says of its results, verdicts and their power, line by line."""
         sentences = map(wrapped, headlines(self.results, self._settings))
-        return (*chain.from_iterable(sentences), *notes_of(self.analysis), *self._of_controls)
+        return (
+            *missing_reference(self.results),
+            *chain.from_iterable(sentences),
+            *notes_of(self.analysis),
+            *self._of_controls,
+        )
 
     @property
     def _of_controls(self) -> tuple[str, ...]:
@@ -204,7 +211,8 @@ class StudyResults:
         key = None if by == "condition" else by
         name = measure or self._defaults.measure or self.results.main.name
         compared = contrasts(self.results, name, phase, key, reference)
-        return Comparison(compared, (*self._of_controls, *self.remarks))
+        missing = missing_reference(self.results) if reference is None and key is None else []
+        return Comparison(compared, (*missing, *self._of_controls, *self.remarks))
 
     def where(self, choice: str) -> StudyResults:
         """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `chosen`."""

@@ -13,9 +13,12 @@ from shutil import get_terminal_size
 from textwrap import fill
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from ...core.plugins.printing import printable, shell_word
+from ...core.plugins.printing import printable
+from ...core.shell import command_line
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ..api.study import StudyResults
     from ..presentation.tables import SummaryTable
 
@@ -91,8 +94,10 @@ def print_study(
         print_lines(study.power)
 
 
-def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
-    """Print the table of a study that has been run, draw its figures, say where everything is.
+def show_results(
+    study: StudyResults, formats: Sequence[str] = (), report: Path | None = None
+) -> int:
+    """Print the table of a study that has been run, write its figures, print where everything is.
 
     Parameters
     ----------
@@ -100,6 +105,8 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
         What has been run.
     formats
         Of the figures; none: PNG and SVG.
+    report
+        Path of its report, if it has been written; without it the command is printed that does.
 
     Returns
     -------
@@ -121,13 +128,13 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
         names = join_names(study.unlearned, 3)
         print_wrapped(
             f"{names}: no better than frozen weights in evaluation. What to try, and in which "
-            f"order: {TROUBLESHOOTING}; nested-agents tune tries it for you.",
+            f"order: {TROUBLESHOOTING}; {command_line('tune')} tries it for you.",
             first="hint    ",
             indent=8,
         )
-    typed = shell_word(directory)
-    print_text(f"rows    nested-agents results {typed} --format csv")
-    print_text(f"report  nested-agents report {typed}")
+    print_text(f"rows    {command_line('results', directory, '--format', 'csv')}")
+    print_text(f"report  {report or command_line('report', directory)}")
     if study.failed:
-        say(f"{count(len(study.failed), 'trial')} failed: nested-agents status {typed}")
+        failed = count(len(study.failed), "trial")
+        say(f"{failed} failed: {command_line('status', directory)}")
     return 1 if study.failed else 0

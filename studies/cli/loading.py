@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Literal
 from ...core.plugins.sources import Sources, files_in, is_file, is_reference, split
 from ...core.plugins.trust import is_trusted, module_text, modules_in
 from ...core.plugins.trust import trust as trust_text
-from ...topologies.files import read_file
 from ..errors import refused
 from ..presentation.progress import say
 from ..spec.outline import other_spec
@@ -124,6 +123,7 @@ def untrusted(source: Path) -> dict[str, str]:
 def _untrusted(source: Path, files: Mapping[str, str], tables: object) -> dict[str, str]:
     """Return untrusted files, and untrusted modules that tables and files of hierarchies name."""
     texts = {f"{n}, which came with {source},": t for n, t in files.items() if n.endswith(".py")}
+    from ...topologies.files import read_file  # NumPy and pydantic take their time
 
     contents: list[object] = []
     with Sources(None, files).active():

@@ -17,6 +17,7 @@ import click
 
 from ...core.plugins.printing import printable
 from ...core.plugins.words import closest
+from ...core.shell import command_line
 from ..errors import SpecError
 from .options import complete
 
@@ -98,12 +99,16 @@ class _Commands(click.Group):
 
 @click.group(
     cls=_Commands,
-    epilog=f"To begin with: {PROGRAM} demo",
+    help="Define hierarchies of learning agents and measure how learning, failure recovery and "
+    "cost scale.",
+    epilog=f"To begin with: {command_line('demo')}",
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
-@click.version_option(None, "-V", "--version", package_name=PROGRAM, message="%(prog)s %(version)s")
+@click.version_option(
+    None, "-V", "--version", package_name=PROGRAM, message=f"{PROGRAM} %(version)s"
+)
 def nested_agents() -> None:
-    """How learning scales in hierarchies of fuzzy reinforcement-learning agents."""
+    """Parse the options that all commands share."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -191,12 +196,12 @@ def _run(arguments: list[str]) -> int:
         return shell_complete(nested_agents, {}, PROGRAM, COMPLETE, instruction)
     # Not `nested_agents.main`, which has its own answers to a closed pipe and to Ctrl-C.
     try:
-        with nested_agents.make_context(PROGRAM, arguments) as context:
+        with nested_agents.make_context(command_line(), arguments) as context:
             return int(nested_agents.invoke(context))
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
     except click.UsageError as error:
-        command = error.ctx.command_path if error.ctx else f"{PROGRAM} {arguments[0]}"
+        command = error.ctx.command_path if error.ctx else command_line(arguments[0])
         raise SpecError(f"{error.format_message().rstrip('.')}; see {command} --help") from None
     except SystemExit as error:
         if isinstance(error.__context__, BrokenPipeError):  # a table of rich ends the program so

@@ -198,6 +198,16 @@ phase = click.option(
 """Which episodes of a study count."""
 
 
+columns = click.option(
+    "--columns",
+    multiple=True,
+    metavar="ROLE=COLUMN",
+    help="Columns of a table of scores by role, with commas between: condition and score (each may "
+    "be several, as condition=model+topology), seed, item; by default those of these names.",
+)
+"""Roles of the columns of a table, see `nested_agents.studies.api.loading.load`."""
+
+
 def formats(*choices: str, text: str = "How to print it.") -> Decorator:
     """Return the option ``--format``, whose default is the first choice."""
     kind = click.Choice(choices)

@@ -1,19 +1,17 @@
-"""The cost of a topology, three times: by formula, counted in the running system, timed.
+"""Cost of a topology: by formula, counted in the running system, and timed.
 
-The formulas (Eq. 18-23) count operations of a sweep over all states; the running system visits one
-state a step. What they share is the number of joint actions that every agent tries,
-``|A| ** (1 + |below|)``, and the number of rules that value each: these are counted, and compared.
+The formulas (Eq. 18-23) count the operations of a sweep over all states, while the running system
+visits one state a step. They share two numbers, which are counted and compared: the joint actions
+that each agent tries, ``|A| ** (1 + |below|)``, and the rules that value each of them.
 
-In a coordination graph agents try joint actions of themselves and their neighbours, and decide by
-variable elimination, whose own operations are timed, but not counted.
+In a coordination graph an agent tries joint actions of itself and its neighbors, and the team
+decides by variable elimination, whose own operations are timed but not counted. Some ways to decide
+(`WAYS`) replace a topology: they try few of all joint actions.
 
-Some ways to decide stand in place of a topology, see `WAYS`: they try few of all joint actions.
-
-Counting and timing use the line-up scenario, whose prediction costs next to nothing, and sigmoid
-membership functions, with which every rule does fire.
+Counting and timing use the line-up scenario, because its prediction costs next to nothing, and
+sigmoid membership functions, because every rule of theirs fires.
 """
 
-import re
 import tracemalloc
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
@@ -39,12 +37,14 @@ from ...topologies import build, parse
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 
 SINGLE_AGENT = "single-agent"
-"""Stands in place of a topology for the one agent of Eq. 23."""
+"""Name that replaces a topology for the single agent of Eq. 23."""
 MEMBERSHIPS = 5
-PAPER = Problem(5**7, 4, 450)
+PAPER = Problem()
 """|S|, |A| and L of the paper's experiment."""
 RULES = MEMBERSHIPS**2
-"""|S| of an agent in what is counted and timed."""
+"""|S| of an agent that is counted and timed."""
+ACTIONS = 4
+"""|A| of an agent that is counted and timed."""
 LEARNER = TDLambdaSettings(
     rule_base=RuleBaseSettings(membership="sigmoid", memberships=MEMBERSHIPS, order=2),
     decision=DecisionSettings(rule="value", evaluator="exact"),
@@ -76,55 +76,61 @@ LEAST_SECONDS = 0.3
 """How long each repeat is timed at least [s]."""
 MOST_TIMES = 100
 """How often each repeat is timed at most."""
-LABELLED = re.compile(r"([\w -]+)=(.+)")
-"""A topology with a label of one's own."""
 
 
 @dataclass(frozen=True)
 class StepCost:
-    """What one step of the running system costs."""
+    """Cost of one step of the running system."""
 
     counted: Counts
-    """What was counted, for the whole team."""
+    """Counts of the whole team."""
     deciding: float
     """Median time of a decision [s]."""
     learning: float
     """Median time of learning from a step [s]."""
     memory: int
-    """Greatest memory held by team and step [bytes]."""
+    """Peak memory of team and step [bytes]."""
     repeats: tuple[float, ...]
-    """The time of a step in each repeat, each with a new team [s]."""
+    """Time of a step in each repeat, each with a new team [s]."""
 
     @property
     def step(self) -> Estimate:
-        """The mean time of a step over repeats with its 95% interval [s]; of one, no interval."""
+        """Mean time of a step over repeats with its 95% interval [s]; one repeat has none."""
         return bootstrap(self.repeats, bounds=NOT_NEGATIVE)
 
 
 @dataclass(frozen=True)
 class CostRow:
-    """The cost of one topology over n agents; Eq. 19 and 21 are of chains only."""
+    """Cost of one topology over n agents."""
 
     agents: int
     topology: str
-    """Its label, or how it is written in a spec."""
+    """Label of the topology, or its text in a spec."""
+    problem: Problem
+    """Rules, actions and iterations of the formulas."""
     nested_exact: int | None
+    """Eq. 18; none for the single agent."""
     nested_closed_form: int | None
+    """Eq. 19; none unless the topology is a chain."""
     nested_asymptotic: Fraction | None
+    """Eq. 21; none unless the topology is a chain."""
     single_agent: int
+    """Eq. 23."""
+    memberships: int | None = None
+    """Membership functions of each state variable, if they determine the rules."""
     formula: Counts | None = None
-    """What a step of the whole team comes to by the formulas, if it was to be measured."""
+    """Counts of a step of the whole team by the formulas, if a measurement was requested."""
     measured: StepCost | None = None
     network: tuple[int, int] | None = None
-    """If asked for, messages of a decision, and how many of them follow one another."""
+    """If requested, the messages of a decision, and how many of them follow one another."""
     broadcast: int = 0
-    """If these are, states that are sent to agents beside them."""
+    """States that agents send to others besides these messages."""
     free: int = 0
-    """Most agents for which one decides, itself included; of hierarchies alone, else 0."""
+    """Maximum number of agents over which one agent searches, itself included; 0 for `WAYS`."""
 
     @property
     def by_formula(self) -> dict[str, int | Fraction | None]:
-        """What the formulas give, by name."""
+        """Results of the formulas by name."""
         return {
             "nested_exact": self.nested_exact,
             "nested_closed_form": self.nested_closed_form,
@@ -135,7 +141,7 @@ class CostRow:
 
     @property
     def ratio(self) -> Fraction | None:
-        """How many times costlier the single agent is."""
+        """Cost of the single agent over that of the hierarchy."""
         return None if self.nested_exact is None else Fraction(self.single_agent, self.nested_exact)
 
 
@@ -203,8 +209,8 @@ def pairs(n: int) -> tuple[tuple[int, ...], ...]:
 def step_formula(text: str, n: int) -> Counts:
     """Return what a step of the running system comes to by the formulas, for the whole team."""
     if text == SINGLE_AGENT:
-        return Counts(PAPER.actions**n, (PAPER.actions * RULES) ** n, RULES**n)
-    joint = sum(joint_actions(text, n, PAPER.actions))
+        return Counts(ACTIONS**n, (ACTIONS * RULES) ** n, RULES**n)
+    joint = sum(joint_actions(text, n, ACTIONS))
     return Counts(joint, joint * RULES, n * RULES)
 
 
@@ -253,10 +259,13 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
         learner = LEARNER.model_copy(update={"rule_base": base})
         return learner, scenario, Hierarchy(scenario.agents, [])
     settings = parse(WAYS.get(text, (text,))[0])
+    hierarchy = build(settings, line_up.agents, pairs(n))
     usual = "variable-elimination" if settings.kind == "coordination-graph" else "exact"
-    decision = DecisionSettings(rule="value", evaluator=text if text in WAYS else usual)
-    learner = LEARNER.model_copy(update={"decision": decision})
-    return learner, line_up, build(settings, line_up.agents, pairs(n))
+    evaluator = text if text in WAYS else usual
+    if settings.kind == "coordination-graph" and not hierarchy.neighbours:
+        evaluator = "exact"  # a single agent has no neighbors
+    decision = DecisionSettings(rule="value", evaluator=evaluator)
+    return LEARNER.model_copy(update={"decision": decision}), line_up, hierarchy
 
 
 @cache

@@ -1,116 +1,164 @@
-"""The figure of cost: formula, counts and times against the number of agents, on log scales."""
+"""Figure of cost: formula, counts and times against the number of agents."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
+from itertools import pairwise
 from math import log10
 from pathlib import Path
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from ..presentation import figures
-from ..presentation.figures import add_legend, handle, look, marker
-from .cost import CostRow
+from .cost import ACTIONS, RULES, CostRow
 
-TITLES = ("operations, by formula", "rule evaluations a step", "time of a step [s]")
-"""Of the panels; the last two hold what was measured."""
+MAX_SERIES = 5
+"""Lines of a panel that can be told apart, the single agent included."""
+MAX_PANELS = 12
+SINGLE_AGENT = "single agent (Eq. 23)"
+LOOKS = [
+    {**figures.look(i), "marker": figures.marker(i), "markersize": size, "lw": 1.2}
+    for i, size in enumerate((8.0, 6.5, 5.0, 3.5))
+]
+"""Looks of hierarchies; hollow markers of decreasing size can be told apart in one place."""
+SINGLE_LOOK = {"color": "black", "ls": "--", "marker": "x", "markersize": 6.0, "lw": 1.2}
 Points = Sequence[tuple[int, float]]
 """Numbers of agents, each with the logarithm of a value."""
+Looks = Mapping[str, Mapping[str, Any]]
+"""Looks of lines by their labels."""
+
+
+def check(topologies: int, problems: int, path: Path) -> None:
+    """Refuse a figure that cannot be read, before anything is measured for it.
+
+    Parameters
+    ----------
+    topologies
+        Number of topologies, the single agent excluded.
+    problems
+        Number of pairs of rules and actions.
+    path
+        Path of the figure.
+
+    Raises
+    ------
+    ValueError
+        If the suffix of `path` is unknown, or there are too many series or panels; one line.
+    """
+    figures.check_suffix(path)
+    if topologies >= MAX_SERIES:
+        raise ValueError(
+            f"{path}: {topologies} topologies and the single agent, allowed in a figure: "
+            f"{MAX_SERIES} series; name fewer topologies"
+        )
+    if problems > MAX_PANELS:
+        raise ValueError(
+            f"{path}: {problems} pairs of rules and actions, allowed in a figure: {MAX_PANELS}, "
+            "one panel each"
+        )
 
 
 def draw(rows: Sequence[CostRow], path: Path) -> None:
     """Write the figure: SVG, PNG or PDF by the suffix of `path`.
 
-    The first panel holds the formulas, their logarithms on a logarithmic scale. If anything was
-    measured, the others hold rule evaluations per step (lines by formula, markers counted) and time
-    per step (markers timed, lines the formula's growth through the last of them). Values are drawn
-    by their logarithms, for no floating-point number holds those of many agents.
+    Each pair of rules and actions has a panel of the formulas. If anything was measured, two more
+    panels show rule evaluations per step (lines by formula, markers counted) and time per step
+    (markers timed, lines the formula's growth through the last of them). All values are drawn by
+    their logarithms, because those of many agents exceed every floating-point number.
 
     Raises
     ------
     ValueError
-        If the suffix is none of these.
+        See `check`.
     """
-    figures.check_suffix(path)
-    series = {
-        text: [row for row in rows if row.topology == text]
-        for text in dict.fromkeys(row.topology for row in rows)
-    }
-    measured = any(row.measured is not None for row in rows)
-    single = [(n, _log10(cost)) for n, cost in {r.agents: r.single_agent for r in rows}.items()]
+    problems = list(dict.fromkeys(row.problem for row in rows))
+    names = list(dict.fromkeys(row.topology for row in rows if row.nested_exact is not None))
+    check(len(names), len(problems), path)
+    looks: Looks = {**dict(zip(names, LOOKS, strict=False)), SINGLE_AGENT: SINGLE_LOOK}
+    is_measured = any(row.measured is not None for row in rows)
     with figures.apply_style():
-        columns = 3 if measured else 1
-        figure, (all_axes,) = figures.panels(1, columns, (3.2 * columns + 0.6, 4.2))
-        all_axes[0].plot(*zip(*single, strict=True), "--", color="black")
-        for index, own in enumerate(series.values()):
-            _draw_series(all_axes, own, index)
-        for axes, title in zip(all_axes, TITLES, strict=False):
-            axes.set_title(title, loc="left")
-            axes.set_xlabel("agents n")
-            axes.set_xscale("log", base=2)
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda n, _: f"{n:g}"))
-            if axes is all_axes[0]:
-                axes.set_yscale("log")  # the single agent's exponents have four digits
-            else:
-                axes.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=7))
-            axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"$10^{{{y:g}}}$"))
-            axes.grid(alpha=0.25)
-        add_legend(figure, _handles(list(series), measured), ncols=columns + (columns > 1))
-        figures.write(figure, path)
+        count = len(problems) + 2 * is_measured
+        columns = 2 if count == 4 else min(count, 3)
+        figure, panels = figures.grid(count, columns, (3.1, 2.7), (0.5, 0.9), least=4.4)
+        for axes, problem in zip(panels.flat, problems, strict=False):
+            _draw_formulas(axes, [row for row in rows if row.problem == problem], looks)
+        if is_measured:
+            first = [row for row in rows if row.problem == problems[0]]
+            _draw_measured(panels.flat[count - 2], panels.flat[count - 1], first, looks)
+        sizes = sorted({row.agents for row in rows})
+        for axes in panels.flat[:count]:
+            _scale(axes, sizes)
+        handles = [_handle(name, look) for name, look in looks.items()]
+        if is_measured:
+            handles.append(figures.handle("lines: formula", color="grey"))
+            handles.append(figures.handle("markers: measured", ls="", marker="o", color="grey"))
+        figures.add_legend(figure, handles, ncols=1 + columns)
+        figures.write(figures.spell_dollars(figure, names), path)
 
 
-def _draw_series(all_axes: Sequence[Axes], rows: Sequence[CostRow], index: int) -> None:
-    exact = [(r.agents, _log10(r.nested_exact)) for r in rows if r.nested_exact is not None]
-    if exact:
-        _draw_line(all_axes[0], exact, exact[-1:], index)
-    costs = [(row.agents, row.measured) for row in rows if row.measured is not None]
-    if not costs:
-        return
-    by_formula = {row.agents: row.formula.rule_evaluations for row in rows if row.formula}
-    formula = [(n, _log10(by_formula[n])) for n, _ in costs]
-    counted = [(n, _log10(m.counted.rule_evaluations)) for n, m in costs]
-    timed = [(n, log10(m.deciding + m.learning)) for n, m in costs]
-    grown = [(n, value - formula[-1][1] + timed[-1][1]) for n, value in formula]
-    _draw_line(all_axes[1], formula, counted, index)
-    _draw_line(all_axes[2], grown, timed, index)
+def _draw_formulas(axes: Axes, rows: Sequence[CostRow], looks: Looks) -> None:
+    """Draw the operations of each hierarchy and of the single agent."""
+    problem = rows[0].problem
+    axes.set_title(f"by formula, |S| = {problem.rules:,}, |A| = {problem.actions:,}", loc="left")
+    axes.set_ylabel("log10(operations)")
+    for name, look in looks.items():
+        values: dict[int, int | None]
+        if name == SINGLE_AGENT:
+            values = {row.agents: row.single_agent for row in rows}
+        else:
+            values = {r.agents: r.nested_exact for r in rows if r.topology == name}
+        line = [(n, _log10(value)) for n, value in sorted(values.items()) if value is not None]
+        _draw_line(axes, line, line[-1:], look)
 
 
-def _draw_line(axes: Axes, line: Points, marked: Points, index: int) -> None:
-    colour = look(index)["color"]
-    size = _marker_size(index)
-    axes.plot(*zip(*line, strict=True), **look(index), lw=1.2)
-    axes.plot(
-        *zip(*marked, strict=True),
-        marker(index),
-        color=colour,
-        markerfacecolor="none",
-        markersize=size,
-    )
+def _draw_measured(counts: Axes, times: Axes, rows: Sequence[CostRow], looks: Looks) -> None:
+    """Draw counts and times of a step."""
+    counts.set_title(f"line-up scenario, |S| = {RULES}, |A| = {ACTIONS}", loc="left")
+    counts.set_ylabel("log10(rule evaluations per step)")
+    times.set_title("the same, timed", loc="left")
+    times.set_ylabel("log10(seconds per step)")
+    for name, look in looks.items():
+        own = [r for r in rows if (r.topology if r.nested_exact else SINGLE_AGENT) == name]
+        known = [(r.agents, r.measured, r.formula) for r in own if r.measured and r.formula]
+        if not known:
+            continue
+        formula = [(n, _log10(by_formula.rule_evaluations)) for n, _, by_formula in known]
+        counted = [(n, _log10(cost.counted.rule_evaluations)) for n, cost, _ in known]
+        timed = [(n, log10(cost.deciding + cost.learning)) for n, cost, _ in known]
+        shift = timed[-1][1] - formula[-1][1]
+        _draw_line(counts, formula, counted, look)
+        _draw_line(times, [(n, value + shift) for n, value in formula], timed, look)
 
 
-def _handles(topologies: Sequence[str], measured: bool) -> list[Line2D]:
-    handles = [
-        handle(
-            text,
-            marker=marker(i),
-            **look(i),
-            markerfacecolor="none",
-            markersize=_marker_size(i),
-        )
-        for i, text in enumerate(topologies)
-    ]
-    handles.append(handle("single agent (Eq. 23)", ls="--", color="black"))
-    if measured:
-        handles.append(handle("lines: formula", color="grey"))
-        handles.append(handle("markers: measured", ls="", marker="o", color="grey"))
-    return handles
+def _draw_line(axes: Axes, line: Points, marked: Points, look: Mapping[str, Any]) -> None:
+    axes.plot(*zip(*line, strict=True), **{**look, "marker": ""})
+    axes.plot(*zip(*marked, strict=True), **{**look, "ls": ""}, markerfacecolor="none")
 
 
-def _marker_size(index: int) -> float:
-    """Return ever smaller sizes, so that hollow markers in one place can be distinguished."""
-    return max(9.0 - 1.2 * index, 3.5)
+def _scale(axes: Axes, sizes: Sequence[int]) -> None:
+    """Scale the axes: numbers of agents that are not equally spaced are logarithmic."""
+    axes.set_xlabel("number of agents n")
+    if len({after - before for before, after in pairwise(sizes)}) > 1:
+        axes.set_xscale("log", base=2)
+        axes.xaxis.set_major_locator(LogLocator(base=2))
+    else:
+        axes.xaxis.set_major_locator(_integers())
+    axes.yaxis.set_major_locator(_integers())
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_minor_locator(NullLocator())
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    axes.grid(alpha=0.25)
+
+
+def _integers() -> MaxNLocator:
+    return MaxNLocator(integer=True, nbins=8, steps=[1, 2, 5, 10], min_n_ticks=1)
+
+
+def _handle(name: str, look: Mapping[str, Any]) -> Line2D:
+    return figures.handle(name, **look, markerfacecolor="none")
 
 
 def _log10(value: int | Fraction) -> float:

@@ -176,12 +176,17 @@ def _profile(names: tuple[str, str], own: Arrangement, steps: int, wanted: float
     return Profile(
         *names,
         agents=len(team.hierarchy),
-        evaluator=" ".join(dict.fromkeys(map(_evaluator, team.parts))),
+        evaluator=search_method(team),
         decisions=decisions,
         tried=(team.counts.joint_actions - before) / decisions,
         formula=team.hierarchy.joint_actions(len(team.action_set)),
         seconds=each,
     )
+
+
+def search_method(team: Team) -> str:
+    """Return the evaluators of a team, or the kinds of learners that have none."""
+    return " ".join(dict.fromkeys(map(_evaluator, team.parts)))
 
 
 def _evaluator(part: object) -> str:

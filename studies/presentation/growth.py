@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import SpecError
-from ..results.laws import LOGIT, Law
+from ..results.laws import Law
 from ..results.results import Results
+from ..results.samples import LOGIT
 from ..results.scaling_law import ScalingLaw, scaling_law
 from . import figures
 
@@ -60,7 +61,7 @@ def draw_laws(analysis: ScalingLaw) -> Figure:
 def _draw(figure: Figure, index: int, law: Law, last: float) -> None:
     (axes,) = figure.axes
     colour = figures.look(index)["color"]
-    measured = law.sample.scale.back(law.sample.values)
+    measured = law.sample.observed
     places = np.broadcast_to(law.sample.sizes, measured.shape)
     axes.scatter(places, measured, s=6, alpha=0.35, color=colour, linewidths=0)
     line = np.geomspace(law.sample.sizes[0], last, POINTS)

@@ -19,7 +19,7 @@ from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Analysis, identity_lines
-from ..results.contrasts import contrasts
+from ..results.contrasts import contrasts, missing_reference
 from ..results.notation import format_estimate, whole
 from ..results.results import read
 from ..results.statistics import LEVEL
@@ -67,6 +67,7 @@ def page(directory: Path) -> str:
         notes = contrasts(
             results, results.main.name
         ).notes  # what `compare` says of it, this included
+    notes = (*missing_reference(results), *notes)
     there = {label: own for label, own in settings.items() if label in results.conditions}
     table = tabulate(analysis.table)
     rate = rate_of(table)

@@ -165,6 +165,21 @@ def contrasts(
     return Contrasts(shown_as, phase, tuple(compared_groups), results.identical)
 
 
+def missing_reference(results: Results) -> list[str]:
+    """Return lines that say so if no trial of the first condition has finished.
+
+    Another condition is the reference then.
+    """
+    present = [condition for condition in results.columns if condition in results.conditions]
+    first = next(iter(results.columns), None)
+    if len(present) < 2 or first is None or present[0] == first:
+        return []
+    return wrapped(
+        f"No trial of {first}, the first condition, has finished: {present[0]} is the reference "
+        "of all comparisons instead."
+    )
+
+
 def power_with_first(results: Results) -> tuple[str, ...]:
     """Return what comparisons with the first condition by `Results.main` can find, in lines.
 

@@ -44,6 +44,12 @@ class Mixture(NamedTuple):
             return low
         return float(optimize.brentq(lambda t: self._below(t) - p, low - EXACT, high + EXACT))
 
+    def sample(self, rng: np.random.Generator, count: int) -> Array:
+        """Return draws ``(count,)``."""
+        part = rng.choice(len(self.weights), size=count, p=self.weights)
+        deviations = rng.standard_t(self.freedoms[part])
+        return self.means[part] + np.sqrt(self.variances[part]) * deviations
+
     def _below(self, t: float) -> float:
         z = (t - self.means) / np.sqrt(self.variances)
         return float(self.weights @ special.stdtr(self.freedoms, z))
@@ -67,7 +73,7 @@ class Drift(NamedTuple):
     """Of what it is left by, beyond what the law's own parameters vary by ``(s,)``."""
 
 
-def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: float) -> Drift:
+def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: Array) -> Drift:
     """Return how far a law that was fitted at ``x`` may be left at `at`.
 
     Parameters
@@ -81,7 +87,7 @@ def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: 
     slopes, slope
         Derivatives of the law by its parameters ``(m, k)``, and at `at` ``(k,)``.
     noise
-        The variance of a mean.
+        Variances of the means ``(m,)``.
     """
     u, s, vt = np.linalg.svd(slopes, full_matrices=False)
     rank = int((s > 1e-9 * s[0]).sum())
@@ -91,9 +97,7 @@ def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: 
     walk = _integrated_wiener(places)
     scales = SIGMAS**2
     # Below, the first axis is that of SIGMAS.
-    inverse = np.linalg.inv(
-        scales[:, None, None] * walk[:-1, :-1] + (noise + EXACT) * np.eye(len(x))
-    )
+    inverse = np.linalg.inv(scales[:, None, None] * walk[:-1, :-1] + np.diag(noise + EXACT))
     information = terms.T @ inverse @ terms
     own = np.linalg.solve(information, (terms.T @ (inverse @ left)[..., None]))[..., 0]
     rest = left - own @ terms.T

@@ -1,228 +1,60 @@
-"""Laws of growth: how a number depends on size, with intervals, and what it will be elsewhere.
+"""Laws of growth: a measure as a function of size, with intervals and predictions.
 
-Values are fitted on a scale on which noise is about equal: logarithms of positive numbers, and the
-empirical logits of rates. There a law is a curve in ``x = log n``:
+A law describes the mean over seeds, on a scale on which it is a simple curve in ``x = log n``: the
+logarithm of a positive mean, or the log odds of a rate.
 
-- ``power law``, of rates ``logistic in log n``: ``a + b x``; numbers, and odds, grow as ``n^b``;
-- ``linear to quadratic``: ``log(a n (n + c))``, with c greater than -2, as pairs are for c = -1;
+- ``power law``, for rates ``logistic in log n``: ``a + b x``; means, or odds, grow as ``n^b``;
+- ``linear to quadratic``: ``log(a n (n + c))``, c above -1, as pairs of agents grow at c = -1;
 - ``power law with a floor``: ``log(exp(c) + exp(a + b x))``;
 - ``break point``: ``a + b x + d max(0, x - k)``; the exponent is b, beyond ``n = exp(k)`` b + d.
 
-Seeds are the unit of sampling, and all sizes of a seed are resampled together. Which law holds is
-decided by sizes that are left out: each of the largest third is predicted from those below it. A
-simpler law stands unless another one predicts them better by more than `MARGIN`.
+Seeds are the unit of sampling, and all sizes of a seed are resampled together. The values of seeds
+are linearized at their mean (delta method), so that the mean of the linearized values is exactly
+the mean of the table on the scale. Which law holds is decided by sizes that are left out: each of
+the largest third is predicted from those below it. A simpler law stands unless another one predicts
+them better by more than `MARGIN`.
 
-A prediction of the mean of new seeds has the variance of the fit, of so many seeds, and of a law
-that does not go on as it did, see `drift`. Degrees of freedom of the first two are Satterthwaite's
-(1946). Values that a run did not live to see (*censored*) are only known to be larger than the last
-seen, and enter the likelihood so (Tobin 1958).
+The interval of a prediction, the mean of new seeds, has the variance of the fit, of that number of
+seeds, and of an exponent that drifts beyond the measured sizes, see `drift`. Degrees of freedom of
+the first two are Satterthwaite's (1946). Rates of new seeds are drawn from binomial distributions.
+Values that a run did not reach (*censored*) are only known to be larger than the last one seen, and
+enter the likelihood so (Tobin 1958); laws of them describe geometric means.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core.numerics import BoolArray, optimize, special
+from .curves import POWER, Curve
 from .drift import Drift, Mixture, drift
+from .samples import LOGIT, Sample, check_sizes
 from .statistics import Array, Estimate
 
 RESAMPLES = 400
-"""Resamples of seeds: of a standard error they leave 4%."""
+"""Resamples of seeds, which estimate a standard error to 4%."""
 FEW_RESAMPLES = 50
-"""Of fits that only score a law."""
+"""Resamples for fits that only score a law."""
 MARGIN = 1.0
-"""By how much the log density of held-out sizes must be greater for a law of more parameters."""
+"""Difference of the log densities of held-out sizes that a law of more parameters needs."""
 FEWEST = 3
-"""Sizes, below which no law is told from another."""
-LEAST = 2.0
-"""The smallest size of a law that is linear to quadratic, as pairs of agents are: n (n - 1)."""
+"""Minimum number of sizes of a law."""
 FLAT = 1e-9
-"""Where so little is left of the variance of seeds, it is taken for rounding."""
+"""Variance of seeds that counts as rounding."""
 MOST_FREEDOM = 1e6
-"""Degrees of freedom of what is as good as normal."""
-
-
-class Curve(NamedTuple):
-    """A family of curves in the logarithm of size."""
-
-    name: str
-    n_parameters: int
-    of: Callable[[Array, Array], Array]
-    """Its values for parameters ``(k,)`` at ``x`` ``(m,)``."""
-    slopes: Callable[[Array, Array], Array]
-    """Its derivatives by the parameters ``(m, k)`` there."""
-    begins: Callable[[Array, Array], list[Array]]
-    """Where a fit to values ``(m,)`` at ``x`` may begin."""
-    exponents: Callable[[Array], dict[str, float]]
-    """What parameters ``(k,)`` mean, by name."""
-
-
-def _line(p: Array, x: Array) -> Array:
-    return p[0] + p[1] * x
-
-
-def _line_slopes(p: Array, x: Array) -> Array:
-    return np.stack([np.ones_like(x), x], axis=1)
-
-
-def _line_begins(x: Array, y: Array) -> list[Array]:
-    b, a = np.polyfit(x, y, 1).tolist()
-    return [np.array([a, b])]
-
-
-def _quadratic(p: Array, x: Array) -> Array:
-    return p[0] + x + np.log(np.exp(x) + np.exp(p[1]) - LEAST)
-
-
-def _quadratic_slopes(p: Array, x: Array) -> Array:
-    own = np.exp(p[1])
-    return np.stack([np.ones_like(x), own / (np.exp(x) + own - LEAST)], axis=1)
-
-
-def _with_floor(p: Array, x: Array) -> Array:
-    return np.logaddexp(p[2], p[0] + p[1] * x)
-
-
-def _floor_slopes(p: Array, x: Array) -> Array:
-    share = special.expit(p[0] + p[1] * x - p[2])
-    return np.stack([share, share * x, 1.0 - share], axis=1)
-
-
-def _floor_begins(x: Array, y: Array) -> list[Array]:
-    a, b = _line_begins(x, y)[0]
-    steep = np.array([y[-1] - 2.0 * b * x[-1], 2.0 * b, y.min() - 0.1])
-    return [np.array([a, b, y.min() - 3.0]), steep]
-
-
-def _broken(p: Array, x: Array) -> Array:
-    return p[0] + p[1] * x + p[2] * np.maximum(0.0, x - p[3])
-
-
-def _broken_slopes(p: Array, x: Array) -> Array:
-    beyond = np.maximum(0.0, x - p[3])
-    return np.stack([np.ones_like(x), x, beyond, -p[2] * (x > p[3])], axis=1)
-
-
-def _broken_begins(x: Array, y: Array) -> list[Array]:
-    begins = []
-    for k in x[1:-1]:
-        terms = np.stack([np.ones_like(x), x, np.maximum(0.0, x - k)], axis=1)
-        begins.append(np.append(np.linalg.lstsq(terms, y, rcond=None)[0], k))
-    return begins
-
-
-POWER = Curve(
-    "power law", 2, _line, _line_slopes, _line_begins, lambda p: {"exponent": float(p[1])}
-)
-LOGISTIC = POWER._replace(name="logistic in log n")
-QUADRATIC = Curve(
-    "linear to quadratic",
-    2,
-    _quadratic,
-    _quadratic_slopes,
-    lambda x, y: [np.array([float((y - 2.0 * x).mean()), start]) for start in (0.0, 3.0)],
-    lambda p: {"c of n (n + c)": float(np.exp(p[1]) - LEAST)},
-)
-FLOOR = Curve(
-    "power law with a floor",
-    3,
-    _with_floor,
-    _floor_slopes,
-    _floor_begins,
-    lambda p: {"exponent": float(p[1]), "floor": float(np.exp(p[2]))},
-)
-BREAK = Curve(
-    "break point",
-    4,
-    _broken,
-    _broken_slopes,
-    _broken_begins,
-    lambda p: {
-        "exponent below": float(p[1]),
-        "exponent above": float(p[1] + p[2]),
-        "break": float(np.exp(p[3])),
-    },
-)
-
-
-class Scale(NamedTuple):
-    """On which values are fitted."""
-
-    curves: tuple[Curve, ...]
-    """The laws there are, simple ones first."""
-    back: Callable[[Array], Array]
-    """Returns values of fitted ones."""
-
-    def interval(self, known: Mixture, level: float = 0.9) -> Estimate:
-        """Return the median of a distribution of fitted values, and an interval around it."""
-        shares = (0.5, 0.5 - level / 2.0, 0.5 + level / 2.0)
-        return Estimate(*(np.asarray(self.back(np.asarray(known.quantile(p)))) for p in shares))
-
-
-LOG = Scale((POWER, QUADRATIC, FLOOR, BREAK), np.exp)
-LOGIT = Scale((LOGISTIC, BREAK), special.expit)
-DIFFERENCE = Scale((LOGISTIC, BREAK), np.array)
-
-
-class Sample(NamedTuple):
-    """What was measured at several sizes with the same seeds."""
-
-    sizes: Array
-    """``(m,)`` in ascending order."""
-    values: Array
-    """``(n_seeds, m)`` on the scale."""
-    censored: BoolArray
-    """``(n_seeds, m)`` whether a value is only known to be larger."""
-    scale: Scale
-
-    def first(self, m: int) -> Sample:
-        """Return the sample of the m smallest sizes."""
-        return Sample(self.sizes[:m], self.values[:, :m], self.censored[:, :m], self.scale)
-
-
-def of_numbers(sizes: Array, values: Array, censored: BoolArray | None = None) -> Sample:
-    """Return a sample of positive numbers ``(n_seeds, m)``.
-
-    Raises
-    ------
-    ValueError
-        If a number is not positive, or all are censored.
-    """
-    if not (values > 0.0).all():
-        raise ValueError("a power law is of positive numbers")
-    unseen = np.zeros(values.shape, dtype=bool) if censored is None else censored
-    if unseen.all():
-        least = values.min()
-        raise ValueError(
-            f"no run reached the criterion: all are censored, at {least:g} decisions or more"
-        )
-    return Sample(sizes, np.log(values), unseen, LOG)
-
-
-def of_rates(sizes: Array, successes: Array, episodes: int) -> Sample:
-    """Return a sample of rates: how many of so many of a run succeeded ``(n_seeds, m)``."""
-    logits = np.log((successes + 0.5) / (episodes - successes + 0.5))
-    return Sample(sizes, logits, np.zeros(logits.shape, dtype=bool), LOGIT)
-
-
-def apart(own: Sample, base: Sample) -> Sample:
-    """Return by how much values lie above those of the same seeds at the same sizes, on the scale.
-
-    What lets both grow alike is not in it, so that its law is left by less than theirs. Its values
-    may be negative, and have the laws of logits.
-    """
-    both, first, second = np.intersect1d(own.sizes, base.sizes, return_indices=True)
-    values = own.values[:, first] - base.values[:, second]
-    censored = own.censored[:, first] | base.censored[:, second]
-    return Sample(both, values, censored, DIFFERENCE)
+"""Degrees of freedom of an almost normal distribution."""
+MAX_LOG_DEVIATION = 30.0
+"""Bound of the logarithm of a standard deviation in a search."""
+DRAWS = 4000
+"""Draws of the rate of new seeds."""
 
 
 class Law(NamedTuple):
-    """A law that has been fitted."""
+    """A fitted law."""
 
     curve: Curve
     sample: Sample
@@ -231,21 +63,26 @@ class Law(NamedTuple):
     resampled: Array
     """``(RESAMPLES, k)`` parameters of resampled seeds."""
     noise: float
-    """Variance of seeds at a size, on the scale."""
+    """Variance of a seed of weight 1 at a size, on the scale."""
     left: Array
-    """What means of seeds deviate by from the law ``(m,)``, on the scale."""
+    """Deviations of the means of seeds from the law ``(m,)``, on the scale."""
     scatter: float
-    """Variance of a seed at a size, beyond what it has at all."""
+    """Variance of a seed of weight 1 at a size around its own mean."""
     held_out: tuple[tuple[float, float, Estimate], ...] = ()
-    """Of each size that was left out: size, what was measured, its 90% prediction."""
+    """For each size that was left out: size, measured mean, its 90% prediction."""
 
     @property
     def seeds(self) -> int:
-        """How many."""
+        """Number of seeds."""
         return len(self.sample.values)
 
+    @property
+    def formula(self) -> str:
+        """The law as an equation in n."""
+        return f"{self.sample.scale.quantity} = {self.curve.formula(self.parameters)}"
+
     def exponents(self, level: float = 0.95) -> dict[str, Estimate]:
-        """Return what the parameters mean, with intervals: Student's of the resampled ones."""
+        """Return the meaning of the parameters, with Student intervals of resampled seeds."""
         values = self.curve.exponents(self.parameters)
         each = [self.curve.exponents(p) for p in self.resampled]
         reach = float(special.stdtrit(self.seeds - 1, 0.5 + level / 2.0))
@@ -256,39 +93,63 @@ class Law(NamedTuple):
         return estimates
 
     def _spread(self, resampled: Array) -> float:
-        """Return a standard error: variances of few resampled seeds fall short."""
+        """Return a standard error; resampling few seeds underestimates it by a known factor."""
         return float(resampled.std(axis=0, ddof=1)) * math.sqrt(self.seeds / (self.seeds - 1))
 
     def predict(self, size: float, level: float = 0.9, seeds: int | None = None) -> Estimate:
-        """Return the mean of so many new seeds at a size, by default as many as were fitted.
+        """Return the law at a size, with an interval of the mean of so many new seeds there.
 
-        Of numbers it is the geometric mean.
+        By default they are as many as were fitted. The interval follows the drift of the largest
+        sizes; it contains the law and lies within the sample's bounds.
         """
-        return self.sample.scale.interval(self.distribution(size, seeds), level)
+        check_sizes(np.array(size))
+        shares = 0.5 - level / 2.0, 0.5 + level / 2.0
+        if self.sample.scale is LOGIT:
+            rates = self._new_rates(size, seeds or self.seeds)
+            low, high = np.quantile(rates, shares, method="inverted_cdf").tolist()
+        else:
+            known = self.distribution(size, seeds)
+            low, high = self.sample.scale.back(np.array([known.quantile(p) for p in shares]))
+        value = float(self.curve_at(np.array([size]))[0])
+        ends = min(value, float(low)), max(value, float(high))
+        return Estimate(*(np.asarray(np.clip(end, *self.sample.bounds)) for end in (value, *ends)))
 
     def distribution(self, size: float, seeds: int | None = None) -> Mixture:
-        """Return the distribution of a prediction, on the scale."""
+        """Return the distribution of the mean of new seeds on the scale, the drift included."""
+        return self._distribution(size, self.noise / (seeds or self.seeds))
+
+    def _distribution(self, size: float, noise: float) -> Mixture:
+        """Return the distribution of the law and of a mean whose weight of 1 has this variance."""
         x = np.log([size])
-        m = len(self.sample.sizes)
+        value = self.curve.of(self.parameters, x)
         parts = [
             (self._spread(self._resampled_at(x)) ** 2, self.seeds - 1.0),
-            (self.noise / (seeds or self.seeds), (self.seeds - 1.0) * m),
+            (noise / float(self.sample.scale.weight(value)[0]), self._freedom),
         ]
         left = self._drift(x)
-        value = float(self.curve.of(self.parameters, x)[0])
-        return _mixed(left.weights, value + left.shifts, left.variances, parts)
+        return _mixed(left.weights, float(value[0]) + left.shifts, left.variances, parts)
+
+    @property
+    def _freedom(self) -> float:
+        return (self.seeds - 1.0) * len(self.sample.sizes)
+
+    def _new_rates(self, size: float, seeds: int) -> Array:
+        """Return draws of the mean rate of new seeds: binomial, with their effective number."""
+        rng = np.random.default_rng(0)
+        rates = special.expit(self._distribution(size, 0.0).sample(rng, DRAWS))
+        count = max(1, round(4.0 * seeds / self.noise))
+        return rng.binomial(count, rates) / count
 
     def _resampled_at(self, x: Array) -> Array:
         """Return the laws of resampled seeds ``(RESAMPLES,)`` at ``x`` ``(1,)``."""
         return np.array([self.curve.of(p, x)[0] for p in self.resampled])
 
     def _drift(self, x: Array) -> Drift:
-        """Return how far the law may be left at ``x`` ``(1,)``."""
+        """Return the possible deviations from the law at ``x`` ``(1,)``."""
         fitted = np.log(self.sample.sizes)
         slopes = self.curve.slopes(self.parameters, np.append(fitted, x))
-        return drift(
-            fitted, float(x[0]), self.left, slopes[:-1], slopes[-1], self.scatter / self.seeds
-        )
+        noise = self.scatter / self.seeds / self.sample.weights
+        return drift(fitted, float(x[0]), self.left, slopes[:-1], slopes[-1], noise)
 
     def curve_at(self, sizes: Array) -> Array:
         """Return the law's values ``(k,)`` at sizes."""
@@ -298,66 +159,76 @@ class Law(NamedTuple):
 def _mixed(
     weights: Array, means: Array, variances: Array, parts: Sequence[tuple[float, float]]
 ) -> Mixture:
-    """Return a mixture of what varies in itself and by `parts`, each a variance and its freedom.
+    """Return a mixture of distributions; each of `parts` is a further variance and its freedom.
 
     Degrees of freedom of sums are Satterthwaite's (1946).
     """
     total = variances + sum(part for part, _ in parts) + FLAT**2
     lack = sum(part**2 / freedom for part, freedom in parts)
-    return Mixture(weights, means, total, np.minimum(total**2 / (lack + FLAT**6), MOST_FREEDOM))
+    freedoms = np.minimum(total**2 / (lack + FLAT**6), MOST_FREEDOM)
+    return Mixture(weights, means, total, freedoms)
 
 
 def fit(curve: Curve, sample: Sample, resamples: int = RESAMPLES) -> Law:
-    """Fit a curve by least squares, or where values are censored by maximum likelihood."""
+    """Fit a curve by weighted least squares, or to censored values by maximum likelihood."""
     x = np.log(sample.sizes)
     values = sample.values
     n_seeds, m = values.shape
-    parameters = _fitted(curve, x, values, sample.censored, curve.begins(x, values.mean(axis=0)))
+    begins = curve.begins(x, values.mean(axis=0))
+    parameters = _fitted(curve, sample, values, sample.censored, begins)
     drawn = np.random.default_rng(0).integers(n_seeds, size=(resamples, n_seeds))
-    if curve.of is _line and not sample.censored.any():  # all at once
-        resampled = np.polynomial.polynomial.polyfit(x, values[drawn].mean(axis=1).T, 1).T
+    if curve.of is POWER.of and not sample.censored.any():  # all at once
+        means = values[drawn].mean(axis=1).T
+        resampled = np.polynomial.polynomial.polyfit(x, means, 1, w=np.sqrt(sample.weights)).T
     else:
         each = [(values[r], sample.censored[r]) for r in drawn]
-        resampled = np.array([_fitted(curve, x, *own, [parameters]) for own in each])
-    at = curve.of(parameters, x)
-    left = values - at
+        resampled = np.array([_fitted(curve, sample, *own, [parameters]) for own in each])
+    left = values - curve.of(parameters, x)
     seen = ~sample.censored
     if seen.all():
-        noise = float(values.var(axis=0, ddof=1).mean())
-        own = left - left.mean(axis=1, keepdims=True)
-        scatter = min(noise, float(own.var(axis=0, ddof=1).mean()) * m / (m - 1.0))
+        noise = max(_variance(values, sample.weights), sample.min_noise)
+        own = left - np.average(left, axis=1, weights=sample.weights)[:, None]
+        scatter = min(noise, _variance(own, sample.weights) * m / (m - 1.0))
+        scatter = max(scatter, sample.min_noise)
     else:
         noise = float((left[seen] ** 2).mean())
         scatter = noise
         deviation = math.sqrt(noise)
-        z = left[~seen] / deviation  # means of what lies beyond, as the law has it
+        z = left[~seen] / deviation  # mean of a normal distribution beyond the censored value
         hazard = np.exp(-0.5 * z**2 - 0.5 * math.log(2.0 * math.pi) - special.log_ndtr(-z))
         left[~seen] = deviation * hazard
     return Law(curve, sample, parameters, resampled, noise, left.mean(axis=0), scatter)
 
 
+def _variance(values: Array, weights: Array) -> float:
+    """Return the variance of a seed of weight 1, pooled over sizes."""
+    return float(np.average(weights * values.var(axis=0, ddof=1), weights=weights))
+
+
 def _fitted(
-    curve: Curve, x: Array, values: Array, censored: BoolArray, begins: Sequence[Array]
+    curve: Curve, sample: Sample, values: Array, censored: BoolArray, begins: Sequence[Array]
 ) -> Array:
-    """Return the parameters ``(k,)`` of values ``(n_seeds, m)``; a search begins at `begins`."""
+    """Return the parameters ``(k,)`` for values ``(n_seeds, m)``; searches start at `begins`."""
+    x = np.log(sample.sizes)
     means = values.mean(axis=0)
+    roots = np.sqrt(sample.weights)
     if not censored.any():
-        if curve.of is _line:
-            return _line_begins(x, means)[0]
+        if curve.of is POWER.of:
+            return np.asarray(np.polynomial.polynomial.polyfit(x, means, 1, w=roots))
 
         def off(p: Array) -> Array:
-            return curve.of(p, x) - means
+            return roots * (curve.of(p, x) - means)
 
         def slopes(p: Array) -> Array:
-            return curve.slopes(p, x)
+            return roots[:, None] * curve.slopes(p, x)
 
         fits = [optimize.least_squares(off, own, slopes) for own in begins]
         return np.asarray(min(fits, key=lambda one: one.cost).x)
 
     def lack(p: Array) -> float:
-        deviation = math.exp(p[-1])
-        z = (values - curve.of(p[:-1], x)) / deviation
-        seen = -0.5 * z[~censored] ** 2 - p[-1]
+        log_deviation = float(np.clip(p[-1], -MAX_LOG_DEVIATION, MAX_LOG_DEVIATION))
+        z = (values - curve.of(p[:-1], x)) * math.exp(-log_deviation)
+        seen = -0.5 * z[~censored] ** 2 - log_deviation
         return -float(seen.sum() + special.log_ndtr(-z[censored]).sum())
 
     spread = math.log(max(values.std(), 1e-3))
@@ -365,20 +236,13 @@ def _fitted(
     return np.asarray(min(fits, key=lambda one: one.fun).x[:-1])
 
 
-def choose(sample: Sample, *, curves: Sequence[Curve] = ()) -> Law:
-    """Return the law that predicts best the sizes that are left out.
-
-    Parameters
-    ----------
-    sample
-        Of `FEWEST` sizes at least, and two seeds.
-    curves
-        Which laws are compared; by default those of the scale.
+def choose(sample: Sample) -> Law:
+    """Return the law of the scale that best predicts the sizes that are left out.
 
     Raises
     ------
     ValueError
-        If there are fewer sizes or seeds; one line.
+        If there are fewer than `FEWEST` sizes, or fewer than two seeds; one line.
     """
     n_seeds, m = sample.values.shape
     if m < FEWEST or n_seeds < 2:
@@ -386,7 +250,7 @@ def choose(sample: Sample, *, curves: Sequence[Curve] = ()) -> Law:
             f"{m} size{'s' * (m != 1)} and {n_seeds} seed{'s' * (n_seeds != 1)}: a law takes "
             f"{FEWEST} sizes and 2 seeds or more"
         )
-    laws = [c for c in curves or sample.scale.curves if c.n_parameters < m]
+    laws = [c for c in sample.scale.curves if c.n_parameters < m]
     chosen = laws[0]
     checks = _held_out(chosen, sample)
     score = sum(density for density, _ in checks)
@@ -399,7 +263,7 @@ def choose(sample: Sample, *, curves: Sequence[Curve] = ()) -> Law:
 
 
 def _held_out(curve: Curve, sample: Sample) -> list[tuple[float, tuple[float, float, Estimate]]]:
-    """Return of each of the largest third of sizes its log density, and how it was predicted.
+    """Return for each of the largest third of sizes its log density, and its prediction.
 
     It is predicted from the sizes below it. Sizes with censored values, or with too few below them,
     are passed over.
@@ -411,19 +275,17 @@ def _held_out(curve: Curve, sample: Sample) -> list[tuple[float, tuple[float, fl
             continue
         law = fit(curve, sample.first(k), FEW_RESAMPLES)
         size = float(sample.sizes[k])
-        mean = float(sample.values[:, k].mean())
-        known = law.distribution(size)
-        measured = float(sample.scale.back(np.asarray(mean)))
-        checks.append((known.log_density(mean), (size, measured, sample.scale.interval(known))))
+        density = law.distribution(size).log_density(float(sample.values[:, k].mean()))
+        checks.append((density, (size, float(sample.means[k]), law.predict(size))))
     return checks
 
 
 class Contrast(NamedTuple):
-    """The exponent of a law less that of another one."""
+    """Difference of the exponents of two laws."""
 
     difference: Estimate
     p: float
-    """That there is none, Student's over seeds."""
+    """P-value of no difference, Student's over seeds."""
     deviation: float
     """Standard deviation of the differences of single seeds."""
 
@@ -431,7 +293,10 @@ class Contrast(NamedTuple):
 def compare(law: Law, base: Law) -> Contrast:
     """Return the difference of the exponents of two power laws of the same seeds and sizes."""
     slopes = [
-        np.polyfit(np.log(own.sample.sizes), own.sample.values.T, 1)[0] for own in (law, base)
+        np.polyfit(np.log(own.sample.sizes), own.sample.values.T, 1, w=np.sqrt(own.sample.weights))[
+            0
+        ]
+        for own in (law, base)
     ]
     each = slopes[0] - slopes[1]
     seeds = len(each)

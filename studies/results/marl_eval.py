@@ -216,7 +216,7 @@ def results_of(
     notes = [f"keys that are no steps are ignored: {', '.join(ignored)}"] if ignored else []
     empty = sum(not (run.series or run.absolute) for run in runs)
     notes += [f"{empty} of {len(runs)} runs have measured nothing: left out"] if empty else []
-    phases, chosen = _phases(frame, metrics, runs)
+    phases, chosen = _phases(frame, runs)
     wide = pd.concat(phases).pivot(index=KEYS, columns="measure", values="value").reset_index()
     wide["seed"] = whole_names(_without_prefix(wide["seed"]))
     known = measures or _measures(wide, metrics, better)
@@ -262,19 +262,19 @@ def _long(runs: Sequence[AlgorithmRun], labels: Mapping[tuple[str, str], str]) -
     """
     rows = []
     for run in runs:
-        key = labels[run.task, run.algorithm], run.name
+        key = labels[run.task, run.algorithm], run.task, run.name
         counts = sorted({count for at in run.series.values() for count in at})
         place = {count: k for k, count in enumerate(counts)}
         for metric, at in run.series.items():
             rows += [(*key, metric, count, place[count], own) for count, own in at.items()]
         rows += [(*key, metric, FINAL, 0, own) for metric, own in run.absolute.items()]
-    names = ["condition", "seed", "measure", "step", "episode", "values"]
+    names = ["condition", "task", "seed", "measure", "step", "episode", "values"]
     frame = pd.DataFrame(rows, columns=names)
     return frame.assign(value=[float(np.mean(own)) for own in frame["values"]])
 
 
 def _phases(
-    frame: pd.DataFrame, metrics: Sequence[str], runs: Sequence[AlgorithmRun]
+    frame: pd.DataFrame, runs: Sequence[AlgorithmRun]
 ) -> tuple[list[pd.DataFrame], list[str]]:
     """Return the scores of each phase in long form, and notes on what is compared."""
     is_final = frame["step"] == FINAL
@@ -284,15 +284,14 @@ def _phases(
         return [series, *_final(final)], []
     chosen: dict[str, list[str]] = {}
     phases = []
-    for metric in metrics:
-        every = frame[frame["measure"] == metric]
+    for (metric, _), every in frame.groupby(["measure", "task"]):
         own = every[every["step"] != FINAL].assign(phase=LAST_STEP)
-        absolute = final[final["measure"] == metric]
+        absolute = final.loc[every.index.intersection(final.index)]
         step = last_common_step(own) if len(own) else None
         rows = own[own["step"] == step]
         if {*absolute["condition"]} == {*every["condition"]}:
             phases += _final(absolute)
-            text = f"{ABSOLUTE} are compared{_best_note(own, absolute)}"
+            text = f"{ABSOLUTE} are compared by default{_best_note(own, absolute)}"
             text += left_out_note(every, absolute)
             text += f"; --phase '{LAST_STEP}' compares step_count {step:.0f}" if step else ""
         elif step is None:
@@ -301,7 +300,10 @@ def _phases(
             text = step_note(every, rows, f"step_count {step:.0f}")
         if step is not None:
             phases += [rows.assign(episode=0), _curves(own[own["step"] <= step], rows)]
-        chosen.setdefault(text, []).append(metric)
+        chosen.setdefault(text, []).append(str(metric))
+    if not phases:
+        raise ValueError("; ".join(f"{', '.join(names)}: {t}" for t, names in chosen.items()))
+    chosen = {text: [*dict.fromkeys(names)] for text, names in chosen.items()}
     return phases, [f"{', '.join(names)}: {text}" for text, names in chosen.items()]
 
 

@@ -1,16 +1,20 @@
-"""Parts of one study that were run into folders of their own, as a Slurm array does, put together.
+"""Studies that are parts of one: of other seeds, as a Slurm array has them, or of other sizes.
 
-Parts are of one study if their specs differ in their seeds alone, and no trial is in two of them.
+Parts belong to one study if their specs differ in their seeds alone, and no trial is in two of
+them. Sizes belong to one study if their specs differ in one number alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
 from ...core.numerics import pd
+from ...core.plugins.words import show
+from ..errors import SpecError
 from ..spec.outline import StudyOutline
+from ..spec.tables import SpecTable, flat
 from .long_form import name_key
-from .results import Results, assemble
+from .results import DIRECTORY, Results, assemble
 
 Part = tuple[StudyOutline, Results]
 """What a part consists of, and what it measured."""
@@ -55,3 +59,78 @@ def _in_order(frames: Sequence[pd.DataFrame], place: dict[str, int]) -> pd.DataF
     )
     order = keys.sort_values(["place", "seed"], kind="stable").index
     return whole.loc[order].reset_index(drop=True)
+
+
+def join_sizes(
+    results: Results,
+    tables: Mapping[str, SpecTable],
+    settings: Mapping[str, SpecTable],
+    size: str | None,
+) -> Results:
+    """Return the results of several studies with the size among the columns of their conditions.
+
+    Parameters
+    ----------
+    results
+        Combined results, whose conditions name their study as `DIRECTORY`.
+    tables
+        Specs by study.
+    settings
+        Settings by condition, as far as they are known.
+    size
+        The key of the size, or its last part; none: the only key in which the specs differ.
+
+    Raises
+    ------
+    SpecError
+        If the specs differ in another key, or two conditions are the same; one line.
+    """
+    specs = {name: _values(table) for name, table in tables.items()}
+    size_key = _only_difference(specs, size)
+    keys = dict.fromkeys(key for row in results.columns.values() for key in row if key != DIRECTORY)
+    columns: dict[str, dict[str, object]] = {}
+    for condition, row in results.columns.items():
+        own = {key: row.get(key, "") for key in (*keys, size_key) if key is not None}
+        fixed = {k: v for k, (v, *_) in specs[str(row[DIRECTORY])].items()}
+        fixed |= flat(settings.get(condition, {}))
+        own |= {key: fixed.get(key, "") for key, value in own.items() if value == ""}
+        for other, there in columns.items():
+            if there == own:
+                raise SpecError(f"{condition}: has the same settings as {other}: {show(own)}")
+        columns[condition] = own
+    return replace(results, columns=columns)
+
+
+def _only_difference(
+    specs: Mapping[str, Mapping[str, tuple[object, ...]]], size: str | None
+) -> str | None:
+    """Return the only key in which specs differ, None if they are equal; refuse several."""
+    (first, base), *others = specs.items()
+    keys = dict.fromkeys(chain.from_iterable(specs.values()))
+    differing = [key for key in keys if len({repr(own.get(key)) for own in specs.values()}) > 1]
+    swept = [key for key in differing if any(len(own.get(key, ())) > 1 for own in specs.values())]
+    named = [key for key in differing if size in (key, key.rpartition(".")[2])]
+    scenario = [key for key in differing if key.startswith("scenario.")]
+    (key, *_) = [*swept, *scenario, *differing, None] if size is None else [*named, None]
+    rest = [other for other in differing if other != key]
+    if rest:
+        name, own = next((n, own) for n, own in others if own.get(rest[0]) != base.get(rest[0]))
+        here, there = (_shown(spec.get(rest[0])) for spec in (own, base))
+        raise SpecError(
+            f"{name}: {rest[0]} = {here}, but {there} in {first}: the specs of one law must be "
+            "equal except for the size"
+        )
+    return key
+
+
+def _shown(values: tuple[object, ...] | None) -> str:
+    if values is None:
+        return "absent"
+    return show(values[0] if len(values) == 1 else list(values))
+
+
+def _values(table: SpecTable) -> dict[str, tuple[object, ...]]:
+    """Return the values of every key of a spec: one, or those of its sweep."""
+    fixed = flat({key: value for key, value in table.items() if key != "sweep"})
+    swept = table.get("sweep", {})
+    return {k: (v,) for k, v in fixed} | {k: tuple(values) for k, values in swept.items()}

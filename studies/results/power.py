@@ -6,6 +6,7 @@ for independent and normal.
 """
 
 import math
+import sys
 from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cache
@@ -17,10 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.numerics import quadrature, special
-from ...core.plugins.words import expect
+from ...core.plugins.words import expect, expect_within
 from ..errors import WIDTH
 from .notation import format_number, wrapped
-from .statistics import EXACT, LEVEL, Array
+from .statistics import EXACT, LEVEL, OPEN_UNIT, Array
 
 WANTED = 0.8
 """The power that studies are planned for (Cohen 1988)."""
@@ -47,6 +48,16 @@ FEW_PATTERNS = 32
 SIMULATED = 4000
 """Studies that are simulated then; the power is off by 0.008 at most (one standard error)."""
 MOST_SEEDS = 10_000
+MAX_COUNT = 1_000_000
+_COUNT = f"a whole number from 1 to {MAX_COUNT:,}", Integral, 1, MAX_COUNT
+ALLOWED: dict[str, tuple[str, type, float, float]] = {
+    "effect": ("a finite number", Real, -sys.float_info.max, sys.float_info.max),
+    "deviation": ("a finite number above 0", Real, sys.float_info.min, sys.float_info.max),
+    "seeds": _COUNT,
+    "comparisons": _COUNT,
+    "wanted": ("a number above 0 and below 1", Real, *OPEN_UNIT),
+}
+"""Range of each argument of the public functions: in words, its type, minimum and maximum."""
 NODES = 64
 """Points of Gauss-Legendre quadrature."""
 WIDEST = 10.0
@@ -84,44 +95,45 @@ def power(effect: float, deviation: float, seeds: int, comparisons: int = 1) -> 
     Raises
     ------
     ValueError
-        If the deviation is not positive, or a number is less than 1.
+        If an argument is not finite or out of range.
 
     Examples
     --------
     >>> power(0.2, 0.25, 5), round(power(0.2, 0.25, 15), 2)
     (0.0, 0.82)
     """
-    expect("numbers", Real, effect=effect, deviation=deviation)
-    expect("whole numbers", Integral, seeds=seeds, comparisons=comparisons)
-    if not deviation > 0.0 or seeds < 1 or comparisons < 1:
-        raise ValueError(
-            f"power: deviation = {deviation}, seeds = {seeds}, comparisons = {comparisons}, "
-            "allowed: above 0, 1 or more, 1 or more"
-        )
+    _check(effect=effect, deviation=deviation, seeds=seeds, comparisons=comparisons)
     if seeds < seeds_needed(comparisons):
         return 0.0
     level = LEVEL / comparisons
+    standardized = min(abs(effect) / deviation, float(MAX_COUNT))  # beyond, power is 1
     if 2**seeds <= EXACT:
         # So many of the 2 ** (seeds - 1) patterns, up to sign, are significant at most.
         extreme = math.ceil(level * 2.0 ** (seeds - 1)) - 1
         if extreme <= FEW_PATTERNS:
-            return _simulated(abs(effect) / deviation, seeds, extreme)
+            return _simulated(standardized, seeds, extreme)
         level = extreme * 2.0 ** (1 - seeds)
-    shift = abs(effect) / deviation * math.sqrt(seeds)
+    shift = standardized * math.sqrt(seeds)
     freedom = seeds - 1
     return power_of_t(freedom, shift, float(special.stdtrit(freedom, 1.0 - level / 2.0)))
 
 
 def detectable(deviation: float, seeds: int, comparisons: int = 1, wanted: float = WANTED) -> float:
-    """Return the least true difference that is found with the wanted power; infinite if none is.
+    """Return the smallest true difference that is detected with the wanted power.
+
+    It is infinite if no difference can be significant with so few seeds.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite or out of range.
 
     Examples
     --------
     >>> round(detectable(0.25, 15), 2), detectable(0.25, 5)
     (0.19, inf)
     """
-    expect("numbers", Real, deviation=deviation, wanted=wanted)
-    expect("whole numbers", Integral, seeds=seeds, comparisons=comparisons)
+    _check(deviation=deviation, seeds=seeds, comparisons=comparisons, wanted=wanted)
     if seeds < seeds_needed(comparisons):
         return math.inf
     low = 0.0
@@ -139,17 +151,21 @@ def detectable(deviation: float, seeds: int, comparisons: int = 1, wanted: float
 def seeds_for(
     effect: float, deviation: float, comparisons: int = 1, wanted: float = WANTED
 ) -> int | None:
-    """Return how many seeds it takes to find a difference with the wanted power.
+    """Return how many seeds detect a difference with the wanted power.
 
     None if it takes more than `MOST_SEEDS`.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite or out of range.
 
     Examples
     --------
     >>> seeds_for(0.2, 0.25), seeds_for(0.2, 0.25, comparisons=10)
     (15, 25)
     """
-    expect("numbers", Real, effect=effect, deviation=deviation, wanted=wanted)
-    expect("whole numbers", Integral, comparisons=comparisons)
+    _check(effect=effect, deviation=deviation, comparisons=comparisons, wanted=wanted)
     low = seeds_needed(comparisons)
     high = low
     while power(effect, deviation, high, comparisons) < wanted:
@@ -160,6 +176,14 @@ def seeds_for(
     seeds = range(low, high)
     enough = bisect_left(seeds, wanted, key=lambda n: power(effect, deviation, n, comparisons))
     return low + enough if low + enough <= MOST_SEEDS else None
+
+
+def _check(**arguments: float) -> None:
+    """Refuse arguments of the public functions that are not finite or out of range."""
+    for name, value in arguments.items():
+        allowed, kind, low, high = ALLOWED[name]
+        expect(allowed, kind, **{name: value})
+        expect_within(allowed, low, high, **{name: value})
 
 
 def deviation_of(samples: Sequence[ArrayLike], *, of_rates: bool) -> float | None:

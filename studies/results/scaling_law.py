@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
@@ -19,40 +19,45 @@ from .contrasts import title_of, values_of
 from .notation import format_estimate, format_number, format_p, wrapped
 from .power import APART, seeds_for
 from .results import Results
-from .statistics import LEVEL, Array, bootstrap, holm
+from .samples import GEOMETRIC, of_numbers, of_rates, of_times
+from .statistics import LEVEL, NOT_NEGATIVE, Array, bootstrap, holm
 
 WINDOW = 5
 """Episodes in a row whose mean success must reach a criterion."""
+MAX_SIZE = 1_000_000_000
+"""Maximum size that is fitted or predicted."""
 
 
 class Fitted(NamedTuple):
     """The law of a group of conditions."""
 
     group: str
-    """What they have in common; empty if there is nothing."""
+    """Settings that the conditions have in common; empty if there are none."""
     law: laws.Law | None
-    """None if there is none, see `why`."""
+    """None if there is no law, see `why`."""
     why: str = ""
-    """Why there is no law, in one sentence."""
+    """Reason why there is no law, in one sentence."""
     censored: int = 0
-    """How many runs did not reach the criterion."""
+    """Number of runs that did not reach the criterion."""
 
 
 class ScalingLaw(NamedTuple):
-    """How one measure grows with size."""
+    """Growth of one measure with size."""
 
     title: str
-    """What is measured."""
+    """Title of the measure."""
     size: str
     """What is counted: robots, joints, agents."""
     fits: tuple[Fitted, ...]
     """By group."""
     predicted: tuple[int, ...]
-    """Sizes that are predicted, beside those that were run."""
+    """Sizes that are predicted besides those that were run."""
+    remarks: tuple[str, ...] = ()
+    """Reasons to doubt that one law holds for all sizes."""
 
     @property
     def table(self) -> tuple[Summary, ...]:
-        """A line for each group that has a law: what its parameters mean, and predictions."""
+        """A line for each group that has a law: the meaning of its parameters, and predictions."""
         lines = []
         for group, law, *_ in self.fits:
             if law is not None:
@@ -63,21 +68,27 @@ class ScalingLaw(NamedTuple):
 
     @property
     def legend(self) -> tuple[str, ...]:
-        """How the table's intervals are made, in lines."""
-        return tuple(
-            wrapped(
-                "Intervals of parameters: 95%, seeds resampled, Student's. Predictions: of the "
-                "mean of as many seeds."
+        """How the table's values and intervals are computed, in lines."""
+        text = "Intervals of parameters: 95%, seeds resampled, Student's."
+        scales = {law.sample.scale for _, law, *_ in self.fits if law is not None}
+        if self.predicted:
+            text += (
+                " Predictions: the law at that size, with the 90% interval of the mean of as many "
+                "seeds, which follows the drift of the largest sizes."
             )
-        )
+        if GEOMETRIC in scales:
+            text += " Times to a criterion are geometric means."
+        return tuple(wrapped(text))
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was chosen, how it predicted sizes that were left out, how groups differ."""
+        """Chosen laws, how they predicted sizes that were left out, how groups differ."""
         lines: list[str] = []
         for fitted in self.fits:
             lines += wrapped(_sentence(fitted, self.size))
         lines += self._comparisons()
+        for remark in self.remarks:
+            lines += wrapped(remark)
         return tuple(lines)
 
     def _comparisons(self) -> list[str]:
@@ -123,13 +134,13 @@ def _sentence(fitted: Fitted, size: str) -> str:
     sizes = law.sample.sizes
     counted = f"{law.seeds} seeds, {len(sizes)} sizes from {sizes[0]:g} to {sizes[-1]:g} {size}"
     unreached = f", {fitted.censored} runs censored" if fitted.censored else ""
-    text = f"{head}{law.curve.name} ({counted}{unreached})"
+    text = f"{head}{law.curve.name}, {law.formula} ({counted}{unreached})"
     for n, measured, e in law.held_out:
         inside = "inside" if e.low <= measured <= e.high else "outside"
         text += f"; {n:g} left out: predicted {format_estimate(e)}, "
         text += f"measured {format_number(measured)}, {inside}"
-    if law.noise <= laws.FLAT:
-        text += "; all seeds agree, so that intervals of parameters tell nothing of the law"
+    if law.sample.values.var(axis=0).max() <= laws.FLAT:
+        text += "; all seeds agree, so that intervals of parameters do not show how well it fits"
     return f"{text}."
 
 
@@ -147,26 +158,33 @@ def scaling_law(
     Parameters
     ----------
     results
-        Of any studies.
+        Results of any studies.
     measure
-        Of episodes, ``steps``, ``return``, or a number of whole trials, by name; with a criterion a
-        rate.
+        Name of a measure of episodes, ``steps``, ``return``, or a number of whole trials; with a
+        criterion the name of a rate.
     phase
-        Of the episodes; by default ``evaluation``, or where there is none ``training``.
+        Phase of the episodes; by default ``evaluation``, or ``training`` if there is none.
     size
         A swept key that is a number, or the last part of it; by default the only one there is.
     criterion
-        Decisions of training are fitted that it takes until this share of `WINDOW` episodes in a
-        row has the measure.
+        Fit the decisions of training until this share of `WINDOW` episodes in a row has the
+        measure.
     predict
-        Sizes of which the mean of as many seeds is predicted.
+        Sizes for which the mean of as many seeds is predicted.
 
     Raises
     ------
     SpecError
-        If there is no such measure, phase or key, the key is no number, or the criterion no share.
+        If there is no such measure, phase or key, the key is no number, a size is below 1 or not
+        finite, or the criterion is no share.
     """
-    key = size_key(results.columns, size)
+    columns = columns_of(results)
+    key = size_key(columns, size)
+    sizes = {c: float(str(own[key])) for c, own in columns.items()}
+    for condition, n in sizes.items():
+        _check_size(key.rpartition(".")[2], n, f" (condition {condition!r})")
+    for n in predict:
+        _check_size("predict", n)
     if criterion is None:
         phases = [phase] if phase else ["evaluation", "training"]
         own = next((p for p in phases if p in results.phases), phases[0])
@@ -179,20 +197,34 @@ def scaling_law(
         samples = _decisions(results, measure, criterion)
         title = f"decisions to {format_number(criterion)} of {measure}"
         shown_as, own = SUCCESS, ""
-    counts = _episodes(results, shown_as, own) if shown_as.is_rate and criterion is None else {}
+    counts = _episodes(results, own) if shown_as.is_rate and criterion is None else {}
+    bounds = shown_as.bounds if criterion is None else NOT_NEGATIVE
     groups: dict[str, list[str]] = {}
     for condition in samples:
-        groups.setdefault(label_but(results.columns[condition], [key]), []).append(condition)
+        groups.setdefault(label_but(columns[condition], [key]), []).append(condition)
     fits = []
     for group, members in groups.items():
-        members.sort(key=lambda c: float(results.columns[c][key]))
-        sizes = np.array([float(results.columns[c][key]) for c in members])
-        fits.append(_fit(group, sizes, [samples[c] for c in members], counts.get(members[0])))
+        members.sort(key=sizes.__getitem__)
+        own_sizes = np.array([sizes[c] for c in members])
+        episodes = np.array([counts[c] for c in members]) if counts else None
+        fits.append(_fit(group, own_sizes, [samples[c] for c in members], episodes, bounds))
     return ScalingLaw(title, key.rpartition(".")[2], tuple(fits), tuple(predict))
 
 
+def _check_size(name: str, size: float, where: str = "") -> None:
+    if not 1.0 <= size <= MAX_SIZE:
+        raise SpecError(f"{name} = {size:g}{where}: allowed are sizes from 1 to {MAX_SIZE:,}")
+
+
+def columns_of(results: Results) -> Mapping[str, Mapping[str, object]]:
+    """Return what distinguishes each condition; without columns it is its label."""
+    if any(results.columns.values()):
+        return results.columns
+    return {condition: {"condition": condition} for condition in results.columns}
+
+
 def size_key(columns: Mapping[str, Mapping[str, object]], size: str | None = None) -> str:
-    """Return the swept key that sizes are of, by the columns of conditions.
+    """Return the swept key that is the size, by the columns of conditions.
 
     Raises
     ------
@@ -203,10 +235,7 @@ def size_key(columns: Mapping[str, Mapping[str, object]], size: str | None = Non
     numbers = [
         key
         for key in keys
-        if all(
-            isinstance(own.get(key), int | float) and not isinstance(own.get(key), bool)
-            for own in columns.values()
-        )
+        if all(_is_number(own.get(key)) for own in columns.values())
         and len({own.get(key) for own in columns.values()}) > 1
     ]
     if size is not None:
@@ -220,12 +249,22 @@ def size_key(columns: Mapping[str, Mapping[str, object]], size: str | None = Non
     return numbers[0]
 
 
-def _episodes(results: Results, measure: Measure, phase: str) -> dict[str, int]:
-    return {
-        c: results.values(c, measure.name, phase).shape[1]
-        for c in results.of_phase(phase)
-        if results.has(c, phase, measure.name)
-    }
+def _is_number(value: object) -> bool:
+    """Return whether a value is a number, or the text of one as in tables of scores."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return False
+    try:
+        float(value)
+    except ValueError:
+        return False
+    return True
+
+
+def _episodes(results: Results, phase: str) -> dict[str, float]:
+    """Return the mean number of episodes of a seed by condition."""
+    own = results.episodes[results.episodes["phase"] == phase]
+    counts = own.groupby("condition", sort=False)["seed"].agg(["size", "nunique"])
+    return dict(counts["size"] / counts["nunique"])
 
 
 def _decisions(
@@ -259,11 +298,12 @@ def _fit(
     group: str,
     sizes: Array,
     samples: Sequence[tuple[pd.Series, pd.Series | None]],
-    episodes: int | None,
+    episodes: Array | None,
+    bounds: tuple[float, float],
 ) -> Fitted:
-    """Return the law of a group, of the seeds that ran at all sizes."""
+    """Return the law of a group, from the seeds that ran at all sizes."""
     if any(a == b for a, b in pairwise(sizes)):
-        return Fitted(group, None, "a size stands twice; conditions differ in something else")
+        return Fitted(group, None, "a size occurs twice; conditions differ in something else")
     frame = pd.concat([own for own, _ in samples], axis=1).dropna()
     values = frame.to_numpy(dtype=float)
     censored = np.zeros(values.shape, dtype=bool)
@@ -274,9 +314,11 @@ def _fit(
         return Fitted(group, None, f"every run has {format_number(values[0, 0])}")
     try:
         if episodes is not None:
-            sample = laws.of_rates(sizes, values * episodes, episodes)
+            sample = of_rates(sizes, values, episodes)
+        elif any(marked is not None for _, marked in samples):
+            sample = of_times(sizes, values, censored)
         else:
-            sample = laws.of_numbers(sizes, values, censored)
+            sample = of_numbers(sizes, values, bounds)
         return Fitted(group, laws.choose(sample), censored=int(censored.sum()))
     except ValueError as error:
         is_pair = values.shape[1] == 2 and len(values) > 1 and not censored.any()

@@ -103,14 +103,16 @@ class ScoreTable(NamedTuple):
         """
         cells = self.frame[column].tolist()
         values = np.array([score_value(cell) for cell in cells], dtype=float)
-        wrong = np.isinf(values)
+        wrong = abs(values) > MAX_SCORE
         if wrong.any():
             row = int(wrong.argmax())
             raise self.refusal(row, column, cells[row], SCORE_ALLOWED)
         return pd.Series(values)
 
 
-SCORE_ALLOWED = "a finite number with a decimal point, or blank"
+MAX_SCORE = 1e100
+"""Largest size of a score, so that no variance overflows."""
+SCORE_ALLOWED = "a finite number with a decimal point, at most 1e100, or blank"
 
 
 class JsonNumber(str):

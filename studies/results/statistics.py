@@ -11,16 +11,17 @@ paired one flips the signs of the differences of n seeds, so its p is a multiple
 """
 
 import math
+import sys
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.numerics import special, stats
-from ...core.plugins.words import expect_each, show
+from ...core.plugins.words import expect, expect_each, expect_within, show
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,10 @@ AT_ONCE = 2**20
 
 NOT_NEGATIVE = (0.0, np.inf)
 """The bounds of times, sizes and numbers of things, see `bootstrap`."""
+
+OPEN_UNIT = (sys.float_info.min, 1.0 - sys.float_info.epsilon)
+"""Bounds of a share that is neither 0 nor 1."""
+MAX_RESAMPLES = 10_000_000
 
 ALIKE = 2.0
 """Failures that `rate` supposes beside those seen. With seeds of which one in twenty never learns,
@@ -55,10 +60,16 @@ def exactly(value: ArrayLike) -> Estimate:
 
 
 def _numbers(values: ArrayLike, name: str) -> Array:
+    """Return values as an array; refuse everything but finite numbers."""
     try:
-        return np.asarray(values, dtype=float)
+        array = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {show(values)}, allowed: numbers in rows") from None
+    wrong = ~np.isfinite(array)
+    if wrong.any():
+        place = np.argwhere(wrong)[0].tolist()
+        raise ValueError(f"{name}{place} = {array[wrong][0]}, allowed: finite numbers")
+    return array
 
 
 def bootstrap(
@@ -91,7 +102,8 @@ def bootstrap(
     Raises
     ------
     ValueError
-        If there are no values, or they have another shape.
+        If there are no values, they have another shape, or an argument is not finite or out of
+        range.
 
     Examples
     --------
@@ -100,6 +112,13 @@ def bootstrap(
     '2.50 [0.45, 4.55]'
     """
     expect_each("numbers", Real, bounds=bounds)
+    if len(bounds) != 2 or not bounds[0] < bounds[1]:
+        raise ValueError(f"bounds = {show(list(bounds))}, allowed: two numbers in ascending order")
+    expect_within("a number above 0 and below 1", *OPEN_UNIT, level=level)
+    for name, number in {"resamples": resamples, "seed": seed}.items():
+        expect("a whole number", Integral, **{name: number})
+    expect_within(f"1 to {MAX_RESAMPLES:,}", 1, MAX_RESAMPLES, resamples=resamples)
+    expect_within("0 or more", 0, math.inf, seed=seed)
     array = _numbers(values, "values")
     if array.ndim not in (1, 2) or len(array) == 0:
         raise ValueError(
@@ -185,9 +204,14 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     Parameters
     ----------
     outcomes
-        Zeros and ones ``(n_runs, n_episodes)``.
+        Zeros and ones, or shares of successes, ``(n_runs, n_episodes)``.
     level
         Coverage of the interval.
+
+    Raises
+    ------
+    ValueError
+        If there are no outcomes, or an outcome or the level is out of range.
 
     Examples
     --------
@@ -198,6 +222,11 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     array = _numbers(outcomes, "outcomes")
     if array.ndim != 2 or array.size == 0:
         raise ValueError(f"outcomes of shape {array.shape}, allowed: (n_runs, n_episodes)")
+    wrong = (array < 0.0) | (array > 1.0)
+    if wrong.any():
+        place = np.argwhere(wrong)[0].tolist()
+        raise ValueError(f"outcomes{place} = {array[wrong][0]}, allowed: 0 to 1")
+    expect_within("a number above 0 and below 1", *OPEN_UNIT, level=level)
     n_runs, n_episodes = array.shape
     p = array.mean()
     if n_runs < 2:

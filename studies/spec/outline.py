@@ -1,17 +1,17 @@
 """What a study consists of, as it was noted: read without running anything that it names.
 
-The installed code that computes results is noted, too, so that an edit of it is reported. Every
-module on which a trial's numbers depend, of this package and of those that offer things to it, has
-a digest of its text, to see at once whether it may have changed, and one of its syntax tree, to see
-whether it has: comments and layout do not count.
+The installed code that computes results is noted, too, so that an edit of it is reported. Each
+module on which a trial's numbers depend has a digest of its text, to see at once whether it may
+have changed, and one of its syntax tree, to see whether it has: comments and layout do not count.
+These are modules of this package, of packages that offer things to it, and those in `foreign_code`.
 """
 
 from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from importlib.util import find_spec
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,6 +21,7 @@ from ..errors import SpecError
 from ..store.database import DATABASE, SPEC_FILE
 from ..store.durable import read_text
 from ..store.store import Store
+from .foreign_code import foreign_code, python_files
 
 if TYPE_CHECKING:
     from .spec import Spec
@@ -175,53 +176,58 @@ def modules() -> dict[str, str]:
             name = path.relative_to(PACKAGE).as_posix()
             if not set(name.split("/")) & set(SILENT):
                 texts[name] = path.read_text(encoding="utf-8")
-    for root in _offering():
-        for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
-            texts[path.relative_to(root.parent).as_posix()] = path.read_text(encoding="utf-8")
+    for package in _offering():
+        for name, path in python_files(package):
+            texts[name] = path.read_text(encoding="utf-8", errors="replace")
     return texts
 
 
-def _offering() -> Iterator[Path]:
-    """Yield the folders, or files, of installed packages that offer things to studies."""
+def _offering() -> list[str]:
+    """Return the installed packages that offer things to studies."""
     from importlib.metadata import entry_points
 
     points = entry_points()
     groups = [group for group in points.groups if group.startswith(GROUPS)]
-    modules = {p.module.partition(".")[0] for g in groups for p in points.select(group=g)}
-    for name in sorted(modules - {__name__.partition(".")[0]}):
-        try:
-            spec = find_spec(name)
-        except (ImportError, ValueError):
-            continue  # what cannot be found is reported when it is asked for
-        if spec is not None and spec.origin is not None and spec.origin.endswith(".py"):
-            origin = Path(spec.origin)
-            yield origin.parent if origin.name == "__init__.py" else origin
+    packages = {p.module.partition(".")[0] for g in groups for p in points.select(group=g)}
+    return sorted(packages - {__name__.partition(".")[0]})
 
 
-def present(known: Mapping[str, tuple[str, str]] | None = None) -> Code:
-    """Return the digests of the installed code; modules whose text is `known` are not parsed."""
+def present(
+    known: Mapping[str, tuple[str, str]] | None, table: SpecTable, texts: Mapping[str, str]
+) -> Code:
+    """Return digests of the code that computes a study, and versions of libraries.
+
+    Parameters
+    ----------
+    known
+        Digests of earlier code; a module with the same text is not parsed again.
+    table
+        The spec as a table.
+    texts
+        Texts of the users' files that it names.
+    """
     digests: Code = {}
     known = known or {}
-    for name, text in modules().items():
+    files, versions = foreign_code(table, texts)
+    read = {n: p.read_text(encoding="utf-8", errors="replace") for n, p in files.items()}
+    for name, text in (modules() | read).items():
         digest = hashlib.sha256(text.encode()).hexdigest()[:16]
         is_same = name in known and known[name][0] == digest
-        digests[name] = known[name] if is_same else (digest, meaning(text, name))
-    return digests
+        digests[name] = known[name] if is_same else (digest, _meaning(text, name) or digest)
+    return digests | {name: (version, version) for name, version in versions.items()}
 
 
-def changed(known: Mapping[str, tuple[str, str]]) -> list[str]:
-    """Return the modules that mean something else than they did, or are new or gone."""
-    here = present(known)
+def _meaning(text: str, name: str) -> str | None:
+    """Return the digest of a module's syntax tree; None if it is a template or no Python."""
+    with suppress(ValueError):
+        return meaning(text, name)
+    return None
+
+
+def changed(known: Mapping[str, tuple[str, str]], here: Code) -> list[str]:
+    """Return the modules and libraries that differ from known ones, or are new or gone."""
     edited = [name for name in here if name in known and here[name][1] != known[name][1]]
     return sorted(known.keys() ^ here.keys()) + edited
-
-
-SAME_RESULTS = frozenset({"ec3ae786e8e72118cee514710d9d67f1"})
-"""Fingerprints of earlier code of this package whose results are those of this code, to the bit.
-
-An earlier one enters when its results have been compared; a change of results, which raises
-`RESULTS_VERSION`, empties the list.
-"""
 
 
 def fingerprint(code: Mapping[str, tuple[str, str]]) -> str:
@@ -237,9 +243,7 @@ def _is_ours(name: str) -> bool:
 def outdated(store: Store) -> str | None:
     """Return why this code would not go on with a study, in one line; None if it would."""
     known = store.code()
-    modules = changed(known)
-    if fingerprint(known) in SAME_RESULTS:
-        modules = [name for name in modules if not _is_ours(name)]
+    modules = changed(known, present(known, store.spec(), store.sources()))
     if not modules:
         return None
     more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"

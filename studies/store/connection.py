@@ -18,6 +18,7 @@ from functools import partial
 from pathlib import Path
 
 from ...core import locks
+from ...core.shell import command_line
 from ..errors import SpecError
 
 CIRCUMSTANCES = (
@@ -81,7 +82,7 @@ class DamageError(SpecError):
     """
 
     def __init__(self, path: Path, reason: str, message: str = "") -> None:
-        usual = f"{path}: is damaged: {reason}; nested-agents run mends it"
+        usual = f"{path}: is damaged: {reason}; {command_line('run')} repairs it"
         super().__init__(message or usual)
         self.reason = reason
 

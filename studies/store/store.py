@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.interface.measures import Measure
+from ...core.shell import command_line
 from ..errors import SpecError
 from . import database, durable, integrity
 from .checksums import find_altered, trial_checksums
@@ -51,13 +52,15 @@ class Store:
         Where it is.
     notes
         What is damaged, and what was done about it; one line each.
+    code_digest
+        Digest of the code that computes the trials that are saved; empty if the store only reads.
     """
 
     def __init__(self, directory: Path, connection: sqlite3.Connection) -> None:
         self.directory = directory
         self.notes: list[str] = []
         self._db = connection
-        self._code = ""  # what computes what is saved
+        self.code_digest = ""
 
     @classmethod
     @contextmanager
@@ -79,8 +82,8 @@ class Store:
             raise DamageError(
                 path,
                 "its log is there without it",
-                f"{path}-wal: is the log of a database that is not there any more; nested-agents "
-                "run sets it aside",
+                f"{path}-wal: is the log of a database that is not there any more; "
+                f"{command_line('run')} sets it aside",
             )
         if not path.exists():
             raise NoStudyError(f"{directory}: holds no study (no {DATABASE})")
@@ -144,7 +147,7 @@ class Store:
     def verify(self) -> None:
         """Raise `SpecError` if the rows of a trial that was run are not what was written."""
         for where in self._damaged_rows().values():
-            raise SpecError(f"{where}; nested-agents run runs it again")
+            raise SpecError(f"{where}; {command_line('run')} runs it again")
 
     def _damaged_rows(self) -> dict[str, str]:
         """Return by identity whose rows are not what was written, one line each."""
@@ -291,7 +294,7 @@ class Store:
                 kept.parent.mkdir(exist_ok=True)
                 if not kept.exists() or durable.read_bytes(kept) != content:
                     durable.write(kept, content)
-            store._code = study.code_digest
+            store.code_digest = study.code_digest
             yield store
 
     def states(self) -> dict[str, str]:
@@ -406,7 +409,7 @@ class Store:
         # By table: what is left of a trial whose row is gone hangs on nothing.
         for table in ("trials", *database.OF_A_TRIAL):
             self._db.execute(f"DELETE FROM {table} WHERE identity = ?", (trial.identity,))
-        row = (trial.identity, trial.condition, trial.seed, state, error, digest, self._code)
+        row = (trial.identity, trial.condition, trial.seed, state, error, digest, self.code_digest)
         self._insert("trials", [row])
 
 

@@ -150,12 +150,13 @@ def join_measures(
     by_scenario
         What each scenario declares.
     taken
-        Names of further columns, which no measure may have.
+        Names of the columns that tell conditions apart, which no measure may have.
 
     Raises
     ------
     SpecError
-        If a name is reserved, or two scenarios mean different things by it.
+        If a name is reserved, two scenarios mean different things by it, or two columns differ
+        only in case.
 
     Examples
     --------
@@ -163,6 +164,13 @@ def join_measures(
     >>> [measure.name for measure in join_measures([(one,), (other, one)])]
     ['energy_j', 'spread_m']
     """
+    columns: dict[str, str] = {}
+    for name in taken:
+        if (other := columns.setdefault(name.lower(), name)) != name:
+            raise SpecError(
+                f"sweep: {other!r} and {name!r} differ only in case, and columns of results do "
+                "not; rename one of these settings"
+            )
     reserved = {name.lower() for name in (*RESERVED, *taken)}
     by_name: dict[str, Measure] = {}
     for measures in by_scenario:

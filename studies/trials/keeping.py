@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...core.interface.measures import Measure
-from ...core.plugins.printing import shell_word
 from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ...core.plugins.words import closest, show
+from ...core.shell import command_line
 from ..errors import SpecError
 from ..spec.outline import Code, outdated, present, sources_of
 from ..spec.spec import Spec
@@ -74,7 +74,7 @@ def open_to_run(
         damage, code, before = _examine(directory, spec, notes, accept_code=accept_code)
         computed = replace(
             notes,
-            code=present(code),
+            code=present(code, notes.spec, notes.sources),
             planned=[*notes.planned, *_planned_before(spec, trials, before)],
         )
         copies = spec.sources.texts.items()  # to be read and run again, as is the spec
@@ -129,7 +129,7 @@ def check_teams(store: Store, identities: Container[str] = ()) -> None:
         raise SpecError(f"{store.directory}: keeps no teams: its spec has no keep_teams = true")
     for identity, line in store.damage().items():
         if identity in identities:
-            raise SpecError(f"{line}; nested-agents run runs it again")
+            raise SpecError(f"{line}; {command_line('run')} runs it again")
 
 
 def notes_of(
@@ -226,8 +226,7 @@ def _mismatch_of_study(
     if mismatch is not None and is_copy(copy, spec, notes):
         raise SpecError(
             f"{copy}: is not the spec of the study beside it: {mismatch}; if you did not edit it, "
-            f"it is damaged: nested-agents retry {shell_word(store.directory)} goes on by the "
-            "database"
+            f"it is damaged: {command_line('retry', store.directory)} goes on by the database"
         )
     return mismatch
 

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...core.isolation import python_command
+from ...core.isolation import python_command, restore_child_signal
 from .runner import Outcome, RunTrial, attempt, begin, storable
 from .warmth import Warmth, measure_warmth, warm_up
 
@@ -66,11 +66,10 @@ def call_for(
 ) -> tuple[Callable[..., Outcome | Answer], *tuple[object, ...]]:
     """Return a function and its arguments by which a worker runs a trial.
 
-    One that names Python files of a user's has a process of its own, and is pickled: whoever hands
-    it on runs none of these files.
+    A trial that runs Python files or modules of users has a process of its own. It is pickled here,
+    so that the worker itself runs none of them.
     """
-    is_own = any(name.endswith(".py") for name in trial.sources.texts)
-    if is_own and sys.platform != "win32":  # which forks no processes
+    if trial.sources.runs_foreign_code and sys.platform != "win32":  # which forks no processes
         return run_apart, pickle.dumps((run_trial, trial)), trial.seed
     return attempt, run_trial, trial
 
@@ -101,7 +100,7 @@ def _begin(parent: int) -> tuple[subprocess.Popen[bytes], Connection]:
     ours, theirs = Pipe()
     command = python_command(f"from {__name__} import serve; serve({theirs.fileno()})")
     # Sets of text are in the same order in every trial.
-    environment = {"PYTHONHASHSEED": "0", **os.environ}
+    environment = {**os.environ, "PYTHONHASHSEED": "0"}
     process = subprocess.Popen(command, env=environment, pass_fds=[theirs.fileno()])
     theirs.close()
     return process, ours
@@ -110,6 +109,7 @@ def _begin(parent: int) -> tuple[subprocess.Popen[bytes], Connection]:
 def serve(descriptor: int) -> None:
     """Fork a process for each trial that is asked for, until nobody asks any more."""
     worker = Connection(descriptor)
+    restore_child_signal()
     importlib.import_module("nested_agents.studies.trials.session")
     warmth = Warmth((), ())
     while True:

@@ -20,6 +20,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from ...core.isolation import safe_path
 from ...core.plugins.words import closest
+from ...core.shell import command_line
 from ..errors import SpecError
 from ..trials.trial import Trial
 from .nursery import Answer, call_for, describe_exit
@@ -90,9 +91,8 @@ def start_workers(
         except ModuleNotFoundError as error:
             if error.name not in ("dask", "distributed"):
                 raise
-            raise SpecError(
-                f"--backend dask: {error.name} is not installed; pip install 'nested-agents[dask]'"
-            ) from None
+            install = command_line("install", "dask", "distributed", program="pip")
+            raise SpecError(f"--backend dask: {error.name} is not installed; {install}") from None
         cluster = DaskWorkers.local(wanted) if address is None else DaskWorkers.at(address, jobs)
         with cluster as workers:
             yield workers

@@ -96,14 +96,14 @@ def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixt
     ("spec", "extras", "agents"),
     [
         ("swimmer", ("mujoco",), {2}),
-        ("swimmer_4", ("mujoco",), {4}),
-        ("swimmer_transfer", ("mujoco",), {4}),
-        ("swimmer_n", ("mujoco",), {2, 4, 8, 16}),
+        ("swimmer-4", ("mujoco",), {4}),
+        ("swimmer-transfer", ("mujoco",), {4}),
+        ("swimmer-n", ("mujoco",), {2, 4, 8, 16}),
         ("spread", ("mpe2",), {3}),
-        ("spread_ppo", ("mpe2",), {3}),
+        ("spread-ppo", ("mpe2",), {3}),
         ("aloha", (), {10}),
-        ("aloha_ppo", (), {10}),
-        ("aloha_copies", (), {10}),
+        ("aloha-ppo", (), {10}),
+        ("aloha-copies", (), {10}),
     ],
 )
 def test_specs_of_worlds_of_others_run(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
+from ....core.shell import command_line
 from ...errors import SpecError, refused
 from .. import options
 from ..display import print_data, print_text, print_wrapped
@@ -58,7 +60,9 @@ def keys(prefix: str | None) -> int:
     if prefix is None:
         for name, parts in outline().items():
             print_wrapped(", ".join(parts), f"[{name}]  " if name else "top of the spec  ")
-        print_text("", "To list the keys of a table or of one key: nested-agents keys PREFIX")
+        print_text(
+            "", f"To list the keys of a table or of one key: {command_line('keys', 'PREFIX')}"
+        )
         return 0
     tables = keys_below(prefix)
     if not tables:
@@ -97,26 +101,33 @@ def schema(kind: str, out: Path | None) -> int:
     return 0
 
 
-MOST_AGENTS = 10_000
-"""Of one row: its integers have some fifty thousand digits."""
-RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
-"""From, to, and what is added or multiplied from one number to the next."""
+MAX_NUMBERS = 10_000
+"""Numbers that one range may have."""
+RANGE = re.compile(r"(\d{1,15})(?::(\d{1,15})(?::(\*?)(\d{1,15}))?)?", re.ASCII)
+"""First and last number, and what is added or multiplied from one number to the next."""
 
 
-class Quantities(TypedDict):
-    """What formulas of costs are given beside the number of agents, see `Problem`."""
+class QuantityOptions(TypedDict):
+    """Quantities of the formulas as they are typed, see `nested_agents.studies.cost.table`."""
 
-    rules: int
-    actions: int
+    memberships: tuple[str, ...]
+    rules: tuple[str, ...]
+    actions: tuple[str, ...]
     iterations: int
 
 
+def several(name: str, default: str, text: str) -> options.Decorator:
+    """Return an option that takes several numbers, lists of numbers and ranges."""
+    return click.option(
+        name, multiple=True, metavar="N|RANGE...", default=(default,) if default else (), help=text
+    )
+
+
 @click.command()
-@click.option(
+@several(
     "--agents",
-    metavar="N|RANGE,...",
-    default="4",
-    help="Numbers of agents and ranges: 4,8,16, 1:16, 2:64:2 (every second), 4:64:*2 (doubled).",
+    "4",
+    "Numbers of agents and ranges: 4 8 16, 1:16, 2:64:2 (every second), 4:64:*2 (doubled).",
 )
 @click.option(
     "--topology",
@@ -127,15 +138,21 @@ class Quantities(TypedDict):
     "of your own; single-agent: Eq. 23; or ways to decide: best-response, max-plus, fitted-q, "
     "hierarchy-ppo.",
 )
-@options.number("--rules", "N", 5**7, "|S|, rules of one agent.")
-@options.number("--actions", "N", 4, "|A|, actions of one agent.")
+@several(
+    "--memberships",
+    "",
+    "Membership functions of each of the seven state variables, 5 by default; rules = "
+    "memberships^7.",
+)
+@several("--rules", "", "|S|, rules of one agent, instead of --memberships.")
+@several("--actions", "4", "|A|, actions of one agent.")
 @options.number("--iterations", "N", 450, "L, iterations (steps) of an epoch.")
 @click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
 @click.option(
     "--repeats",
     type=int,
     metavar="N",
-    help="Measure so often, each time with a new team; from 2 on times have an interval.",
+    help="Number of measurements, each with a new team; two or more give times an interval.",
 )
 @click.option(
     "--network/--no-network",
@@ -144,56 +161,76 @@ class Quantities(TypedDict):
 @options.formats("table", "json", "csv", "latex")
 @options.plot
 def cost(
-    agents: str,
+    agents: tuple[str, ...],
     topology: tuple[str, ...],
     measured: bool,
     repeats: int | None,
     network: bool,
     form: costs.Form,
     plot: Path | None,
-    **quantities: Unpack[Quantities],
+    **typed: Unpack[QuantityOptions],
 ) -> int:
-    """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
-    from ....core.agents.cost import Problem
-    from ...cost.table import cost_table, format_rows
+    """Print the cost of hierarchies, by formula (Eq. 18-23) and, if requested, measured.
+
+    Several numbers of agents, rules and actions give a row for each combination.
+    """
+    from ...cost import table as costs
     from ...presentation.progress import say
 
     with refused():
-        problem = Problem(**quantities)
-        sizes = numbers(agents)
+        quantities: costs.Quantities = {
+            "actions": numbers("actions", typed["actions"]),
+            "iterations": typed["iterations"],
+        }
+        if typed["memberships"]:
+            quantities["memberships"] = numbers("memberships", typed["memberships"])
+        if typed["rules"]:
+            quantities["rules"] = numbers("rules", typed["rules"])
+        if plot is not None:
+            from ...cost.figure import check, draw
+
+            check(costs.count_hierarchies(topology), len(costs.problems(**quantities)), plot)
         if measured := measured or repeats is not None:
             say("measuring, first compiling what is not: no steps of more than a second or so")
-        often = 1 if repeats is None else repeats
-        rows = cost_table(
-            topology, sizes, problem, measured=measured, repeats=often, network=network
+        rows = costs.cost_table(
+            topology,
+            numbers("agents", agents),
+            measured=measured,
+            repeats=1 if repeats is None else repeats,
+            network=network,
+            **quantities,
         ).rows
         if plot is not None:
-            from ...cost.figure import draw
-
             draw(rows, plot)
-    print_data(f"{format_rows(rows, form)}\n")
+    print_data(f"{costs.format_rows(rows, form)}\n")
     return 0
 
 
-def numbers(text: str) -> list[int]:
-    """Return the numbers that a list of numbers and ranges names, both ends of each included.
+def numbers(name: str, texts: Sequence[str]) -> list[int]:
+    """Return the numbers in lists of numbers and ranges; both ends of a range are included.
+
+    Raises
+    ------
+    ValueError
+        If a text is no list of whole numbers and ranges; one line that names the option.
 
     Examples
     --------
-    >>> numbers("4,8,16"), numbers("1:3"), numbers("2:6:2"), numbers("4:64:*2")
-    ([4, 8, 16], [1, 2, 3], [2, 4, 6], [4, 8, 16, 32, 64])
+    >>> numbers("agents", ["4,8", "16"]), numbers("agents", ["1:3"]), numbers("rules", ["4:32:*2"])
+    ([4, 8, 16], [1, 2, 3], [4, 8, 16, 32])
     """
     chosen: list[int] = []
-    for part in text.split(","):
+    for part in ",".join(texts).split(","):
         match = RANGE.fullmatch(part.strip())
-        first, last, times, step = match.groups("") if match else ("0", "", "", "")
+        first, last, times, step = match.groups("") if match else ("1", "0", "", "")
         number = int(first)
         end = int(last or first)
         by = int(step or 1)
-        if not 1 <= number <= end <= MOST_AGENTS or by < (2 if times else 1):
+        is_long = not times and by > 0 and (end - number) // by >= MAX_NUMBERS
+        if number > end or by < (2 if times else 1) or (times and number < 1) or is_long:
             raise ValueError(
-                f"agents = {text!r}, allowed: 4, 4,8,16, 1:16, 2:64:2 or 4:64:*2, from 1 to "
-                f"{MOST_AGENTS:,}"
+                f"{name} = {part!r}, allowed: whole numbers such as 4 or 4,8,16, and ranges of at "
+                f"most {MAX_NUMBERS:,} numbers such as 1:16, 2:64:2 or 4:64:*2"
             )
         while number <= end:
             chosen.append(number)

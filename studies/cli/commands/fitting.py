@@ -7,7 +7,7 @@ import click
 from ...errors import refused
 from .. import options
 from ..display import Form, in_form, print_data, print_table, print_text
-from ..loading import load_results
+from ..loading import read_results, say_remarks
 
 
 @click.command()
@@ -33,6 +33,7 @@ from ..loading import load_results
     metavar="N...",
     help="Sizes that were not run: the mean of as many seeds, with its 90% interval.",
 )
+@options.columns
 @options.plot
 @options.where
 @options.form
@@ -44,6 +45,7 @@ def fit(
     size: str | None,
     criterion: float | None,
     predict: tuple[int, ...],
+    columns: tuple[str, ...],
     plot: Path | None,
     where: str | None,
     form: Form,
@@ -51,13 +53,16 @@ def fit(
 ) -> int:
     """Fit how results grow with the size of teams: exponents, floors, break points, predictions.
 
-    DIR is where a study is kept that sweeps a size, FILE.json a file of results. Conditions that
-    agree in all else have a law each: a power law, one with a floor or a break point; of rates a
-    logistic curve. The one is taken that best predicts the largest sizes from those below.
+    DIR is the folder of a study that sweeps a size, FILE a file of results or a table of scores as
+    compare reads it. Several folders are fitted together if their specs are equal except for the
+    size. Conditions that agree in all else have a law each: a power law, one with a floor or a
+    break point; for rates a logistic curve. The command chooses the law that best predicts the
+    largest sizes from those below.
     """
     from ...api.growth import scaling_law
 
-    loaded = load_results(sources, where=where, trust=trust)
+    loaded = read_results(sources, where=where, trust=trust, columns=columns)
+    say_remarks(loaded)
     growth = scaling_law(
         loaded, measure, phase=phase, size=size, criterion=criterion, predict=predict
     )

@@ -9,7 +9,8 @@ from typing import Literal, TypedDict, Unpack
 
 import click
 
-from ....core.plugins.printing import printable, shell_word
+from ....core.plugins.printing import printable
+from ....core.shell import command_line
 from ...api.status import describe, failures, progress
 from ...errors import SpecError, refused
 from ...presentation.progress import say
@@ -56,7 +57,7 @@ def status(directory: Path, watch: bool) -> int:
     for text in failures(failed):
         print_text(f"\n{text}")
     if failed:
-        print_text(f"\nto run them again: nested-agents retry {shell_word(directory)}")
+        print_text(f"\nto run them again: {command_line('retry', directory)}")
     return 1 if failed else 0
 
 
@@ -139,13 +140,7 @@ class Compared(TypedDict):
 )
 @options.plot
 @options.where
-@click.option(
-    "--columns",
-    multiple=True,
-    metavar="ROLE=COLUMN",
-    help="What the columns of a table of scores are, with commas between: condition and score "
-    "(each may be several, as condition=model+topology), seed, item; by default those called so.",
-)
+@options.columns
 @click.option(
     "--better",
     type=click.Choice(["higher", "lower"]),
@@ -256,7 +251,7 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
     """Write one file with a row for every episode, and one with a row for every trial.
 
     DIR is where the study is kept. JSON is one small file of spec, seeds and rounded measures, fit
-    to be published with a paper; `nested-agents table` reads it.
+    to be published with a paper; the command table reads it.
     """
     folder = directory / "export" if out is None else out
     if trust:

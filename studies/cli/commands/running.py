@@ -6,7 +6,7 @@ from typing import TypedDict, Unpack
 
 import click
 
-from ....core.plugins.printing import shell_word
+from ....core.shell import command_line
 from .. import options
 from ..display import print_data, print_table, print_text, show_results
 
@@ -25,7 +25,7 @@ class Rerun(options.RunOptions):
 @options.jobs
 @click.option("--print-spec", is_flag=True, help="Print the spec that would be run, and stop.")
 def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
-    """Train two e-Pucks to push a box: table, figures and replay within minutes."""
+    """Train two e-Pucks to push a box: table, figures, report and replay within minutes."""
     file = Path(__file__).parents[2] / "catalogue/learning_curve/demo.toml"
     text = file.read_text(encoding="utf-8")
     if print_spec:
@@ -56,7 +56,7 @@ def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
     terminal = Terminal(draw_first)
     with ThreadPoolExecutor(1) as drawing:  # trials go on while the first episode is drawn
         study = run(spec, out, jobs=jobs, observer=terminal)
-    status = show_results(study)
+    status = show_results(study, report=study.report())
     for name in ("first", "last") if not study.failed else ():
         print_text(f"replay  {replays[name].result() if name in replays else draw(name)}")
     return status
@@ -84,7 +84,7 @@ def run(
 ) -> int:
     """Run the study of a spec; the same command again continues it.
 
-    SPEC.toml says what to run; `nested-agents demo --print-spec` prints an example.
+    SPEC.toml says what to run; the command demo prints an example with --print-spec.
     """
     from ...api.running import run
     from ...errors import SpecError
@@ -101,8 +101,8 @@ def run(
         if not (out / DATABASE).exists() or spec.resolve() != (out / SPEC_FILE).resolve():
             raise
         raise SpecError(
-            f"{error}; if you did not edit {spec}, it is damaged: nested-agents retry "
-            f"{shell_word(out)} goes on by the database"
+            f"{error}; if you did not edit {spec}, it is damaged: {command_line('retry', out)} "
+            "goes on by the database"
         ) from None
     return show_results(run(changed, out, observer=Terminal(), **running), figures)
 

@@ -6,14 +6,14 @@ from functools import partial
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.scenario import Transition, check_reward
+from nested_agents.core.interface.scenario import Transition, checked_reward
 
 AGENTS = ("first", "second")
 
 
 @pytest.mark.parametrize("reward", [1, -0.5, True, np.float32(2.0), np.array([1.0, 2.0]), (1, 2)])
 def test_a_reward_is_a_number_or_one_for_each_agent(reward: object) -> None:
-    check_reward(reward, AGENTS)
+    checked_reward(reward, AGENTS)
 
 
 @pytest.mark.parametrize(
@@ -30,7 +30,7 @@ def test_a_reward_is_a_number_or_one_for_each_agent(reward: object) -> None:
 )
 def test_a_reward_that_cannot_be_learned_from_is_refused(reward: object, complaint: str) -> None:
     with pytest.raises(ValueError, match=re.escape(complaint)):
-        check_reward(reward, AGENTS)
+        checked_reward(reward, AGENTS)
 
 
 def test_twists_are_measured_once_and_only_if_they_are_asked_for() -> None:

@@ -50,10 +50,13 @@ def test_a_state_space_refuses(names: str, n_own: int, complaint: str) -> None:
 @pytest.mark.parametrize(
     ("states", "complaint"),
     [
-        (None, "NoneType, allowed: numbers of shape (2, 2)"),
+        (None, "NoneType, allowed: real numbers"),
         ([[0.0], [0.0, 1.0]], "list"),
         (np.zeros((9, 9)), "shape (9, 9)"),
-        (np.array([["a", "b"], ["c", "d"]]), "ndarray, allowed: numbers"),
+        (np.array([["a", "b"], ["c", "d"]]), "str32, allowed: real numbers"),
+        (np.zeros((2, 2), complex), "complex128, allowed: real numbers"),
+        ([[0.0, 1j], [0.0, 0.0]], "complex128, allowed: real numbers"),
+        (np.array([[0.0, 1j], [0.0, 0.0]], object), "allowed: real numbers"),
         (np.array([[0.0, 0.0], [0.0, np.nan]]), "gap of second is nan, allowed: finite"),
         (np.array([[0.0, np.inf], [0.0, 0.0]]), "gap of first is inf"),
         (np.array([[1e300, 0.0], [0.0, 0.0]]), "speed of first is 1e+300"),

@@ -175,6 +175,25 @@ def test_all_kernels_are_compiled_so() -> None:
     for folder in ("core", "scenarios", "topologies", "studies"):
         for path in (ROOT / folder).rglob("*.py"):
             # What numba generates code by is imported when a kernel is compiled.
-            if path.name not in ("compiler.py", "memory.py"):
+            if path.name not in ("compiler.py", "kernel_cache.py", "memory.py"):
                 found = re.search(r"^\s*(from|import) numba\b.*", path.read_text(), re.MULTILINE)
                 assert found is None, f"{path}: {found and found[0]}; see core/numerics"
+
+
+@pytest.mark.parametrize(
+    ("ending", "damage"),
+    [(".nbi", "truncated"), (".nbi", "garbage"), (".nbc", "truncated"), (".nbc", "flipped")],
+)
+def test_a_damaged_cached_kernel_is_compiled_again(
+    ending: str, damage: str, package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    assert called(package) == (6, 1, True)
+    for path in package.rglob(f"*{ending}"):
+        content = bytearray(path.read_bytes())
+        if damage == "flipped":  # what could be a constant in machine code
+            content[len(content) // 2] ^= 1
+        part = {"truncated": content[:-7], "garbage": b"\x80" * 99}
+        path.write_bytes(part.get(damage, content))
+    assert called(package) == (6, 1, True)
+    assert called(package) == (6, 1, False)

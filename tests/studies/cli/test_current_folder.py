@@ -26,6 +26,11 @@ learner.kind = "frozen"
 scenario.kind = "line-up"
 """
 MINE = """
+import random
+
+import numpy as np
+
+
 def ring(agents, groups):
     return list(zip(agents, agents[1:]))
 """
@@ -99,10 +104,10 @@ def run_here(folder: Path, *line: str, **environment: str) -> None:
 def test_no_process_imports_or_reads_anything_of_the_current_folder(traps: Path) -> None:
     (traps / "study.toml").write_text(SPEC)
     (traps / "mine.py").write_text(MINE)
-    run_here(traps, str(COMMAND), "run", "study.toml", "--out", "out", "--jobs", "1")
+    run_here(traps, str(COMMAND), "run", "study.toml", "--out", ".", "--jobs", "1")
     lines = (
-        ("report", "out"),
-        ("explain", "out"),
+        ("report", "."),
+        ("explain", "."),
         ("plan", "study.toml"),
         ("run", "study.toml", "--out", "other", "--backend", "dask", "--jobs", "1"),
     )

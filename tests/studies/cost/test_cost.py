@@ -3,8 +3,11 @@
 import csv
 import io
 import json
+import math
 import sys
 from dataclasses import replace
+from fractions import Fraction
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -47,6 +50,10 @@ def test_json_has_integers_as_integers(said) -> None:
     assert row == {
         "agents": 4,
         "topology": "chain",
+        "memberships": 5,
+        "rules": 78_125,
+        "actions": 4,
+        "iterations": 450,
         "nested_exact": 2_457_562_500_000,
         "nested_closed_form": 2_457_562_500_000,
         "nested_asymptotic": 2_457_600_000_000,
@@ -117,29 +124,40 @@ def test_columns_that_do_not_fit_a_terminal_follow_below(said, monkeypatch) -> N
 
 
 def test_numbers() -> None:
-    assert list(numbers("5:7")) == [5, 6, 7]
-    assert numbers("4,8,16") == [4, 8, 16]
-    assert numbers("1:3, 2:64:*4, 3") == [1, 2, 3, 8, 32]
+    assert numbers("agents", ["5:7"]) == [5, 6, 7]
+    assert numbers("agents", ["4,8", "16"]) == [4, 8, 16]
+    assert numbers("agents", ["1:3, 2:64:*4, 3"]) == [1, 2, 3, 8, 32]
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--agents", "0"), "agents = '0', allowed: 4, 4,8,16, 1:16, 2:64:2 or 4:64:*2"),
+        (("--agents", "0"), "agents[0] = 0, allowed: whole numbers from 1 to 10,000"),
+        (("--agents", "0:8:*2"), "agents = '0:8:*2', allowed: whole numbers such as 4 or 4,8,16"),
         (("--agents", "4:64:*1"), "agents = '4:64:*1'"),
         (("--agents", "4:64:0"), "agents = '4:64:0'"),
-        (("--agents", "4,,8"), "agents = '4,,8'"),
+        (("--agents", "4,,8"), "agents = ''"),
         (("--agents", "four"), "agents = 'four'"),
         (("--agents", "5:2"), "agents = '5:2'"),
-        (("--agents", "1:10001"), "from 1 to 10,000"),
-        (("--actions", "1"), "actions = 1, allowed: 2 or more"),
-        (("--rules", "0"), "rules = 0, allowed: 1 or more"),
+        (("--agents", "1:10001"), "at most 10,000 numbers"),
+        (("--agents", "10001"), "agents[0] = 10001, allowed: whole numbers from 1 to 10,000"),
+        (("--actions", "4", "1"), "actions[1] = 1, allowed: whole numbers from 2 to 10,000"),
+        (("--actions", "4.5"), "actions = '4.5'"),
+        (("--actions", "-4"), "-4"),
+        (("--rules", "0"), "rules[0] = 0, allowed: whole numbers from 1"),
+        (("--memberships", "0"), "memberships[0] = 0, allowed: whole numbers from 1 to 1,000"),
+        (("--memberships", "three"), "memberships = 'three'"),
+        (("--memberships", "3", "--rules", "9"), "memberships and rules are both given"),
+        (("--iterations", "0"), "iterations = 0, allowed: 1 to"),
+        (("--agents", "1:1000", "--actions", "2:1000"), "999,000 rows, allowed: 100,000"),
         (("--topology", "ring"), "topology 'ring': known: chain,"),
         (("--topology",), "'--topology' requires an argument; see nested-agents cost --help"),
         (("--topology", "--format", "csv"), "--topology --format: is an option"),
         (("--topology", "per-robot"), "agents = 'body', topology = 'chain'"),
         (("--format", "xml"), "'xml' is not one of 'table', 'json', 'csv', 'latex'"),
         (("--plot", "cost.txt"), "cost.txt: suffix must be"),
+        (("--plot", "cost.svg", "--topology", *FIVE), "5 topologies and the single agent, allowed"),
+        (("--plot", "cost.svg", "--rules", "1:13"), "13 pairs of rules and actions, allowed"),
         (("--topology", "a=chain", "a=star"), "'a' more than once; name each: LABEL=chain"),
         (("--topology", "a=b=chain"), "topology 'b=chain'"),
     ],
@@ -174,7 +192,7 @@ def test_ways_to_decide_count_as_their_formula(way: str, n: int) -> None:
 
 def test_ways_to_decide_are_added_up_as_the_hierarchies() -> None:
     """Of six agents the first tries 4 + 3 * 12 starts and 6 * 4 around them, each its own four."""
-    table = cost_table([*WAYS, "independent"], [6], Problem(7, 4, 5))
+    table = cost_table([*WAYS, "independent"], [6], rules=[7], iterations=5)
     rows = {row.topology: row for row in table.rows}
     exact = {name: row.nested_exact for name, row in rows.items()}
     assert exact["best-response"] == 35 * (68**2 + 5 * 4**2)
@@ -223,7 +241,7 @@ def made_up(n: int, power: float) -> CostRow:
     counts = Counts(tried, tried, n)
     seconds = 1e-6 * tried**power
     measured = StepCost(counts, seconds, 1e-6, 10 * tried, (seconds + 1e-6,))
-    return CostRow(n, "chain", 1, None, None, 1, counts, measured)
+    return CostRow(n, "chain", Problem(), 1, None, None, 1, formula=counts, measured=measured)
 
 
 def test_the_table_of_what_was_measured_says_what_it_holds() -> None:
@@ -303,7 +321,7 @@ def test_the_legend_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     drawn = []
     monkeypatch.setattr(figures, "write", lambda figure, path: drawn.append(figure))
     labels = {"chain": "chain", "evenodd.py:even_odd": "star"}
-    rows = [row for t in labels.values() for row in cost_table([t], [4, 8], Problem()).rows]
+    rows = [row for t in labels.values() for row in cost_table([t], [4, 8]).rows]
     names = {text: label for label, text in labels.items()}
     draw([replace(row, topology=names[row.topology]) for row in rows], tmp_path / "cost.svg")
     (figure,) = drawn
@@ -321,9 +339,94 @@ def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
     assert "All counts equal the formulas in 4 of 4 rows." in out
     assert max(map(len, out.splitlines())) <= 80
     assert "<svg" in figure.read_text()
-    rows = cost_table(["chain"], [2], Problem(), measured=True).rows
+    rows = cost_table(["chain"], [2], measured=True).rows
     (record,) = json.loads(format_rows(rows, "json"))
     assert record["joint_actions_per_step"] == record["joint_actions_formula_per_step"] == 20
+
+
+def test_several_rules_and_actions_have_columns_in_every_form(said) -> None:
+    """Each row equals the sum of Eq. 18 and the power of Eq. 23, with 2,187 and 78,125 rules."""
+    command = ("--agents", "2", "3", "--memberships", "3", "5", "--actions", "4", "6")
+    rows = json.loads(said(*command, "--format", "json")[1])
+    keys = ("memberships", "actions", "agents")
+    assert [tuple(row[key] for key in keys) for row in rows] == [*product((3, 5), (4, 6), (2, 3))]
+    for row in rows:
+        m, a, n = (row[key] for key in keys)
+        assert row["rules"] == m**7
+        assert row["nested_exact"] == 450 * m**7 * sum(a ** (2 * i) for i in range(1, n + 1))
+        assert row["single_agent"] == 450 * m ** (7 * n) * a ** (2 * n)
+    of_csv = csv.DictReader(io.StringIO(said(*command, "--format", "csv")[1]))
+    assert [int(row["rules"]) for row in of_csv] == [row["rules"] for row in rows]
+    header, first, *_ = (line.split() for line in said(*command)[1].splitlines())
+    assert header[:5] == ["memberships", "rules", "actions", "n", "topology"]
+    assert first[:5] == ["3", "2,187", "4", "2", "chain"]
+    latex = said(*command, "--format", "latex")[1]
+    assert "memberships & rules & actions & n & topology & Eq. 18" in latex
+    assert r"5 & 78\,125 & 6 & 3 & chain & $1.687\times 10^{12}$" in latex
+    assert (
+        said("--agents", "2,3", "--memberships", "3,5", "--actions", "4:6:2")[1]
+        == said(*command)[1]
+    )
+    table = cost_table(["chain"], [2, 3], memberships=[3, 5], actions=[4, 6])
+    assert [row.nested_exact for row in table.rows] == [row["nested_exact"] for row in rows]
+    assert str(table) == said(*command)[1].rstrip("\n")
+
+
+def test_one_value_of_a_quantity_stands_below_the_table(said) -> None:
+    out = " ".join(said("--memberships", "3")[1].split())
+    assert "Rules |S| = 3^7 = 2,187, actions |A| = 4, iterations L = 450." in out
+    assert "memberships" not in out.partition("Operations")[0]
+    out = said("--rules", "9", "10", "--format", "csv")[1]
+    assert [row["memberships"] for row in csv.DictReader(io.StringIO(out))] == ["", ""]
+
+
+def test_what_was_measured_has_one_line_whatever_the_rules(said) -> None:
+    out = said("--agents", "1", "--actions", "4", "6", "--measured", "--network")[1]
+    assert len([line for line in out.splitlines() if line.split()[:2] == ["1", "chain"]]) == 2
+    (first, second) = cost_table(["chain"], [1], actions=[4, 6], measured=True).rows
+    assert first.measured is second.measured
+
+
+def test_a_graph_of_one_agent_is_measured() -> None:
+    for text in ("coordination-graph", "max-plus"):
+        measured = measure(text, 1)
+        assert measured is not None
+        assert measured.counted == step_formula(text, 1)
+
+
+def test_the_paper_s_numbers_are_reproduced() -> None:
+    """Section VII prints 2.45e12, which is Eq. 21 cut to three digits, and 1.1e27, rounded."""
+    (row,) = cost_table().rows
+    assert row.nested_asymptotic == 450 * 5**7 * 16**4 * Fraction(16, 15) == 2_457_600_000_000
+    assert str(row.nested_asymptotic)[:3] == "245"
+    assert f"{row.single_agent:.1e}" == "1.1e+27"
+
+
+@pytest.mark.parametrize("agents", ["2:4", "2:10", "1:16", "1:300"])
+def test_the_axis_of_operations_is_their_logarithm(said, agents, tmp_path, monkeypatch) -> None:
+    drawn = []
+    monkeypatch.setattr(figures, "write", lambda figure, path: drawn.append(figure))
+    names = ("chain", "best-response", "fitted-q", "hierarchy-ppo")
+    command = ("--agents", agents, "--topology", *names, "single-agent", "--plot", "cost.png")
+    assert said(*command)[0] == 0
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    assert axes.get_ylabel() == "log10(operations)"
+    shown = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert shown == [*names, "single agent (Eq. 23)"]
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        ticks = axis.get_majorticklocs()
+        assert sum(low <= tick <= high for tick in ticks) >= 3
+        labels = [label.get_text().replace(",", "") for label in axis.get_majorticklabels()]
+        assert list(map(float, labels)) == pytest.approx(ticks)
+        assert not len(axis.get_minorticklocs())
+    n = max(numbers("agents", [agents]))
+    lines = {line.get_color(): line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 1}
+    single = Fraction((78125 * 16) ** n * 450)
+    assert lines["black"][-1] == pytest.approx(math.log10(single.numerator))
+    assert len(lines) == 5
 
 
 @pytest.mark.parametrize(("agents", "is_said"), [("5", False), ("5:6", True)])

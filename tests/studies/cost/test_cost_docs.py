@@ -15,7 +15,7 @@ COMMANDS = [
     for page in PAGES.values()
     for block in re.findall(r"```sh\n(.*?)```", page, re.DOTALL)
     for line in block.splitlines()
-    if line.startswith("nested-agents ")
+    if line.startswith("./dev exec nested-agents ")
 ]
 LONG = ("--measured", "nested-agents run")
 
@@ -34,7 +34,7 @@ def test_a_documented_command_works(
     monkeypatch.chdir(tmp_path)
     (spec,) = re.findall(r"```toml\n(# arms.toml.*?)```", PAGES["cost"], re.DOTALL)
     (tmp_path / "arms.toml").write_text(spec)
-    assert main(shlex.split(command)[1:]) == 0
+    assert main(shlex.split(command)[3:]) == 0
     assert capsys.readouterr().out
 
 

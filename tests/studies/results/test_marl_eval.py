@@ -211,3 +211,29 @@ def test_what_is_none_is_refused_by_its_key(path, value, key, tmp_path, capsys) 
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert key in err
+
+
+def test_each_task_has_its_own_last_step(tmp_path: Path) -> None:
+    longer = SERIES | {"step_9": {"step_count": 900, "return": [9.0]}}
+    path = tmp_path / "tasks.json"
+    tasks = {
+        task: {name: {f"seed_{k}": own for k in range(3)} for name in ("A", "B")}
+        for task, own in (("short", SERIES), ("long", longer))
+    }
+    path.write_text(json.dumps({"env": tasks}))
+    comparison = na.load(path).compare()
+    means = {
+        line.condition: line.estimates["last step return"].value
+        for line in comparison.contrasts.table
+    }
+    assert {name: float(own) for name, own in means.items()} == {
+        "env/short, A": 4.0, "env/short, B": 4.0, "env/long, A": 9.0, "env/long, B": 9.0,
+    }  # fmt: skip
+
+
+def test_algorithms_that_share_no_step_are_refused(tmp_path: Path, capsys) -> None:
+    other = {"step_0": {"step_count": 50, "return": [1.0]}}
+    path = tmp_path / "runs.json"
+    path.write_text(json.dumps({"env": {"task": {"A": {"s": SERIES}, "B": {"s": other}}}}))
+    assert main(["compare", str(path)]) == 2
+    assert "return: most runs of every algorithm share no step_count" in capsys.readouterr().err

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from nested_agents.studies.results import laws
+from nested_agents.studies.results import curves, laws, samples
 from nested_agents.studies.results.analysis import Difference, adjust, verdict_lines
 from nested_agents.studies.results.notation import format_number
 from nested_agents.studies.results.power import (
@@ -66,10 +66,37 @@ def test_what_takes_too_many_seeds_is_said_to() -> None:
     assert seeds_for(0.001, 1.0) is None
 
 
-@pytest.mark.parametrize("wrong", [(0.0, 5, 1), (1.0, 0, 1), (1.0, 5, 0)])
-def test_what_is_no_study_is_refused(wrong: tuple[float, int, int]) -> None:
-    with pytest.raises(ValueError, match="allowed: above 0"):
-        power(0.2, *wrong)
+NAN, INFINITE = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize(
+    ("function", "argument", "value"),
+    [
+        *((power, "effect", value) for value in (NAN, INFINITE, -INFINITE)),
+        *((power, "deviation", value) for value in (0.0, -1.0, NAN, INFINITE)),
+        *((power, "seeds", value) for value in (0, -3, 10**9, 5.5, NAN)),
+        *((power, "comparisons", value) for value in (0, 10**9, 1.5)),
+        *((detectable, "deviation", value) for value in (0.0, NAN, INFINITE)),
+        *((detectable, "seeds", value) for value in (0, NAN)),
+        *((detectable, "wanted", value) for value in (0.0, 1.0, 2.0, NAN)),
+        *((seeds_for, "effect", value) for value in (NAN, INFINITE)),
+        *((seeds_for, "deviation", value) for value in (-0.1, NAN)),
+        *((seeds_for, "wanted", value) for value in (0.0, 1.0, -1.0, NAN)),
+    ],
+)
+def test_an_argument_out_of_range_is_named(function, argument, value) -> None:
+    valid = {"effect": 0.2, "deviation": 0.25, "seeds": 15}
+    names = function.__code__.co_varnames[: function.__code__.co_argcount]
+    given = {name: number for name, number in valid.items() if name in names}
+    with pytest.raises(ValueError, match=f"^{argument} = .*, allowed: ") as caught:
+        function(**{**given, argument: value})
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("ratio", [1e12, 1e300])
+def test_an_effect_of_many_deviations_is_detected_for_certain(ratio: float) -> None:
+    assert power(ratio, 1e-3, 6) == power(ratio, 1e-3, 40) == 1.0
+    assert seeds_for(ratio, 1e-3) == 6
 
 
 def test_the_deviation_is_pooled_and_of_rates_never_zero() -> None:
@@ -177,7 +204,7 @@ def test_told_exponents_are_found_as_often_as_promised() -> None:
     for _ in range(times):
         logs = 0.5 * rng.standard_normal((20, 4)) / 2.0**0.5
         others = 0.5 * rng.standard_normal((20, 4)) / 2.0**0.5 + least * np.log(sizes)
-        samples = [laws.of_numbers(sizes, np.exp(own)) for own in (others, logs)]
-        pair = [laws.fit(laws.POWER, sample, 2) for sample in samples]
+        both = [samples.of_numbers(sizes, np.exp(own)) for own in (others, logs)]
+        pair = [laws.fit(curves.POWER, sample, 2) for sample in both]
         hits += laws.compare(*pair).p < 0.05
     assert 0.74 < hits / times < 0.88

@@ -10,6 +10,7 @@ import pytest
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.results.published import MOST_VALUES
+from nested_agents.studies.store.database import RESULTS_VERSION
 
 SPEC = {
     "study": "learning-curve",
@@ -36,7 +37,7 @@ ARRAYS = {
     "spread_m": [[0.1, 0.2], [0.3, 0.4], [0.5, 1]],
 }
 SOUND = {
-    "results_version": 4,
+    "results_version": RESULTS_VERSION,
     "spec": SPEC,
     "columns": {"default": {"preset": "default"}, "random": {"preset": "random"}},
     "measures": MEASURES,

@@ -1,5 +1,8 @@
 """Laws of growth of published studies, by Python and by the command."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -64,6 +67,38 @@ def test_what_is_wrong_is_told_in_one_line(options, said) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("size", [0, 0.5, -1, float("nan"), float("inf")])
+def test_a_size_below_one_is_refused_and_named(size) -> None:
+    results = made_up({"chain": 1.0})
+    columns = {**results.columns, "chain, robots=2": {"topology": "chain", "scenario.robots": size}}
+    results = replace(results, columns=columns)
+    with pytest.raises(
+        SpecError, match=rf"robots = {size:g} \(condition .*allowed are sizes from 1"
+    ):
+        scaling_law(results, "steps")
+
+
+@pytest.mark.parametrize("size", [0, -3, 10**12])
+def test_a_predicted_size_out_of_range_is_refused(size) -> None:
+    with pytest.raises(SpecError, match=re.escape(f"predict = {size:g}: allowed are sizes from 1")):
+        scaling_law(made_up({"chain": 1.0}), "steps", predict=[size])
+
+
+@pytest.mark.filterwarnings("error")
+def test_rates_are_those_of_the_table() -> None:
+    """Of sizes 2, 4, 8 with one, two and three failures in twelve episodes a run."""
+    results = made_up({"chain": 0.9})
+    law = scaling_law(results, "success", predict=[1, 16])
+    fitted = law.fits[0].law
+    assert fitted is not None
+    expected = [results.values(c, "success").mean() for c in results.columns]
+    assert fitted.sample.means.tolist() == pytest.approx(expected)
+    assert fitted.held_out == () or fitted.held_out[-1][1] == pytest.approx(expected[-1])
+    for title in ("at 1 (90%)", "at 16 (90%)"):
+        e = law.table[0].estimates[title]
+        assert 0.0 <= e.low <= e.value <= e.high <= 1.0
+
+
 def test_two_sizes_or_one_seed_give_no_number() -> None:
     two = scaling_law(made_up({"chain": 1.0}, sizes=(2, 4)), "success", criterion=1.0)
     assert not two.table
@@ -89,6 +124,107 @@ def test_figures_of_a_report_are_of_measures_with_a_law() -> None:
     results = made_up({"chain": 3.0, "star": 5.0})
     assert list(growth_figures(results)) == ["growth of success"]
     assert growth_figures(made_up({"chain": 3.0}, sizes=(2, 4))) == {}
+
+
+CARTS = {
+    "preset": "random", "seeds": 3, "episodes": 2, "steps": 4, "evaluation": 1,
+    "scenario": {"kind": "line-up"}, "sweep": {"scenario.carts": [1, 2, 3]},
+}  # fmt: skip
+LATER = {k: v for k, v in CARTS.items() if k != "sweep"} | {
+    "scenario": {"kind": "line-up", "carts": 4}
+}
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Folders of a study of three sizes, of a later size, and of two that differ in more."""
+    root = tmp_path_factory.mktemp("joined")
+    specs = {
+        "three": CARTS, "later": LATER, "longer": {**LATER, "steps": 5},
+        "again": {**LATER, "scenario": {"kind": "line-up", "carts": 3}},
+    }  # fmt: skip
+    for name, spec in specs.items():
+        na.run(spec, root / name, jobs=1, progress=False)
+    return root
+
+
+def test_a_later_folder_joins_a_fit(folders, capsys) -> None:
+    places = [str(folders / name) for name in ("three", "later")]
+    assert main(["fit", *places, "--measure", "final_distance_m"]) == 0
+    assert "4 sizes from 1 to 4 carts" in " ".join(capsys.readouterr().out.split())
+    study = na.load(*places)
+    growth = na.scaling_law(study, "final_distance_m")
+    (fitted,) = growth.analysis.fits
+    assert fitted.law is not None
+    assert fitted.law.sample.sizes.tolist() == [1.0, 2.0, 3.0, 4.0]
+    values = study.episodes[study.episodes["phase"] == "evaluation"]
+    means = values.groupby("condition", sort=False)["final_distance_m"].mean().tolist()
+    assert fitted.law.sample.means.tolist() == pytest.approx(means)
+    named = na.scaling_law(na.load(*reversed(places)), "final_distance_m", size="carts")
+    assert named.analysis.fits[0].law.sample.sizes.tolist() == [1.0, 2.0, 3.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("others", "said"),
+    [
+        (("longer",), r"longer: steps = 5, but 4 in three: .*equal except for the size"),
+        (("again",), r"has the same settings as .*carts = 3"),
+        (("later", "longer"), r"longer: steps = 5, but 4 in three"),
+    ],
+)
+def test_folders_that_differ_in_more_than_the_size_are_refused(folders, others, said) -> None:
+    study = na.load(*(folders / name for name in ("three", *others)))
+    with pytest.raises(SpecError, match=said) as caught:
+        na.scaling_law(study, "final_distance_m")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_search_method_that_changes_is_remarked(tmp_path) -> None:
+    spec = {**CARTS, "preset": "default", "sweep": {"scenario.carts": [1, 2, 7]}}
+    growth = na.scaling_law(
+        na.run(spec, tmp_path / "a", jobs=1, progress=False), "final_distance_m"
+    )
+    (remark,) = growth.analysis.remarks
+    assert "exact from 1 carts, best-response from 7 carts" in remark
+    few = {**spec, "sweep": {"scenario.carts": [1, 2, 3]}}
+    assert (
+        na.scaling_law(na.run(few, tmp_path / "b", jobs=1, progress=False)).analysis.remarks == ()
+    )
+
+
+def table(path, sizes, of, seeds=4):
+    """Write a table of scores whose means are those of a law; deviations of seeds sum to zero."""
+    deviations = [0.9, 0.95, 1.05, 1.1]
+    rows = [f"{n},{seed},{of(n) * deviations[seed]}" for n in sizes for seed in range(seeds)]
+    path.write_text("\n".join(["agents,seed,score", *rows]) + "\n")
+    return str(path)
+
+
+def test_a_table_of_scores_is_fitted(tmp_path, capsys) -> None:
+    path = table(tmp_path / "scores.csv", (1, 2, 4, 8), lambda n: 3.0 * n**1.5)
+    assert main(["fit", path, "--columns", "condition=agents", "--predict", "16"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "power law, mean = 3 n^1.5 (4 seeds, 4 sizes from 1 to 8 agents)" in out
+    assert "192 [" in out
+    labeled = tmp_path / "labels.csv"
+    labeled.write_text((tmp_path / "scores.csv").read_text().replace("agents", "condition"))
+    assert main(["fit", str(labeled)]) == 0
+    assert "mean = 3 n^1.5 (4 seeds" in " ".join(capsys.readouterr().out.split())
+
+
+def test_tables_of_other_sizes_are_joined(tmp_path, capsys) -> None:
+    small = table(tmp_path / "small.csv", (1, 2), lambda n: 3.0 * n**1.5)
+    large = table(tmp_path / "large.csv", (4, 8), lambda n: 3.0 * n**1.5)
+    assert main(["fit", small, large, "--columns", "condition=agents"]) == 0
+    assert "mean = 3 n^1.5 (4 seeds, 4 sizes" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_table_with_a_size_below_one_is_refused(tmp_path, capsys) -> None:
+    path = table(tmp_path / "scores.csv", (0.5, 2, 4), lambda n: 3.0 * n**1.5)
+    assert main(["fit", path, "--columns", "condition=agents"]) == 2
+    error = capsys.readouterr().err
+    assert "agents = 0.5" in error
+    assert error.count("\n") == 1
 
 
 def test_the_published_study_of_scaling_by_command_and_in_python(capsys, tmp_path) -> None:

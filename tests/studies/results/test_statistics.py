@@ -162,6 +162,29 @@ def test_what_cannot_be_estimated_is_refused(values):
         bootstrap(values)
 
 
+@pytest.mark.parametrize(
+    ("function", "values", "options", "named"),
+    [
+        (rate, [[0, 2]], {}, r"outcomes\[0, 1\] = 2.0"),
+        (rate, [[1], [-0.5]], {}, r"outcomes\[1, 0\] = -0.5"),
+        (rate, [[1], [np.nan]], {}, r"outcomes\[1, 0\] = nan"),
+        (rate, [[1], [0]], {"level": 1.0}, "level = 1.0"),
+        (rate, [[1], [0]], {"level": np.nan}, "level = nan"),
+        (bootstrap, [1.0, np.inf], {}, r"values\[1\] = inf"),
+        (bootstrap, [[1.0], [np.nan]], {}, r"values\[1, 0\] = nan"),
+        (bootstrap, [1.0, 2.0], {"level": 95.0}, "level = 95.0"),
+        (bootstrap, [1.0, 2.0], {"resamples": 0}, "resamples = 0"),
+        (bootstrap, [1.0, 2.0], {"resamples": 1.5}, "resamples = 1.5"),
+        (bootstrap, [1.0, 2.0], {"seed": -1}, "seed = -1"),
+        (bootstrap, [1.0, 2.0], {"bounds": (1.0, 0.0)}, "bounds = "),
+        (bootstrap, [1.0, 2.0], {"bounds": (np.nan, 1.0)}, "bounds = "),
+    ],
+)
+def test_an_argument_out_of_range_is_named(function, values, options, named) -> None:
+    with pytest.raises(ValueError, match=f"^{named}.*, allowed: "):
+        function(values, **options)
+
+
 @pytest.mark.parametrize("shape", [(25,), (24, 1), (30, 7)])
 def test_how_resamples_lie_in_memory_changes_no_bit(shape):
     values = RNG.normal(size=shape)

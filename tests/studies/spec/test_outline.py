@@ -20,7 +20,8 @@ def test_all_that_computes_is_known_and_pictures_are_not() -> None:
     known = outline.modules()
     assert {"core/agents/team.py", "scenarios/box_pushing/states/relational.py"} <= known.keys()
     assert not [name for name in known if "pictures" in name or name.endswith("figure.py")]
-    assert outline.changed(outline.present()) == []
+    here = outline.present(None, {}, {})
+    assert outline.changed(here, outline.present(here, {}, {})) == []
 
 
 @pytest.mark.parametrize(
@@ -30,11 +31,12 @@ def test_what_means_the_same_has_not_changed(
     text: str | None, changed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(outline, "modules", lambda: MODULES)
-    known = outline.present()
+    known = outline.present(None, {}, {})
     later = {**MODULES, "core/team.py": text} if text is not None else {"core/loop.py": "pass"}
     later["core/loop.py"] = MODULES["core/loop.py"]
     monkeypatch.setattr(outline, "modules", lambda: later)
-    assert outline.changed(known) == ["core/team.py"] * changed
+    here = outline.present(known, {}, {})
+    assert outline.changed(known, here) == ["core/team.py"] * changed
 
 
 def test_packages_that_offer_things_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,15 +74,9 @@ def test_rows_of_two_codes_are_mixed_only_if_asked_for(
     assert len(set(codes)) == 2
 
 
-def test_earlier_code_of_the_same_results_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_modules_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     old = {"core/a.py": ("0", "1"), "studies/trials/b.py": ("2", "3"), "plugin/c.py": ("4", "5")}
     here = {"core/d.py": ("6", "7"), "plugin/c.py": ("4", "5")}
-    monkeypatch.setattr(outline, "present", lambda known=None: here)
-    store = SimpleNamespace(code=lambda: old, directory="out")
+    monkeypatch.setattr(outline, "present", lambda *_: here)
+    store = SimpleNamespace(code=lambda: old, spec=dict, sources=dict, directory="out")
     assert "core/a.py and 2 more have changed" in outline.outdated(store)
-    monkeypatch.setattr(outline, "SAME_RESULTS", {outline.fingerprint(old)})
-    assert outline.outdated(store) is None
-    here["plugin/c.py"] = ("8", "9")  # a package that offers something has changed, too
-    assert "plugin/c.py has changed" in outline.outdated(store)
-    old["core/a.py"] = ("0", "other")
-    assert "core/a.py" in outline.outdated(store)

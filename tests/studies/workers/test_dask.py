@@ -149,7 +149,7 @@ def test_dask_not_installed_is_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert run(tmp_path) == 2
     err = capsys.readouterr().err
-    assert "distributed is not installed; pip install 'nested-agents[dask]'" in err
+    assert "distributed is not installed; pip install dask distributed" in err
 
 
 def attempt(workers, tmp_path):

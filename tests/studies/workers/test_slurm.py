@@ -42,6 +42,9 @@ def test_a_killed_array_that_is_submitted_again_ends_with_the_bytes_of_a_serial_
     sbatch.parent.mkdir()
     sbatch.write_text(SBATCH.format(python=sys.executable, spool=tmp_path / "bin"))
     sbatch.chmod(0o700)
+    dev = tmp_path / "dev"  # as in a checkout
+    dev.write_text('#!/bin/sh\nshift\nexec "$@"\n')
+    dev.chmod(0o700)
     mark = tmp_path / "mark"
     monkeypatch.chdir(tmp_path)
     assert main(["run", "study.toml", "--out", "serial", "--jobs", "1", "--set", "seeds=2"]) == 0

@@ -1,0 +1,123 @@
+"""Every exported file of every installed study is read to the verdict of the study itself."""
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import made_up
+import pytest
+
+import nested_agents as na
+from nested_agents.studies import catalogue
+from nested_agents.studies.api.study import StudyResults
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.errors import SpecError
+from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.studies import NAMES
+from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
+from nested_agents.studies.workers.runner import save
+
+FILES = {
+    "csv": "episodes.csv",
+    "parquet": "episodes.parquet",
+    "json": "results.json",
+    "marl-eval": "marl-eval.json",
+}
+DECISIONS = 5
+
+
+def spec_of(study: str) -> Spec:
+    """Return the spec of a study of the catalogue with few conditions, seeds and episodes."""
+    name = study.replace("-", "_")
+    path = Path(catalogue.__file__).parent / name / f"{name}.toml"
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    table |= {"seeds": 5, "steps": 5}
+    if study != "wheel-failure":  # whose failure begins in episode 20
+        table |= {"episodes": 6}
+    if study == "experience":
+        table |= {"decisions": 10_000}
+    return Spec.of(table)
+
+
+def measured(trial: Trial) -> TrialResult:
+    """Return made-up results; a study by decisions has fewer episodes with some seeds."""
+    result = made_up.measure(trial)
+    if trial.study == "experience":
+        kept = DECISIONS - trial.seed % 3
+        rows = [row for row in result.rows if row.phase != "training" or row.episode < kept]
+        result = replace(result, rows=tuple(rows), numbers={"decisions": 10_000.0})
+    return result
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def study(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study two of whose trials failed, with all its exported files."""
+    directory = tmp_path_factory.mktemp(request.param) / "out"
+    spec = spec_of(request.param)
+    first, *others = trials_of(spec)
+    with made_up.opened(directory, spec) as store:
+        for trial in others[:-1]:
+            save(store, trial, measured(trial), 2.5)
+        for trial in (first, others[-1]):
+            store.fail(trial, "Traceback\nRuntimeError: a wheel came off\n")
+    return directory
+
+
+def verdict(study: StudyResults, **options: str) -> str:
+    """Return the table and the verdicts of a comparison."""
+    contrasts = study.compare(**options).contrasts
+    return "\n".join([str(tabulate(contrasts.table)), *contrasts.notes])
+
+
+@pytest.mark.parametrize("form", FILES)
+def test_exported_files_give_the_verdict_of_the_study(study: Path, form: str) -> None:
+    assert main(["export", str(study), "--format", form]) == 0
+    kept, read = na.load(study), na.load(study / "export" / FILES[form])
+    names = {kept.results.main.name, "steps"}
+    names |= {"final_distance_m"} & {m.name for m in read.results.measures}
+    for phase in kept.results.phases:
+        for name in names:
+            expected = verdict(kept, measure=name, phase=phase)
+            assert verdict(read, measure=name, phase=phase) == expected
+    assert verdict(read) == verdict(kept)
+
+
+def test_exported_trials_give_the_verdict_of_the_study(study: Path, tmp_path: Path) -> None:
+    assert main(["export", str(study), "--out", str(tmp_path)]) == 0
+    expected = na.load(study).compare(measure="seconds.total")
+    comparison = na.load(tmp_path / "trials.csv").compare(measure="seconds.total")
+    assert comparison.contrasts.notes == expected.contrasts.notes
+    assert "2 of" in comparison.remarks[0]
+    with pytest.raises(SpecError, match=r"measure = 'success': known: .*seconds\.total"):
+        na.load(tmp_path / "trials.csv").compare(measure="success")
+
+
+def test_a_table_without_its_description_gives_the_same_verdict(study: Path, tmp_path) -> None:
+    assert main(["export", str(study), "--out", str(tmp_path)]) == 0
+    (tmp_path / "study.json").unlink()
+    read = na.load(tmp_path / "episodes.csv")
+    assert read.compare().contrasts.notes == na.load(study).compare().contrasts.notes
+    assert any("study.json" in remark for remark in read.remarks)
+    asked = na.load(tmp_path / "episodes.csv", columns=["score=success"])
+    assert verdict(asked) == verdict(read, measure="success")
+
+
+def test_mixed_swept_values_are_written_and_read(tmp_path: Path, capsys) -> None:
+    pytest.importorskip("pyarrow", reason="extra [parquet]")
+    spec = Spec.of(
+        {
+            "seeds": 3, "episodes": 1, "steps": 2, "evaluation": 1, "preset": "random",
+            "overrides": [
+                {"name": "a", "sweep": {"scenario": {"box": ["square", "disc"]}}},
+                {"name": "b", "sweep": {"scenario": {"robots": [2, 3]}}},
+            ],
+        }
+    )  # fmt: skip
+    with made_up.opened(tmp_path / "out", spec) as store:
+        for trial in trials_of(spec):
+            save(store, trial, made_up.measure(trial), 1.0)
+    for form, name in FILES.items():
+        assert main(["export", str(tmp_path / "out"), "--format", form]) == 0
+        read = na.load(tmp_path / "out" / "export" / name)
+        assert verdict(read) == verdict(na.load(tmp_path / "out"))
