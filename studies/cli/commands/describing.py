@@ -19,7 +19,7 @@ from ..display import print_data, print_text, print_wrapped
 if TYPE_CHECKING:
     from ....core.agents.joint import Granularity
     from ....topologies import view
-    from ...cost import table as costs
+    from ...cost.formats import Form as CostForm
 
 
 @click.command()
@@ -166,7 +166,7 @@ def cost(
     measured: bool,
     repeats: int | None,
     network: bool,
-    form: costs.Form,
+    form: CostForm,
     plot: Path | None,
     **typed: Unpack[QuantityOptions],
 ) -> int:
@@ -175,6 +175,7 @@ def cost(
     Several numbers of agents, rules and actions give a row for each combination.
     """
     from ...cost import table as costs
+    from ...cost.formats import format_rows
     from ...presentation.progress import say
 
     with refused():
@@ -202,7 +203,7 @@ def cost(
         ).rows
         if plot is not None:
             draw(rows, plot)
-    print_data(f"{costs.format_rows(rows, form)}\n")
+    print_data(f"{format_rows(rows, form)}\n")
     return 0
 
 

@@ -26,7 +26,8 @@ from nested_agents.studies.cost.cost import (
     step_formula,
 )
 from nested_agents.studies.cost.figure import draw
-from nested_agents.studies.cost.table import cost_table, format_rows
+from nested_agents.studies.cost.formats import format_rows
+from nested_agents.studies.cost.table import cost_table
 from nested_agents.studies.presentation import figures
 
 FIVE = ("chain", "teams", "tree:2", "star", "independent")
