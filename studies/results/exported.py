@@ -47,27 +47,27 @@ def is_exported(table: ScoreTable) -> bool:
 
 
 def results_of(table: ScoreTable, known: Description | None) -> Exported:
-    """Return the results of an exported table.
+    """Return the results of an exported table, in any order of its rows and columns.
 
     Raises
     ------
     SpecError
         If a cell is not what was exported; one line names its line and column.
     """
-    conditions, labels = _conditions(table, known)
+    labels = table.filled("condition")
+    swept = _swept(table, labels, known)
+    conditions, labels = _conditions(table, labels, swept, known)
     if {*TRIALS} <= {*table.columns}:
-        return _trials(table, conditions, labels)
-    frame = pd.DataFrame(
-        {
-            "condition": labels,
-            "phase": table.filled("phase"),
-            "seed": whole_names(table.filled("seed")),
-            "episode": _whole(table, "episode"),
-        }
-    )
-    names = table.columns[table.columns.index("steps") + 1 :]
+        return _trials(table, conditions, labels, swept)
+    keys = {
+        "condition": labels,
+        "phase": table.filled("phase"),
+        "seed": whole_names(table.filled("seed")),
+        "episode": _whole(table, "episode"),
+    }
+    names = [name for name in table.columns if name not in (*EPISODES, *swept)]
     values = {name: table.numbers(name) for name in names}
-    frame = frame.assign(steps=_whole(table, "steps"), **values)
+    frame = pd.DataFrame({**keys, "steps": _whole(table, "steps"), **values})
     refuse_repeated(table, frame, {key: key for key in KEYS})
     notes: list[str] = []
     if known is None:
@@ -77,12 +77,15 @@ def results_of(table: ScoreTable, known: Description | None) -> Exported:
     return Exported(pack(frame, conditions, measures), conditions, tuple(notes))
 
 
-def _trials(table: ScoreTable, conditions: Mapping[str, SpecTable], labels: pd.Series) -> Exported:
+def _trials(
+    table: ScoreTable,
+    conditions: Mapping[str, SpecTable],
+    labels: pd.Series,
+    swept: Sequence[str],
+) -> Exported:
     """Return the numbers of whole trials; those of trials that have not finished are left out."""
-    names = table.columns
-    swept = names[names.index("condition") + 1 : names.index("seed")]
     frame = pd.DataFrame({"condition": labels, "seed": whole_names(table.filled("seed"))})
-    numbers = [n for n in names if n not in (*TRIAL_COLUMNS, *swept)]
+    numbers = [name for name in table.columns if name not in (*TRIAL_COLUMNS, *swept)]
     frame = frame.assign(
         state=table.filled("state"), **{name: table.numbers(name) for name in numbers}
     )
@@ -93,11 +96,28 @@ def _trials(table: ScoreTable, conditions: Mapping[str, SpecTable], labels: pd.S
     return Exported(results, conditions, (note,) if unfinished else ())
 
 
+def _swept(table: ScoreTable, labels: pd.Series, known: Description | None) -> list[str]:
+    """Return the columns that are swept keys.
+
+    Where the study is not known, these are the columns before the seed or, if columns are in
+    another order, those that are constant within each condition.
+    """
+    names = table.columns
+    if known is not None:
+        keys = {key for row in known.conditions.values() for key in row}
+        return [name for name in names if name in keys]
+    first, seed = names.index("condition"), names.index("seed")
+    if first == 0 and [n for n in names if n in EPISODES] in ([*EPISODES], ["condition", "seed"]):
+        return names[1:seed]
+    others = [n for n in names if n not in (*EPISODES, *TRIAL_COLUMNS, SUCCESS.name, RETURN.name)]
+    groups = {name: table.text(name).groupby(labels).nunique() for name in others}
+    return [name for name, counts in groups.items() if (counts == 1).all()]
+
+
 def _conditions(
-    table: ScoreTable, known: Description | None
+    table: ScoreTable, labels: pd.Series, swept: Sequence[str], known: Description | None
 ) -> tuple[Mapping[str, SpecTable], pd.Series]:
     """Return the conditions with their swept keys, and the label of each row."""
-    labels = table.filled("condition")
     if known is not None:
         written = {str(harmless(condition)): condition for condition in known.conditions}
         strange = ~labels.isin(list(written)).to_numpy()
@@ -106,8 +126,6 @@ def _conditions(
             allowed = "a condition of study.json beside it"
             raise table.refusal(row, "condition", labels[row], allowed)
         return known.conditions, labels.map(written)
-    names = table.columns
-    swept = names[names.index("condition") + 1 : names.index("seed")]
     levels = pd.DataFrame({key: plain_levels(table.text(key)) for key in swept}, labels.index)
     rows = levels.assign(condition=labels).drop_duplicates("condition").to_dict("records")
     return {row.pop("condition"): row for row in rows}, labels

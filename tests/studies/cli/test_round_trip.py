@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import made_up
+import pandas as pd
 import pytest
 
 import nested_agents as na
@@ -91,6 +92,18 @@ def test_exported_trials_give_the_verdict_of_the_study(study: Path, tmp_path: Pa
     assert "2 of" in comparison.remarks[0]
     with pytest.raises(SpecError, match=r"measure = 'success': known: .*seconds\.total"):
         na.load(tmp_path / "trials.csv").compare(measure="success")
+
+
+def test_the_order_of_rows_and_columns_does_not_matter(study: Path, tmp_path: Path) -> None:
+    assert main(["export", str(study), "--out", str(tmp_path)]) == 0
+    path = tmp_path / "episodes.csv"
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    shuffled = table.sample(frac=1.0, random_state=1)[[*reversed(table.columns)]]
+    shuffled.to_csv(path, index=False)
+    assert verdict(na.load(path)) == verdict(na.load(study))
+    (tmp_path / "study.json").unlink()
+    first = na.load(study).conditions[0]
+    assert verdict(na.load(path), reference=first).splitlines()[-1:]
 
 
 def test_a_table_without_its_description_gives_the_same_verdict(study: Path, tmp_path) -> None:
