@@ -74,7 +74,9 @@ def check_command(words: list[str]) -> list[str]:
         return []
     program, *arguments = words[2:]
     if program == "nested-agents":
-        parse(nested_agents, click.Context(nested_agents), arguments)
+        parse(
+            nested_agents, click.Context(nested_agents, **nested_agents.context_settings), arguments
+        )
         return arguments
     assert program in ("python", "pip", "dask"), words
     if program == "python":

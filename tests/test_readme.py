@@ -26,9 +26,8 @@ def test_the_tagline_is_the_same_everywhere() -> None:
 
 def test_the_table_of_the_readme_is_published(capsys: pytest.CaptureFixture[str]) -> None:
     edges = RESULTS / "edges.json"
-    assert (
-        main(["table", str(edges), "--columns", "evaluation success", "--format", "markdown"]) == 0
-    )
+    line = ["table", str(edges), "--columns", "evaluation success", "--format", "markdown"]
+    assert main([*line, "--trust"]) == 0
     cells = dict(re.findall(r"\| (.*?) \| 20 \| (.*?) \|", capsys.readouterr().out))
     entries = (
         "as trained",

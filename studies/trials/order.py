@@ -48,8 +48,13 @@ def _programs(trial: Trial) -> list[str]:
 
 
 def _shortened(trial: Trial, steps: int) -> Trial:
+    """Return a short trial in one environment, as a budget of episodes needs."""
+    learner = trial.settings.learner
+    if learner.n_environments > 1:
+        learner = learner.model_copy(update={"environments": 1})
     return replace(
         trial,
+        settings=trial.settings.model_copy(update={"learner": learner}),
         episodes=EPISODES,
         steps=min(steps, trial.steps),
         evaluation=1,

@@ -122,7 +122,7 @@ def _leave_out_same(table: Sequence[Summary]) -> None:
 def _of_evaluations(results: Results) -> Analysis:
     """Estimate what was measured after training: results of other tools may have no more."""
     estimates: dict[str, dict[str, Estimate]] = {c: {} for c in results.conditions}
-    for m in results.measures:
+    for m in results.measures if results.conditions else ():
         _, values, _ = values_by_seed(results, m.name)
         for condition, own in values.items():
             estimates[condition][m.heading] = mean_estimate(m, own)
