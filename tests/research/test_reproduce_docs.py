@@ -7,8 +7,8 @@ import pytest
 from programs import main
 
 from nested_agents.studies.results import published
-from nested_agents.studies.store.database import RESULTS_VERSION
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.database import RESULTS_VERSION
 from research import RESULTS
 
 ROOT = Path(__file__).resolve().parents[2]
