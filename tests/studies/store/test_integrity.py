@@ -6,7 +6,6 @@ import sqlite3
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import made_up
 import pytest
@@ -432,33 +431,17 @@ def test_a_damaged_copy_of_the_spec_is_no_other_study(study, before, after, caps
     assert f"it is damaged: nested-agents retry {study} goes on by the database" in error
 
 
-def test_a_study_of_a_newer_version_is_refused_and_left_as_it_is(study, capsys):
-    change(study, "UPDATE meta SET value = '99' WHERE key = 'results_version'")
+@pytest.mark.parametrize("version", [1, 99])
+def test_a_study_of_another_version_is_refused_and_left_as_it_is(version, study, capsys):
+    change(study, "UPDATE meta SET value = ? WHERE key = 'results_version'", str(version))
     before = (study / DATABASE).read_bytes()
-    with pytest.raises(SpecError, match="holds results of version 99, this is version"):
+    with pytest.raises(SpecError, match=f"holds results of version {version}, this is version"):
         finish(study)
     for command in ("results", "table", "status"):
         assert main([command, str(study)]) == 2
-        assert "holds results of version 99" in capsys.readouterr().err
+        assert f"holds results of version {version}" in capsys.readouterr().err
     assert (study / DATABASE).read_bytes() == before
     assert not list(study.glob("*.damaged-*"))
-
-
-def test_a_study_of_version_0_3_0_is_read_as_before(tmp_path, capsys):
-    dump = Path(__file__).with_name("version_0_3_0.sql").read_text(encoding="utf-8")
-    with sqlite3.connect(tmp_path / DATABASE) as db:
-        db.executescript(dump)
-    db.close()
-    with Store.open(tmp_path) as store:
-        store.verify()
-        assert store.counts() == {"done": 4, "failed": 0}
-        assert len(list(store.episodes()[1])) == 4 * 3
-    assert main(["results", str(tmp_path), "--format", "csv"]) == 0
-    first = capsys.readouterr().out.splitlines()[1]
-    assert first == (
-        "default,default,0,training,0,6,0,0.9644814481842697,0.8611634842064431,"
-        "-0.009279672728450386"
-    )
 
 
 WITH_LITTLE_MEMORY = """
