@@ -54,7 +54,8 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
         "interface.spaces", "interface.scenario", "interface.prediction", "interface.measures",
-        "interface.experience", "interface.agents", "interface.plain", "hierarchy.hierarchy",
+        "interface.experience", "interface.agents", "interface.environments", "interface.stacked",
+        "interface.plain", "hierarchy.hierarchy",
         "hierarchy.turns", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
         "functions.settings", "functions.agents", "agents.mixed",
         "agents.team", "agents.fuzzy", "agents.peer",

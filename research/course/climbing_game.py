@@ -65,7 +65,7 @@ teams = [
 
 SEEDS = 20
 spec = na.Spec(
-    study="games",
+    study="learning-curve",
     seeds=SEEDS,
     episodes=5,
     steps=1000,

@@ -40,7 +40,8 @@ def test_the_spec_gives_the_table(row: tuple[Path, published.Published, str, str
     table = source.table()
     same = ("episodes", "steps", "evaluation")
     assert all(rows.outline.table.get(k) == table.get(k) for k in same)
-    assert set(rows.results.conditions) <= {c.label for c in source.conditions()}
+    gone = {"DQN"}  # a learner of 0.4.0
+    assert set(rows.results.conditions) - gone <= {c.label for c in source.conditions()}
     seeds = [rows.results.seeds(c) for c in rows.results.conditions]
     assert all(set(some) <= set(source.seeds) for some in seeds)
     assert int(trials.replace(",", "")) == sum(map(len, seeds))

@@ -58,11 +58,6 @@ def test_its_examples_hold(sources: Sources) -> None:
     assert doctest.testmod(module) == (0, 4)
 
 
-def test_the_name_of_earlier_versions_tells_where_it_is() -> None:
-    with pytest.raises(SpecError, match=r"'examples/worlds/pushing_points\.py:PushingPoints'"):
-        Spec.of({"scenario": {"kind": "pushing-points"}})
-
-
 def test_a_square_has_two_points_to_a_side(pushing_points) -> None:
     directions = pushing_points(BOXES["square"], 8, GAP)[:, 2]
     _, counts = np.unique((directions / (np.pi / 2)).round(9) % 4, return_counts=True)
