@@ -41,7 +41,6 @@ def test_effects_are_means_over_settings() -> None:
     text = " ".join(" ".join(lines_of({"star": (success, decisions)}, "chain")).split())
     assert "star (2 settings): success -0.25 [-0.25, -0.25]" in text
     assert "decisions x1.5 [1.5, 1.5], p = 0.004: different" in text
-    assert any(note.startswith("All settings together") for note in analysis.notes)
 
 
 def test_who_never_succeeds_is_left_out() -> None:

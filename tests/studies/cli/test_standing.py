@@ -86,7 +86,7 @@ def test_failed_and_damaged_trials_are_counted_once(study, capsys):
 
 
 def test_what_other_code_has_done_is_done(study, monkeypatch, capsys):
-    monkeypatch.setattr(outline, "changed", lambda known: ["core/a.py"])
+    monkeypatch.setattr(outline, "changed", lambda *known: ["core/a.py"])
     now = read(study)
     assert (now.done, now.left, now.seconds) == (4, 2, None)
     assert main(["status", str(study)]) == 0
