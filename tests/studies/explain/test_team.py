@@ -272,7 +272,7 @@ def test_rules_in_words():
     agents = ["robot1.left", "robot1.front-right"]
     lines = rules_table(rules, VARIABLES, agents, parts).splitlines()
     assert [line.split() for line in lines[:2]] == [["robot1", "robot1"], ["left", "front-right"]]
-    assert lines[2].split() == ["gap,", "share", "of", "the", "variance", "100", "%", "100", "%"]
+    assert lines[2].split() == ["gap,", "share", "of", "the", "variance", "100%", "100%"]
     assert lines[3].split() == ["IF", "gap", "is", "touching,", "0", "m:", "+2.00", "+4.00"]
     assert lines[5].split() == ["IF", "gap", "is", "far,", "1", "m:", "-2.00", "-4.00"]
 
