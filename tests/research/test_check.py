@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 import pytest
+
 from nested_agents import Spec
 from nested_agents.analysis import Estimate
-
 from research import RESULTS, check
 
 TABLES = sorted(path.stem for path in RESULTS.glob("*.json"))
