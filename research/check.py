@@ -36,7 +36,7 @@ Spec = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Check:
+class Rerun:
     """A condition of a published table that can be rerun."""
 
     name: str
@@ -47,7 +47,7 @@ class Check:
     """The spec of that condition with these seeds."""
 
 
-def find_condition(name: str, max_minutes: float) -> Check | None:
+def find_condition(name: str, max_minutes: float) -> Rerun | None:
     """Return the first condition of which enough seeds fit, or None without `MIN_SEEDS`."""
     published = json.loads((RESULTS / f"{name}.json").read_text())
     seconds = {
@@ -64,7 +64,7 @@ def find_condition(name: str, max_minutes: float) -> Check | None:
     if n_seeds < MIN_SEEDS:
         return None
     seeds = tuple(published["seeds"][condition][:n_seeds])
-    return Check(
+    return Rerun(
         name,
         condition,
         seeds,
@@ -103,23 +103,23 @@ def agree(published: Estimate, new: Estimate) -> bool:
     return new.low <= published.value <= new.high and published.low <= new.value <= published.high
 
 
-def lines(check: Check, out: Path, jobs: int | None) -> Iterator[str]:
+def lines(rerun: Rerun, out: Path, jobs: int | None) -> Iterator[str]:
     """Rerun a condition, and yield a row of the table for each of its estimates."""
-    study = na.run(check.spec, out / check.name, jobs=jobs, progress=False)
+    study = na.run(rerun.spec, out / rerun.name, jobs=jobs, progress=False)
     (condition,) = study.results.conditions
-    chosen = " or ".join(f"seed == {seed}" for seed in check.seeds)
-    published = estimates(load(check.name).where(chosen).results, check.condition)
+    chosen = " or ".join(f"seed == {seed}" for seed in rerun.seeds)
+    published = estimates(load(rerun.name).where(chosen).results, rerun.condition)
     for title, new in estimates(study.results, condition).items():
         old = published[title]
         verdict = "agree" if agree(old, new) else "**disagree**"
         yield (
-            f"| {check.name} | {check.condition} | {len(check.seeds)} | {title} "
+            f"| {rerun.name} | {rerun.condition} | {len(rerun.seeds)} | {title} "
             f"| {format_estimate(old)} | {format_estimate(new)} | {verdict} |"
         )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Check the tables named, by default all, and return 1 if any estimate disagrees."""
+    """Rerun the tables named, by default all, and return 1 if any estimate disagrees."""
     parser = argparse.ArgumentParser(prog="python -m research.check", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="published tables; default all")
     parser.add_argument("--out", type=Path, default=Path("out/check"), help="folder of the runs")
@@ -130,11 +130,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print_lines(HEADER)
     disagrees = False
     for name in names:
-        check = find_condition(name, options.minutes)
-        if check is None:
+        rerun = find_condition(name, options.minutes)
+        if rerun is None:
             print_lines([f"| {name} | | | | | | not run |"])
             continue
-        for line in lines(check, options.out, options.jobs):
+        for line in lines(rerun, options.out, options.jobs):
             print_lines([line])
             disagrees |= "disagree" in line
     return int(disagrees)
