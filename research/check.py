@@ -36,7 +36,7 @@ Spec = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Rerun:
+class PublishedCondition:
     """A condition of a published table that can be rerun."""
 
     name: str
@@ -47,7 +47,7 @@ class Rerun:
     """The spec of that condition with these seeds."""
 
 
-def find_condition(name: str, max_minutes: float) -> Rerun | None:
+def find_condition(name: str, max_minutes: float) -> PublishedCondition | None:
     """Return the first condition of which enough seeds fit, or None without `MIN_SEEDS`."""
     published = json.loads((RESULTS / f"{name}.json").read_text())
     seconds = {
@@ -64,7 +64,7 @@ def find_condition(name: str, max_minutes: float) -> Rerun | None:
     if n_seeds < MIN_SEEDS:
         return None
     seeds = tuple(published["seeds"][condition][:n_seeds])
-    return Rerun(
+    return PublishedCondition(
         name,
         condition,
         seeds,
@@ -103,7 +103,7 @@ def agree(published: Estimate, new: Estimate) -> bool:
     return new.low <= published.value <= new.high and published.low <= new.value <= published.high
 
 
-def lines(rerun: Rerun, out: Path, jobs: int | None) -> Iterator[str]:
+def lines(rerun: PublishedCondition, out: Path, jobs: int | None) -> Iterator[str]:
     """Rerun a condition, and yield a row of the table for each of its estimates."""
     study = na.run(rerun.spec, out / rerun.name, jobs=jobs, progress=False)
     (condition,) = study.results.conditions
