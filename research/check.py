@@ -9,6 +9,7 @@ check. A table that is not rerun, because too few seeds fit into the time, is na
 
 import argparse
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,7 +74,10 @@ def find_condition(name: str, max_minutes: float) -> PublishedCondition | None:
 
 
 def select_condition(spec: Spec, column: Spec) -> dict[str, Any]:
-    """Return the spec of one condition: its override and one value for each swept key."""
+    """Return the spec of one condition: its override and one value for each swept key.
+
+    Files are named relative to the published table, and in the returned spec by their full path.
+    """
     matching = [
         narrow_sweep(override, column)
         for override in spec.get("overrides", [])
@@ -81,9 +85,12 @@ def select_condition(spec: Spec, column: Spec) -> dict[str, Any]:
         and all(column[key] in values for key, values in override.get("sweep", {}).items())
     ]
     selected = narrow_sweep(spec, column) | {"overrides": matching}
-    if spec["study"].startswith("../"):
-        selected["study"] = str((RESULTS / spec["study"]).resolve())
-    return {key: value for key, value in selected.items() if value not in ({}, [])}
+    text = json.dumps({key: value for key, value in selected.items() if value not in ({}, [])})
+    files = re.compile(r'(?<=")\.\./[^"]*(?=\.py:)')
+    table: dict[str, Any] = json.loads(
+        files.sub(lambda path: str((RESULTS / path[0]).resolve()), text)
+    )
+    return table
 
 
 def narrow_sweep(table: Spec, column: Spec) -> dict[str, Any]:

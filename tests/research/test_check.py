@@ -1,6 +1,8 @@
 """Tests of the program that reruns published conditions."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -49,3 +51,12 @@ def test_estimates_agree_if_each_lies_in_the_interval_of_the_other():
     assert check.agree(wide, Estimate(0.6, 0.4, 0.9))
     assert not check.agree(wide, narrow)
     assert not check.agree(narrow, wide)
+
+
+@pytest.mark.parametrize("name", ["aloha", "edges", "related-boxes"])
+def test_files_that_a_table_names_are_found(name):
+    published = json.loads((RESULTS / f"{name}.json").read_text())
+    for condition, column in published["columns"].items():
+        text = json.dumps(check.select_condition(published["spec"], column))
+        for path in re.findall(r'"([^"]*\.py):', text):
+            assert Path(path).is_file(), condition
