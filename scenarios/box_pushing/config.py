@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from ...core.plugins.settings import Positive, ScenarioSettings, team_size
 from ..state_variables import names_of
 from .prediction.settings import BeliefSettings
-from .states.relational import STATE_VARIABLES
+from .states.variables import STATE_VARIABLES
 from .world.settings import (
     CONTROL_PERIOD,
     BoxSettings,
