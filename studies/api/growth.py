@@ -113,7 +113,7 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
     columns = laws_of_results.columns_of(results)
     key = laws_of_results.size_key(columns, size)
     groups: dict[str, list[tuple[float, str]]] = {}
-    for condition, settings in _condition_settings(study).items():
+    for condition, settings in condition_settings(study).items():
         if condition in columns:
             row = columns[condition]
             with study._sources.active(), suppress(ValueError, ImportError):
@@ -137,7 +137,7 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
     return tuple(remarks)
 
 
-def _condition_settings(study: StudyResults) -> dict[str, ConditionSettings]:
+def condition_settings(study: StudyResults) -> dict[str, ConditionSettings]:
     """Return the settings of each condition, as far as they can be read."""
     settings: dict[str, ConditionSettings] = {}
     with study._sources.active(), suppress(ValueError, KeyError, ImportError):

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from ...core.agents.team import Team
     from ...core.interface.scenario import Scenario
     from .explaining import TeamExplanation
+    from .scalability import ScalabilityReport
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -255,6 +256,12 @@ class StudyResults:
         if name is not None and name not in figures:
             raise SpecError(f"figure = {name!r}: {closest(name, figures)}")
         return figures[next(iter(figures)) if name is None else name]
+
+    def scalability(self, measure: str | None = None, **choices: Any) -> ScalabilityReport:
+        """Return which hierarchy scales, how far, and at which cost; see `scalability`."""
+        from .scalability import scalability
+
+        return scalability(self, measure, **choices)
 
     def replay(
         self,
