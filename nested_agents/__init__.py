@@ -103,7 +103,6 @@ _PLACES = {
     "reevaluate": ("studies.api.reevaluation", "reevaluate"),
     "run": ("studies.api.running", "run"),
     "run_trial": ("studies.trials.session", "run_trial"),
-    "scalability": ("studies.api.scalability", "scalability"),
     "scaling_law": ("studies.api.growth", "scaling_law"),
     "schema": ("studies.spec.schema", "schema"),
     "seeds_for": ("studies.results.power", "seeds_for"),

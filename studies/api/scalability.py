@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, get_args
 
-from ...core.plugins.words import expect
 from ..errors import SpecError
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
 from ..results.notation import wrapped
-from ..results.parts import join_sizes
+from ..results.results import Results
 from ..results.scaling_law import columns_of, size_key
 from ..scalability.analysis import Scalability
 from ..scalability.data import collect
 from ..scalability.laws import Scaling
-from .growth import condition_settings
-from .study import StudyResults
+from ..spec.conditions import ConditionSettings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,72 +84,47 @@ class ScalabilityReport:
         return f"{self.table.html}{laws}<p>{notes}</p>"
 
 
-def scalability(
-    study: StudyResults,
-    measure: str | None = None,
-    *,
-    size: str | None = None,
-    scaling: Scaling | None = None,
-    criterion: float | None = None,
-    budget: str = "",
+def analyze(
+    results: Results,
+    settings: Mapping[str, ConditionSettings],
+    measure: str | None,
+    size: str | None,
+    scaling: Scaling | None,
+    criterion: float | None,
+    budget: str,
 ) -> ScalabilityReport:
-    """Answer which hierarchy scales, up to how many agents, and at which cost.
-
-    Parameters
-    ----------
-    study
-        Loaded results, whose sizes are a swept key of numbers.
-    measure
-        Measure of performance; by default the first, which is success, or the return where nothing
-        is a success.
-    size
-        The swept key, or its last part, as ``robots``; by default the only one of numbers.
-    scaling
-        ``strong`` if the task is the same for all sizes, ``weak`` if it grows with the team; by
-        default as the scenario says.
-    criterion
-        Also count the decisions of training until this share of five episodes in a row succeeds.
-    budget
-        Limits of costs, as ``"messages <= 50, decision_ms <= 100"``.
-
-    Raises
-    ------
-    SpecError
-        If there is only one size, or a cost of the budget was not measured; one line.
-    """
-    expect("what load or run returned", StudyResults, study=study)
+    """Return the report of results with the settings of their conditions, see `StudyResults`."""
     if scaling not in (None, *get_args(Scaling)):
         raise SpecError(f"scaling = {scaling!r}: allowed are {', '.join(get_args(Scaling))}")
-    results = study.results
-    if study._tables:
-        results = join_sizes(results, study._tables, study._settings, size)
-    told = _scaling_of(study, size)
+    by_scenario = _scaling_of(results, settings, size)
     data = collect(
         results,
-        scaling or told or "strong",
+        scaling or by_scenario or "strong",
         measure=results.main.name if measure is None else measure,
         size=size,
         criterion=criterion,
     )
     analysis = Scalability(data, budget)
     _ = analysis.choices  # a wrong budget is refused before anything is printed
-    return ScalabilityReport(analysis, () if scaling or told else (ASSUMED,))
+    return ScalabilityReport(analysis, () if scaling or by_scenario else (ASSUMED,))
 
 
 def _tabulate(lines: Sequence[Summary]) -> ScalabilityTable:
     return ScalabilityTable(tabulate(lines).titles, tuple(lines))
 
 
-def _scaling_of(study: StudyResults, size: str | None) -> Scaling | None:
+def _scaling_of(
+    results: Results, settings: Mapping[str, ConditionSettings], size: str | None
+) -> Scaling | None:
     """Return whether the task grows with the team; None if the scenario does not say."""
-    columns = columns_of(study.results)
+    columns = columns_of(results)
     key = size_key(columns, size)
     sizes: dict[float, set[float | None]] = {}
-    for condition, settings in condition_settings(study).items():
+    for condition, own in settings.items():
         if condition in columns:
             n = float(str(columns[condition][key]))
-            sizes.setdefault(n, set()).add(settings.scenario.task_size)
-    known: Sequence[float | None] = [own for each in sizes.values() for own in each]
+            sizes.setdefault(n, set()).add(own.scenario.task_size)
+    known: Sequence[float | None] = [part for each in sizes.values() for part in each]
     if not known or None in known:
         return None
     return "weak" if len(set(known)) > 1 else "strong"

@@ -96,7 +96,7 @@ class Scalability:
     @cached_property
     def crossovers(self) -> tuple[Crossover, ...]:
         """Sizes from which on one hierarchy beats another, of all pairs."""
-        found = []
+        changes = []
         sign = -1.0 if self.data.performance.better == "lower" else 1.0
         for better, worse in permutations(self.data.hierarchies, 2):
             sizes = [n for n in self.data.sizes(better) if n in self.data.sizes(worse)]
@@ -107,8 +107,8 @@ class Scalability:
             differences = sign * (values[:, : len(sizes)] - values[:, len(sizes) :])
             size = sign_change(sizes, differences)
             if size is not None:
-                found.append(Crossover(better, worse, size))
-        return tuple(found)
+                changes.append(Crossover(better, worse, size))
+        return tuple(changes)
 
     @cached_property
     def fronts(self) -> tuple[FrontPoint, ...]:

@@ -60,11 +60,9 @@ def scalability(
     The text names the best team size by the universal scalability law, sizes from which on one
     hierarchy beats another, and the hierarchies on the Pareto front of performance and cost.
     """
-    from ...api.scalability import scalability as analyze
-
     loaded = read_results(sources, where=where, trust=trust, columns=columns)
     say_remarks(loaded)
-    report = analyze(loaded, measure, **choices)  # type: ignore[arg-type]
+    report = loaded.scalability(measure, **choices)  # type: ignore[arg-type]
     if plot is not None:
         from ...presentation.figures import write
 
