@@ -244,6 +244,11 @@ class ScenarioSettings(PartSettings):
         return None
 
     @property
+    def task_size(self) -> float | None:
+        """Size of the task relative to that of the smallest team; None if it is unknown."""
+        return None
+
+    @property
     def failure_spans(self) -> tuple[FailureSpan, ...]:
         """When its ``failures``, if it has any, begin and end."""
         return tuple((f.episode, f.end_episode) for f in dict(self).get("failures", ()))

@@ -15,6 +15,7 @@ from ...core.plugins.settings import Positive, ScenarioSettings, team_size
 from ..state_variables import names_of
 from .prediction.settings import BeliefSettings
 from .states.variables import STATE_VARIABLES
+from .world.boxes import growth
 from .world.settings import (
     CONTROL_PERIOD,
     BoxSettings,
@@ -88,6 +89,11 @@ class BoxTaskSettings(ScenarioSettings):
         ('scenario.infrared.reach = 60 m: perhaps meant in mm, 0.06 m',)
         """
         return tuple(_warnings(self))
+
+    @property
+    def task_size(self) -> float:
+        """Size of the box relative to that of two robots."""
+        return growth(self.box, self.robots)
 
     @property
     def period(self) -> float:

@@ -112,6 +112,11 @@ class KinematicChainSettings(ScenarioSettings):
         return {"learner": {"ridge": RIDGE * sharing[preset], "discount": DISCOUNT}}
 
     @property
+    def task_size(self) -> float:
+        """Length of the arm [m], whatever the number of joints."""
+        return 1.0
+
+    @property
     def period(self) -> float:
         """Seconds for which a decision is held."""
         return PERIOD

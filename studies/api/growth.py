@@ -16,8 +16,6 @@ from ..presentation.tables import SummaryTable, tabulate
 from ..results import scaling_law as laws_of_results
 from ..results.parts import join_sizes
 from ..results.results import Results
-from ..spec.conditions import ConditionSettings
-from ..spec.spec import Spec
 from ..spec.tables import label_but
 from ..trials.arrangement import arrange
 from .study import StudyResults
@@ -113,7 +111,7 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
     columns = laws_of_results.columns_of(results)
     key = laws_of_results.size_key(columns, size)
     groups: dict[str, list[tuple[float, str]]] = {}
-    for condition, settings in _condition_settings(study).items():
+    for condition, settings in study.condition_settings().items():
         if condition in columns:
             row = columns[condition]
             with study._sources.active(), suppress(ValueError, ImportError):
@@ -135,15 +133,3 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
             "several methods; learner.decision.evaluator sets one for all."
         )
     return tuple(remarks)
-
-
-def _condition_settings(study: StudyResults) -> dict[str, ConditionSettings]:
-    """Return the settings of each condition, as far as they can be read."""
-    settings: dict[str, ConditionSettings] = {}
-    with study._sources.active(), suppress(ValueError, KeyError, ImportError):
-        if not study._settings:
-            spec = Spec.of(study.outline.table, study._sources)
-            return {c.label: c.settings for c in spec.conditions()}
-        for condition, table in study._settings.items():
-            settings[condition] = ConditionSettings.model_validate(table)
-    return settings

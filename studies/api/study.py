@@ -16,6 +16,7 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
@@ -35,7 +36,9 @@ from ..presentation.tables import SummaryTable, tabulate
 from ..results.choices import choose_trials
 from ..results.contrasts import contrasts, missing_reference, power_with_first
 from ..results.notation import wrapped
+from ..results.parts import join_sizes
 from ..results.results import Results, read
+from ..spec.conditions import ConditionSettings
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..spec.tables import SpecTable, TomlTable
@@ -50,7 +53,9 @@ if TYPE_CHECKING:
 
     from ...core.agents.team import Team
     from ...core.interface.scenario import Scenario
+    from ..scalability.laws import Scaling
     from .explaining import TeamExplanation
+    from .scalability import ScalabilityReport
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -255,6 +260,60 @@ class StudyResults:
         if name is not None and name not in figures:
             raise SpecError(f"figure = {name!r}: {closest(name, figures)}")
         return figures[next(iter(figures)) if name is None else name]
+
+    def condition_settings(self) -> dict[str, ConditionSettings]:
+        """Return the settings of each condition, as far as they can be read."""
+        from ..spec.spec import Spec  # imports all scenarios
+
+        settings: dict[str, ConditionSettings] = {}
+        with self._sources.active(), suppress(ValueError, KeyError, ImportError):
+            if not self._settings:
+                spec = Spec.of(self.outline.table, self._sources)
+                return {c.label: c.settings for c in spec.conditions()}
+            for condition, table in self._settings.items():
+                settings[condition] = ConditionSettings.model_validate(table)
+        return settings
+
+    def scalability(
+        self,
+        measure: str | None = None,
+        *,
+        size: str | None = None,
+        scaling: Scaling | None = None,
+        criterion: float | None = None,
+        budget: str = "",
+    ) -> ScalabilityReport:
+        """Answer which hierarchy scales, up to how many agents, and at which cost.
+
+        Parameters
+        ----------
+        measure
+            Measure of performance; by default the first, which is success, or the return where
+            nothing is a success.
+        size
+            The swept key that is the size, or its last part, as ``robots``; by default the only one
+            of numbers.
+        scaling
+            ``strong`` if the task is the same for all sizes, ``weak`` if it grows with the team; by
+            default as the scenario says.
+        criterion
+            Also count the decisions of training until this share of five episodes in a row
+            succeeds.
+        budget
+            Limits of costs, as ``"messages <= 50, decision_ms <= 100"``.
+
+        Raises
+        ------
+        SpecError
+            If there is only one size, or a cost of the budget was not measured; one line.
+        """
+        from .scalability import analyze
+
+        results = self.results
+        if self._tables:
+            results = join_sizes(results, self._tables, self._settings, size)
+        settings = self.condition_settings()
+        return analyze(results, settings, measure, size, scaling, criterion, budget)
 
     def replay(
         self,

@@ -44,6 +44,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "table": (".commands.reading", "Print the results of a study, one row per condition."),
         "compare": (".commands.reading", "Compare conditions of one or more studies by seed."),
         "fit": (".commands.fitting", "Fit scaling laws over team sizes, and predict."),
+        "scalability": (".commands.scalability", "Show which hierarchy scales, and its cost."),
         "results": (".commands.reading", "Print the measures of every episode."),
         "report": (".commands.reading", "Write the study as one self-contained HTML file."),
         "explain": (".commands.reading", "Explain a trained team in words and figures."),

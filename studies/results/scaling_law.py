@@ -194,7 +194,7 @@ def scaling_law(
         }
         title = title_of(shown_as, own)
     else:
-        samples = _decisions(results, measure, criterion)
+        samples = decisions_to_criterion(results, measure, criterion)
         title = f"decisions to {format_number(criterion)} of {measure}"
         shown_as, own = SUCCESS, ""
     counts = _episodes(results, own) if shown_as.is_rate and criterion is None else {}
@@ -267,7 +267,7 @@ def _episodes(results: Results, phase: str) -> dict[str, float]:
     return dict(counts["size"] / counts["nunique"])
 
 
-def _decisions(
+def decisions_to_criterion(
     results: Results, measure: str, criterion: float
 ) -> dict[str, tuple[pd.Series, pd.Series]]:
     """Return by condition decisions until the criterion, or all, and whether it was not reached."""
