@@ -151,7 +151,7 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
         index = self._index[agent]
         names = self.hierarchy.agents
         if not self._messages.failures:
-            above = [names[i] for i in self.hierarchy.above(index)]
+            above = [names[i] for i in self.hierarchy.senders(index)]
             return {name: a for name in above if (a := self._actions.get(name)) is not None}
         if agent == self.agent_selection and agent not in self._inboxes:
             senders, actions, _ = self._messages.heard(index, self._joint())
