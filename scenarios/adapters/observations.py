@@ -72,8 +72,8 @@ class StateReader:
         for rows in self._places.values():
             self._is_read[self._player, rows] = True
         explored = cache(lambda: explore(self.numbers))
-        found = [self._variable(name, explored) for name in self._places]
-        self.variables = tuple(variable for variable in found if variable is not None)
+        described = [self._variable(name, explored) for name in self._places]
+        self.variables = tuple(variable for variable in described if variable is not None)
         names = [variable.name for variable in self.variables]
         self._check_names(names)
         if not self.variables:

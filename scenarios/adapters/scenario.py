@@ -270,12 +270,12 @@ def inspect_environment(
 
     def explore(numbers: Callable[[EnvironmentStep], FloatArray]) -> FloatArray:
         rng = np.random.default_rng(0)
-        found = [
+        samples = [
             numbers(result)
             for episode in range(EXPLORED_EPISODES)
             for result in _play_randomly(simulator, actions, episode, EXPLORED_STEPS, rng)
         ]
-        return np.stack([np.min(found, axis=0), np.max(found, axis=0)], axis=1)
+        return np.stack([np.min(samples, axis=0), np.max(samples, axis=0)], axis=1)
 
     reader = StateReader(settings, simulator.observation_spaces, actions.players, explore)
     for result in _play_randomly(simulator, actions, 0, TRIAL_STEPS, np.random.default_rng(0)):
