@@ -23,11 +23,11 @@ from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES, Measurements
-from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
+from .prediction.prediction import BoxPrediction, Premises, PresentState, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.settings import BeliefSettings
-from .states.situations import Situations
+from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
 from .states.variables import progress_of
 from .world.boxes import box_for, growth
@@ -219,7 +219,7 @@ class BoxPushing(Scenario, Embodiment):
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> BoxPrediction:
         """Predict, believing in these effects of the wheels and constants of the push."""
-        situation = Situation(
+        situation = PresentState(
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),
             self._goal,
@@ -316,12 +316,14 @@ class BoxPushing(Scenario, Embodiment):
         """
         return self.states_at(self._present(origin), self._speeds[None])[0]
 
-    def _present(self, origin: FloatArray) -> Situations:
+    def _present(self, origin: FloatArray) -> SituationBatch:
         world = self.world
         poses, gaps = world.poses[None], world.gaps[None]
         return self.situations(poses, gaps, origin[None])
 
-    def situations(self, poses: FloatArray, gaps: FloatArray, origins: FloatArray) -> Situations:
+    def situations(
+        self, poses: FloatArray, gaps: FloatArray, origins: FloatArray
+    ) -> SituationBatch:
         """Return ``m`` situations one decision period after the box was at its origin.
 
         Parameters
@@ -335,9 +337,9 @@ class BoxPushing(Scenario, Embodiment):
         """
         last = np.ascontiguousarray(poses.transpose(1, 2, 0))
         apart, before = np.ascontiguousarray(gaps.T), np.ascontiguousarray(origins.T)
-        return Situations(last[1:], last[0], apart, self._goal, before, 1.0, self.box.shape)
+        return SituationBatch(last[1:], last[0], apart, self._goal, before, 1.0, self.box.shape)
 
-    def states_at(self, batch: Situations, speeds: FloatArray) -> FloatArray:
+    def states_at(self, batch: SituationBatch, speeds: FloatArray) -> FloatArray:
         """Return the states ``(m, n, d)`` of all agents in m situations.
 
         `speeds` are those commanded ``(m, n)`` [m/s].

@@ -19,7 +19,7 @@ from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
 from ....core.rules.rule_base import RuleBase
-from ..states.situations import Situations
+from ..states.situations import SituationBatch
 from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
 from ..world.geometry import BoxShape
@@ -40,7 +40,7 @@ CONTACT_GAP = 0.002
 
 
 @dataclass(frozen=True)
-class Situation:
+class PresentState:
     """The present, as far as prediction needs it."""
 
     robots: FloatArray
@@ -99,12 +99,12 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
     merges: ClassVar[bool] = True
     """Whether wheel commands of one twist are taken to lead to the same place."""
 
-    def __init__(self, situation: Situation, model: PushModel, premises: Premises) -> None:
+    def __init__(self, situation: PresentState, model: PushModel, premises: Premises) -> None:
         self.situation = situation
         self.model = model
         self.premises = premises
         self.groups = situation.groups
-        self._last: tuple[bytes, Situations] | None = None  # what was asked for last
+        self._last: tuple[bytes, SituationBatch] | None = None  # what was asked for last
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:
@@ -117,7 +117,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         ).reshape(len(self.groups), -1, len(actions))
         return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
 
-    def _after(self, choices: IntArray, seconds: float) -> Situations:
+    def _after(self, choices: IntArray, seconds: float) -> SituationBatch:
         now = self.situation
         twists = self.wheel_commands.twists
         by_robot = np.ascontiguousarray(choices.T)
@@ -126,14 +126,16 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
 
     def _batch(
         self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float
-    ) -> Situations:
+    ) -> SituationBatch:
         """Return the situations that the present one leads to in `seconds`."""
         now = self.situation
         premises = self.premises
         periods = seconds / premises.hold
-        return Situations(robots, box, gaps, now.goal, now.box[:, None], periods, premises.shape)
+        return SituationBatch(
+            robots, box, gaps, now.goal, now.box[:, None], periods, premises.shape
+        )
 
-    def _reached(self, joint_actions: IntArray) -> tuple[IntArray, Situations]:
+    def _reached(self, joint_actions: IntArray) -> tuple[IntArray, SituationBatch]:
         """Return wheel commands ``(m, M)``, and the situations that they lead to."""
         choices = self._choices(joint_actions)
         key = choices.tobytes()
@@ -196,7 +198,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         return joint
 
     @cached_property
-    def _table(self) -> tuple[Situations, IntArray]:
+    def _table(self) -> tuple[SituationBatch, IntArray]:
         """Where all combinations of twists lead, and the row of every joint-action index."""
         choices, row = twist_table(self.wheel_commands)
         return self._after(choices, self.premises.seconds), row
@@ -272,7 +274,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         own = space.own(poses, speeds.reshape(-1), self.situation.goal)
         return own.reshape(*speeds.shape, -1), space.shared(batch, range(choices.shape[1]))
 
-    def poses(self, joint_actions: IntArray) -> Situations:
+    def poses(self, joint_actions: IntArray) -> SituationBatch:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""
         return self._after(self._choices(joint_actions), self.premises.hold)
 
@@ -320,7 +322,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         batch, row = self._table
         return self._rewards(batch)[row]
 
-    def _rewards(self, batch: Situations) -> FloatArray:
+    def _rewards(self, batch: SituationBatch) -> FloatArray:
         gaps = batch.gaps.T
         contact = gaps < CONTACT_GAP
         readings = self.premises.infrared.reading(gaps)

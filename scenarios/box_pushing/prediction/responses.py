@@ -19,7 +19,7 @@ from ....core.interface.prediction import Exploring
 from ....core.numerics import FloatArray, IntArray, njit
 from ....core.rules.kernels.compact_states import total_compact
 from ....core.rules.kernels.fuzzy import Packed
-from ..states.situations import Situations
+from ..states.situations import SituationBatch
 from ..states.variables import evaluate
 from ..world.geometry import BoxShape
 from .push import Contacts, PushModel, contacts_of, pushed_on
@@ -79,7 +79,7 @@ def _worths(choices: IntArray, contacts: Contacts, outlook: Outlook) -> FloatArr
     """Return what wheel commands ``(M, m)`` are worth to the mean agent ``(m,)``."""
     robots, box, gaps = pushed_on(contacts, outlook.box, choices, outlook.seconds, outlook.model)
     origins = np.expand_dims(outlook.box, 1)
-    batch = Situations(robots, box, gaps, outlook.goal, origins, outlook.periods, outlook.shape)
+    batch = SituationBatch(robots, box, gaps, outlook.goal, origins, outlook.periods, outlook.shape)
     shared = evaluate(batch, outlook.every, outlook.columns)
     own = np.expand_dims(speeds_of(choices, outlook.speeds), 2)
     weights, agents, firsts = outlook.weights, outlook.agents, outlook.firsts

@@ -90,7 +90,7 @@ class Situation(NamedTuple):
     """All robots; empty in a compiled function."""
 
 
-class Situations(NamedTuple):
+class SituationBatch(NamedTuple):
     """A batch of ``m`` situations of ``M`` robots, for kernels: arrays are C-contiguous."""
 
     robots: FloatArray
@@ -147,7 +147,7 @@ def away_fraction(gap: float) -> float:
 
 
 @njit(cache=True, fastmath={"contract", "nsz"})
-def summarize(batch: Situations) -> FloatArray:
+def summarize(batch: SituationBatch) -> FloatArray:
     """Return the fields of `Situation` from `distance` to `largest_gaps` as rows ``(7, m)``."""
     robots, boxes, gaps, goal = batch.robots, batch.boxes, batch.gaps, batch.goal
     count, _, m = robots.shape
@@ -169,7 +169,7 @@ def summarize(batch: Situations) -> FloatArray:
 
 
 @njit(cache=True)
-def contacts_of(batch: Situations, wanted: IntArray) -> FloatArray:
+def contacts_of(batch: SituationBatch, wanted: IntArray) -> FloatArray:
     """Return `contact` and `inward` of `Situation`, then `inward` of robots ``(3 + k, m)``."""
     robots, gaps = batch.robots, batch.gaps
     count, _, m = robots.shape
@@ -218,7 +218,7 @@ def _face_directions(
             out[first + k] = boxes[2, first + k] + angle_of(dx, dy)
 
 
-def whole_batch(batch: Situations) -> Situation:
+def whole_batch(batch: SituationBatch) -> Situation:
     """Return all situations of a batch as one; arrays are read-only."""
     summary = freeze(summarize(batch))
     contact = freeze(contacts_of(batch, np.arange(len(batch.robots))))

@@ -15,7 +15,7 @@ import numpy as np
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics import FloatArray, IntArray, wrap
 from ...state_variables import StateVariable, find_variable, space_of
-from .situations import Situations, whole_batch
+from .situations import SituationBatch, whole_batch
 from .variables import STATE_VARIABLES, columns_of, evaluate
 
 
@@ -42,7 +42,7 @@ class BoxStateSpace:
         """Whether all shared variables are built in."""
         return all(variable.trusted for variable in self.variables)
 
-    def shared(self, batch: Situations, robots: Sequence[int]) -> FloatArray:
+    def shared(self, batch: SituationBatch, robots: Sequence[int]) -> FloatArray:
         """Return the shared variables ``(k, m, d - n_own)`` of k robots in m situations.
 
         Raises

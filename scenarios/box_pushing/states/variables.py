@@ -31,7 +31,7 @@ from ...state_variables import StateVariable, state_variable
 from .situations import (
     Robot,
     Situation,
-    Situations,
+    SituationBatch,
     angle_of,
     away_fraction,
     contacts_of,
@@ -331,7 +331,7 @@ _BRANCH = """if column == {index}{once}:
             """
 
 
-def _write_kernel() -> Callable[[Situations, IntArray, IntArray], FloatArray]:
+def _write_kernel() -> Callable[[SituationBatch, IntArray, IntArray], FloatArray]:
     """Write the kernel that calls the built-in functions; numba cannot call them from a list."""
     branches = [
         _BRANCH.format(index=_INDEX[name], name=name, once=" and i == 0" * variable.common)
@@ -370,7 +370,7 @@ _FIRST = np.zeros(1, np.int64)
 _PROGRESS = np.array([_INDEX[name] for name in ("box_distance", "approach", "box_turn")])
 
 
-def progress_of(batch: Situations) -> tuple[FloatArray, FloatArray, FloatArray]:
+def progress_of(batch: SituationBatch) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return distance [m], approach [m] and turn [rad] of the box ``(m,)`` in all situations."""
     distance, nearer, turn = evaluate(batch, _FIRST, _PROGRESS)[0].T
     return distance, nearer, turn

@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 
 from nested_agents.core.numerics import FloatArray, wrap
-from nested_agents.scenarios.box_pushing.states.situations import Situations
+from nested_agents.scenarios.box_pushing.states.situations import SituationBatch
 from nested_agents.scenarios.box_pushing.world.geometry import BoxShape, surface
 
 
@@ -21,13 +21,13 @@ def batch_of(
     origins: FloatArray,
     periods: float,
     shape: BoxShape,
-) -> Situations:
+) -> SituationBatch:
     """Return a batch of situations that are given on the first axis."""
     last = [np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (robots, boxes, gaps)]
-    return Situations(*last, goal, np.ascontiguousarray(origins.T), periods, shape)
+    return SituationBatch(*last, goal, np.ascontiguousarray(origins.T), periods, shape)
 
 
-def _inward(batch: Situations, points: FloatArray) -> FloatArray:
+def _inward(batch: SituationBatch, points: FloatArray) -> FloatArray:
     directions = []
     for (x, y), (box_x, box_y, turn) in zip(points, batch.boxes.T, strict=True):
         cos, sin, dx, dy = np.cos(turn), np.sin(turn), x - box_x, y - box_y
@@ -37,7 +37,7 @@ def _inward(batch: Situations, points: FloatArray) -> FloatArray:
     return np.array(directions)
 
 
-def variables(batch: Situations, robot: int) -> dict[str, FloatArray]:
+def variables(batch: SituationBatch, robot: int) -> dict[str, FloatArray]:
     """Return every built-in variable ``(m,)`` of a robot by name."""
     goal, periods, shape = batch.goal, batch.periods, batch.shape
     robots, gaps = batch.robots.transpose(2, 0, 1), batch.gaps.T

@@ -10,7 +10,7 @@ from nested_agents.core.numerics import wrap, wrap_each
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.states.situations import Situations
+from nested_agents.scenarios.box_pushing.states.situations import SituationBatch
 from nested_agents.scenarios.box_pushing.states.state_spaces import (
     STATE_SPACES,
     build_space,
@@ -24,12 +24,12 @@ SQUARE = BOXES["square"].shape
 ORIGIN = np.array([[-0.03, 0.0, 0.0]])
 
 
-def situation(robots, box, gaps) -> Situations:
+def situation(robots, box, gaps) -> SituationBatch:
     described = np.array([robots], float), np.array([box], float), np.array([gaps], float)
     return batch_of(*described, GOAL, ORIGIN, 3.0, SQUARE)
 
 
-def shared(batch: Situations, robot: int) -> dict[str, float]:
+def shared(batch: SituationBatch, robot: int) -> dict[str, float]:
     return dict(zip(VARIABLES, EVERY.shared(batch, [robot])[0][0], strict=True))
 
 

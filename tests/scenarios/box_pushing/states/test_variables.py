@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from variables_oracle import batch_of, variables
 
 from nested_agents.scenarios.box_pushing.states.situations import (
-    Situations,
+    SituationBatch,
     angle_of,
     whole_batch,
 )
@@ -18,7 +18,7 @@ from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 NAMES = tuple(STATE_VARIABLES.built_in)
 
 
-def drawn(box: str, robots: int, number: int = 100, scale: float = 1.0) -> Situations:
+def drawn(box: str, robots: int, number: int = 100, scale: float = 1.0) -> SituationBatch:
     rng = np.random.default_rng(robots)
     return batch_of(
         scale * rng.normal(size=(number, robots, 3)) * [1, 1, 9],
@@ -49,7 +49,7 @@ def test_a_situation_has_the_same_bits_alone_and_among_others() -> None:
     many = space.shared(batch, range(10))
     for s in (0, 7, 99):
         alone = [each[..., s : s + 1].copy() for each in (*batch[:3], batch.origins)]
-        one = Situations(*alone[:3], batch.goal, alone[3], *batch[5:])
+        one = SituationBatch(*alone[:3], batch.goal, alone[3], *batch[5:])
         assert space.shared(one, range(10)).tobytes() == many[:, s : s + 1].tobytes()
 
 
