@@ -164,7 +164,7 @@ class PassingDownEnv(parallel_to_aec_wrapper):
         place = self._place[agent]
         team = self.hierarchy.agents
         if not self._messages.failures:
-            above = [team[i] for i in self.hierarchy.above(place)]
+            above = [team[i] for i in self.hierarchy.senders(place)]
             return {name: a for name in above if (a := self._actions.get(name)) is not None}
         if agent == self.agent_selection and agent not in self._arrived:
             senders, actions, _ = self._messages.heard(place, self._joint())

@@ -53,7 +53,7 @@ class _Scripted(ABC):
             raise ValueError(
                 f"learner.decision.evaluator: {type(self).__name__} moves a kinematic-chain only"
             )
-        above = list(self.problem.hierarchy.above(agent))
+        above = list(self.problem.hierarchy.senders(agent))
         turns = np.zeros(len(prediction.angles))
         turns[above] = prediction.turns[above, deliberation.joint_action[above]]
         places = ends_of(prediction.angles + turns, prediction.arm.length)
@@ -79,7 +79,7 @@ class DampedLeastSquares(_Scripted):
     settings: Settings
 
     def _wanted(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
-        above = list(self.problem.hierarchy.above(agent))
+        above = list(self.problem.hierarchy.senders(agent))
         least = prediction.turns.min(axis=1)
         most = prediction.turns.max(axis=1)
         free = most > least

@@ -94,12 +94,12 @@ def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
     """Return the table of the topology of just these agents and edges, or neighbours."""
     relations = {}
     if isinstance(graph, Hierarchy):
-        if graph.edges and graph.neighbours:
+        if graph.edges and graph.neighbors:
             raise SpecError("topology: a hierarchy of edges and neighbours has no table in a spec")
         agents: list[str] = list(graph.agents)
-        pairs = [(agents[a], agents[b]) for a, b in graph.edges or graph.neighbours]
-        of_neighbours = bool(graph.neighbours)
-        relations = {"told": graph.told, "considers": graph.considers}
+        pairs = [(agents[a], agents[b]) for a, b in graph.edges or graph.neighbors]
+        of_neighbours = bool(graph.neighbors)
+        relations = {"communication": graph.communication, "lookahead": graph.lookahead}
     else:
         agents = list(map(str, graph))
         pairs = [(str(a), str(b)) for a, b in graph.edges]

@@ -133,7 +133,7 @@ def test_it_is_the_world_of_the_parallel_environment() -> None:
             assert not ended
             assert not broken
             passed = np.zeros((4, 4))
-            for superior in TREE.above(place):
+            for superior in TREE.senders(place):
                 passed[superior, actions[TREE.agents[superior]]] = 1
             assert (seen[own:] == passed.ravel()).all()
             turns.step(actions[name])
