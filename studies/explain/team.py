@@ -396,7 +396,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         team.begin_world(world, episode)
         for _ in range(DECISIONS):
             joint = team.act(Observation(states, scenario), explore=False).joint_action
-            guesses = {"learned": _states(predictor.predict(states), joint), "as it is": states}
+            guesses = {"learned": _states(predictor.predict(states), joint), "persistence": states}
             given = scenario.predict() if scenario.horizon == horizon else None
             if given is not None:
                 guesses["given"] = _states(given, joint)
