@@ -21,7 +21,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray
-from ....core.rules.rule_base import RuleBase
+from ....core.values.rule_base import RuleBase
 from ..states.relational import View
 from ..world.boxes import BoxSpec
 from ..world.robots import compliance
