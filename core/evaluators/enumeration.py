@@ -70,15 +70,15 @@ class ExactEnumeration(Aggregation):
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
         n, a = len(self.hierarchy), self.n_actions
-        self._below = [combinations(self.hierarchy.below(i), a) for i in range(n)]
+        self._below = [combinations(self.hierarchy.searched(i), a) for i in range(n)]
         self._indices: list[IntArray] = []
         self._given_places: list[IntArray] = []
         self._means: tuple[tuple[object, ...], FloatArray] | None = None
-        self._uses_tables = self.hierarchy.joint_actions(a) >= a**n
+        self._uses_tables = self.hierarchy.count_joint_actions(a) >= a**n
         if self._uses_tables:
             places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
             for agent in range(n):
-                below = list(self.hierarchy.below(agent))
+                below = list(self.hierarchy.searched(agent))
                 own = np.arange(a)[:, None] * places[agent]
                 self._indices.append((own + self._below[agent] @ places[below]).ravel())
                 given = places.copy()
@@ -88,7 +88,7 @@ class ExactEnumeration(Aggregation):
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
         agent = deliberation.agent
-        below = self.hierarchy.below(agent)
+        below = self.hierarchy.searched(agent)
         probabilities = None
         if self.problem.teammates == "empirical":
             probabilities = probabilities_of(deliberation.frequencies, below)
@@ -166,7 +166,7 @@ class Sampling(Aggregation):
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        below, a = self.hierarchy.below(deliberation.agent), self.n_actions
+        below, a = self.hierarchy.searched(deliberation.agent), self.n_actions
         frequencies, rng = deliberation.frequencies, deliberation.rng
         empirical = self.problem.teammates == "empirical"
         probabilities = None
@@ -202,7 +202,7 @@ class AutoSettings(EvaluatorSettings):
         hierarchy = problem.hierarchy
         if problem.unseen == "plan" or problem.plan == "common":
             return EVALUATORS.parsed("best-response")
-        free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
+        free = max(1 + len(hierarchy.searched(i)) for i in range(len(hierarchy)))
         if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MOST_JOINT_ACTIONS:
             return EVALUATORS.parsed("exact")
         is_large = free > self.sampling_up_to or problem.value_of != "own"
