@@ -186,7 +186,7 @@ def test_no_folders_import_each_other_in_a_circle(graph: nx.DiGraph) -> None:
 
 def test_a_circle_of_folders_is_named() -> None:
     roof_and_ground = {
-        "nested_agents.core": ("from .rules import base", True),
+        "nested_agents.core": ("from .values import base", True),
         "nested_agents.core.values": ("", True),
         "nested_agents.core.values.base": ("def f():\n    from ..spaces import S", False),
         "nested_agents.core.spaces": ("", False),
