@@ -42,8 +42,8 @@ from ...core.interface.scenario import PolicyMap, Scenario
 from ...core.interface.spaces import Variable
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.printing import printable
-from ...core.rules.kernels.fuzzy import Partition
-from ...core.rules.rule_base import RuleBase
+from ...core.values.partitions import Partition
+from ...core.values.rule_base import RuleBase
 from ...scenarios.checking.predictions import apart
 from ..errors import WIDTH, SpecError, refused
 from ..store.database import STAGE, columns

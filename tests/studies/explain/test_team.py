@@ -9,8 +9,8 @@ import pytest
 
 import nested_agents as na
 from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.rule_base import RuleBase
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import team as explain
