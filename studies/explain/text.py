@@ -59,8 +59,8 @@ def summarize(explained: Explanation) -> list[str]:
     elif len(groups) < len(explained.agents):
         lines.append(f"The agents share {len(groups)} value functions.")
     if explained.bodies:
-        found = list(verdicts(explained.bodies, explained.actuators))
-        lines += found or ["The self-model finds that all actuators work."]
+        failures = list(verdicts(explained.bodies, explained.actuators))
+        lines += failures or ["The self-model finds that all actuators work."]
     return lines
 
 
