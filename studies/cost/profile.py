@@ -58,7 +58,7 @@ ROOMS = {
     "core/adaptation": "predict",
     "core/interface": "predict",
     "scenarios": "predict",
-    "core/rules": "value",
+    "core/values": "value",
     "core/networks": "value",
     "core/learners": "value",
     "core/evaluators": "search",
