@@ -21,7 +21,7 @@ from typing import Any
 
 __version__: str
 
-if not Path(__file__).with_name("core").exists():  # a checkout: the four folders stand beside
+if not Path(__file__).with_name("core").exists():  # a checkout: the four folders are at the top
     __path__.append(str(Path(__file__).parents[1]))
 
 from .core.isolation import ignore_settings_files

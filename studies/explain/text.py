@@ -98,7 +98,7 @@ def text(explained: Explanation) -> str:
 
 
 def share_rules(agents: Sequence[str], parts: Sequence[Parts]) -> list[list[str]]:
-    """Return the agents in groups whose functions are the same, as where they share weights."""
+    """Return groups of agents with equal functions, which share weights."""
     groups: dict[bytes, list[str]] = {}
     for name, part in zip(agents, parts, strict=True):
         groups.setdefault(np.concatenate(part.singles).tobytes(), []).append(name)
@@ -133,10 +133,10 @@ def effects_table(bodies: BodyEffects, actuators: Sequence[str]) -> str:
 
 
 def verdicts(bodies: BodyEffects, actuators: Sequence[str]) -> Iterator[str]:
-    """Yield, for every actuator whose drive is not what it was built with, what it is taken for.
+    """Yield a line for every actuator that the self-model finds changed.
 
-    Its drive is the part of its effect that is along the one it was built with; a change within
-    two of its standard deviations is called uncertain.
+    The drive of an actuator is the projection of its effect on the effect as built. A change within
+    two standard deviations is called uncertain.
     """
     built = bodies.moments["built"]
     last = bodies.moments["after"]

@@ -18,11 +18,11 @@ class Preset(NamedTuple):
     """A named fragment of a spec."""
 
     summary: str
-    """What it is, in one line."""
+    """Description in one line."""
     table: SpecTable
-    """The `scenario`, `topology` and `learner` tables as they would stand in a spec."""
+    """The tables `scenario`, `topology` and `learner` as in a spec."""
     other_scenarios: SpecTable
-    """Laid over it where the scenario is of another kind than its own."""
+    """Changes for scenarios of another kind."""
 
 
 _TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))

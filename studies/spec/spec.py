@@ -243,7 +243,7 @@ class Spec(Settings):
         Parameters
         ----------
         table
-            The spec. In place of names it may hold settings, classes and functions.
+            The spec. It may hold settings, classes and functions instead of names.
         sources
             The files that it may name; those below the working directory unless given.
 
@@ -332,10 +332,10 @@ class Spec(Settings):
     def load(
         cls, path: str | PathLike[str], changes: Iterable[str] = (), study: Path | None = None
     ) -> Spec:
-        """Read a TOML file and lay ``key=value`` changes over it.
+        """Read a TOML file and apply ``key=value`` changes.
 
-        Files of users are looked for beside it, then among the copies of a study. The copy of a
-        spec that stands beside a study's database may be somebody else's, see `trust`.
+        Files of users are searched for in its folder, then among the copies of a study. The copy of
+        a spec in the folder of a study may come from another person, see `trust`.
 
         Raises
         ------
@@ -357,7 +357,7 @@ class Spec(Settings):
         title: str = "spec",
         sources: Sources | None = None,
     ) -> Spec:
-        """Read TOML text and lay ``key=value`` changes over it; see `load`, `of`.
+        """Read TOML text and apply ``key=value`` changes; see `load`, `of`.
 
         Messages call the text by its `title`.
         """
@@ -383,10 +383,10 @@ class Spec(Settings):
         return Spec.of({**self.table(), **(update or {})}, self.sources)
 
     def warnings(self) -> tuple[str, ...]:
-        """Return what looks wrong and is not refused, a line each: sizes in another unit.
+        """Return a line for each suspicious value and each ignored key.
 
-        Also which keys are left out: of its learner for controls, see `conditions`, of its topology
-        for learners that pass nothing down, and of its preset for kinds that have none such.
+        Ignored are keys of the learner in controls, of the topology for learners without hierarchy,
+        and of the preset for kinds that do not have them.
         """
         lines = []
         left_out = dict.fromkeys(key for c in self.conditions() for key in c.left_out)
@@ -426,7 +426,7 @@ class Spec(Settings):
 
     @property
     def sources(self) -> Sources:
-        """The files of users that it names."""
+        """Files of users that the spec names."""
         return self._sources
 
     def table(self) -> TomlTable:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...trials.trial import Trial
 
 SHORT = "{:.2g}".format
-"""How numbers are printed."""
+"""Format of numbers."""
 LESSONS = 8
 """Episodes from which a predictor has learned when its errors are shown."""
 
@@ -30,9 +30,9 @@ class ScenarioCase(NamedTuple):
     """A scenario that is checked."""
 
     label: str
-    """What it is called."""
+    """Name of the scenario."""
     build: Callable[[], object]
-    """Makes it anew."""
+    """Makes a new instance."""
     episodes: list[int]
     """Numbers of the episodes that are played: the first, and those in which failures begin."""
 
@@ -45,13 +45,12 @@ class ScenarioCase(NamedTuple):
 def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int:
     """Check what every scenario must promise, such as equal bits for equal seeds.
 
-    A table shows the values met of every variable beside its range, and the root mean square error
-    of its prediction beside that of persistence, as if all stayed as it is. Where agents learn to
-    predict, a second table shows the errors of that after a few episodes.
+    A table shows the range and the observed values of each variable, and the root mean square error
+    of its prediction compared with that of persistence. If agents learn a dynamics model, a second
+    table shows its errors after a few episodes.
 
-    SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
-    file that makes a scenario of one's own. A class with a nested class Settings is given these
-    with their defaults.
+    SPEC.toml is a spec; all its conditions are checked. FILE.py:NAME is a function or class in a
+    Python file that makes a scenario. A class with a nested class Settings gets their defaults.
     """
     from pandas import DataFrame
 
@@ -156,7 +155,7 @@ def _case_of_file(source: str) -> ScenarioCase:
 
 
 def _factory_of(source: str) -> Callable[[], object]:
-    """Return what makes a scenario of one's own, by its own settings as they are by default."""
+    """Return a function that makes a user's scenario with its default settings."""
     from ....core.plugins.sources import active
     from ....scenarios import SCENARIOS
 

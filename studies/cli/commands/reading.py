@@ -38,7 +38,7 @@ from ..loading import (
 )
 
 PERIOD = 2.0
-"""How often a study that is watched is looked at [s]."""
+"""Polling interval of a watched study [s]."""
 
 
 @click.command()
@@ -47,7 +47,7 @@ PERIOD = 2.0
 def status(directory: Path, watch: bool) -> int:
     """Tell how many trials are done, running, failed (with the reason) and left, and for how long.
 
-    DIR is where the study is kept, whoever runs it; looking at it disturbs nothing.
+    DIR is the folder of the study. Reading it does not disturb a run.
     """
     if watch and sys.stdout.isatty():
         _watch(directory)
@@ -113,7 +113,7 @@ def table(
 
 
 class Compared(TypedDict):
-    """What is compared, see `StudyResults.compare`."""
+    """Options of `StudyResults.compare`."""
 
     by: str | None
     measure: str | None
@@ -308,7 +308,7 @@ def _contents(store: Store, form: Files) -> dict[str, bytes]:
 def report(directory: Path, out: Path | None, trust: bool) -> int:
     """Write a study as one self-contained HTML file: verdict, table, figures, replays, spec.
 
-    DIR is where the study is kept; it may be unfinished.
+    DIR is the folder of the study, which may be unfinished.
     """
     path = load_results([directory], trust=trust).report(out)
     if left_out := untrusted(directory):
