@@ -76,7 +76,7 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
             for kind, text in findings.remarks():
                 label = f"{case.label}: " if kind == "passed" else ""
                 print_wrapped(f"{label}{text}", f"{kind}  ", 8)
-            frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
+            frame = DataFrame(findings.variables)
             _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
     if is_spec and not faults:
         faults += _report_order(source, changes, steps)
