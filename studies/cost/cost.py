@@ -97,7 +97,7 @@ class StepCost:
 
     @property
     def step(self) -> Estimate:
-        """Mean time of a step with its 95% interval over repeats [s]; one repeat has no interval."""
+        """Mean time of a step [s] with its 95% interval if there are several repeats."""
         return bootstrap(self.repeats, bounds=NOT_NEGATIVE)
 
 
