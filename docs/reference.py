@@ -13,7 +13,7 @@ import nested_agents
 from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.adapters.scenario import EnvironmentScenario
-from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
+from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
@@ -72,7 +72,7 @@ MODULES = {
         "box_pushing.config", "box_pushing.world.settings",
         "box_pushing.prediction.settings", "box_pushing.scenario",
         "environments", "box_pushing.environments", "adapters.turns", "adapters.scenario",
-        "adapters.settings", "box_pushing.states.relational",
+        "adapters.settings", "box_pushing.states.variables",
         "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
         "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.starts",
         "box_pushing.world.world",

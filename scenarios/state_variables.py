@@ -19,8 +19,9 @@ from ..core.interface.spaces import StateSpace, Variable
 from ..core.numerics import FloatArray
 from ..core.plugins.registry import Registry
 
-StateFunction = Callable[[Any, Any], FloatArray]
-"""The values ``(m,)`` of a variable for one body in the ``m`` situations of a scenario's view."""
+StateFunction = Callable[[Any, Any], Any]
+"""A function of a scenario's situation and of a body; what it returns is the scenario's business:
+values ``(m,)`` in ``m`` situations, or one number if it is compiled."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +58,19 @@ class StateVariable:
         ValueError
             If a function that is not trusted returns anything but a finite number per situation.
         """
-        values = self.function(view, body)
-        if self.trusted:
-            return values
-        values = np.asarray(values)
+        values: FloatArray = self.function(view, body)
+        return values if self.trusted else self.checked(values, view.n_situations)
+
+    def checked(self, returned: object, m: int) -> FloatArray:
+        """Return the values that a user's function gave for ``m`` situations.
+
+        Raises
+        ------
+        ValueError
+            If they are anything but a finite number per situation.
+        """
+        values = np.asarray(returned)
         name = self.variable.name
-        m = view.n_situations
         if values.shape != (m,):
             raise ValueError(
                 f"state variable {name!r}: shape {values.shape}, must be {(m,)}: one value for "
@@ -149,10 +157,10 @@ def state_variable(
     Examples
     --------
     >>> @state_variable("m", 0.0, 0.5)
-    ... def closest(view, robot):
-    ...     return view.gaps.min(axis=1)
-    >>> closest.variable.name
-    'closest'
+    ... def nearness(situation, robot):
+    ...     return situation.distance + robot.gap
+    >>> nearness.variable.name
+    'nearness'
     """
 
     def describe(function: StateFunction) -> StateVariable:

@@ -14,8 +14,7 @@ from pydantic import Field, model_validator
 from ...core.plugins.settings import Positive, ScenarioSettings, team_size
 from ..state_variables import names_of
 from .prediction.settings import BeliefSettings
-from .states.relational import STATE_VARIABLES
-from .world.boxes import growth
+from .states.variables import STATE_VARIABLES
 from .world.settings import (
     CONTROL_PERIOD,
     BoxSettings,
@@ -93,6 +92,8 @@ class BoxTaskSettings(ScenarioSettings):
     @property
     def task_size(self) -> float:
         """Size of the box relative to that of two robots."""
+        from .world.boxes import growth  # shapely takes its time
+
         return growth(self.box, self.robots)
 
     @property

@@ -23,12 +23,13 @@ from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES, Measurements
-from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
+from .prediction.prediction import BoxPrediction, Premises, PresentState, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.settings import BeliefSettings
-from .states.relational import View
+from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
+from .states.variables import progress_of
 from .world.boxes import box_for, growth
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD, Task, reward
@@ -119,7 +120,7 @@ class BoxPushing(Scenario, Embodiment):
             self._limits,
             self.task,
             settings.infrared,
-            self.box.outline,
+            self.box.shape,
             settings.period,
             settings.prediction_horizon * CONTROL_PERIOD,
         )
@@ -173,20 +174,19 @@ class BoxPushing(Scenario, Embodiment):
         begin = perf_counter()
         self._advance(self._speeds)
         moved = perf_counter()
-        view = self._view(before[0])
-        states = self.states_at(view, self._speeds[None])[0]
+        present = self._present(before[0])
+        states = self.states_at(present, self._speeds[None])[0]
         readings = self.world.infrared()[0]
         if self._is_noisy:
             readings = self.settings.infrared.noisy(readings, self._sensing)
-        distance = view.distance
+        distance, approach, turn = progress_of(present)
         contact = self.world.contact[None]
         strongest = np.maximum.reduce(readings, axis=1)[None]
-        way = distance - view.before
-        gained = reward(self.task, distance, way, view.turn, contact, strongest)[0]
+        gained = reward(self.task, distance, -approach, turn, contact, strongest)[0]
         received = gained[self.body] if self._pays_robots else float(gained[0])
         away = float(distance[0])
-        measured = self._measured(away, float(view.turn[0]))
-        terminated = bool(self.task.reached(distance, view.turn)[0])
+        measured = self._measured(away, float(turn[0]))
+        terminated = bool(self.task.reached(distance, turn)[0])
         sensed = perf_counter()
         twists = partial(_twists, before, self.world.poses, self._period, self.robot.radius)
         if terminated:
@@ -219,7 +219,7 @@ class BoxPushing(Scenario, Embodiment):
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> BoxPrediction:
         """Predict, believing in these effects of the wheels and constants of the push."""
-        situation = Situation(
+        situation = PresentState(
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),
             self._goal,
@@ -314,28 +314,40 @@ class BoxPushing(Scenario, Embodiment):
 
         `origin` is the pose ``(3,)`` of the box one decision period ago.
         """
-        return self.states_at(self._view(origin), self._speeds[None])[0]
+        return self.states_at(self._present(origin), self._speeds[None])[0]
 
-    def _view(self, origin: FloatArray) -> View:
+    def _present(self, origin: FloatArray) -> SituationBatch:
         world = self.world
-        return self.view_of(world.robot_poses[None], world.box_pose[None], world.gaps[None], origin)
+        poses, gaps = world.poses[None], world.gaps[None]
+        return self.situations(poses, gaps, origin[None])
 
-    def view_of(
-        self, robots: FloatArray, box: FloatArray, gaps: FloatArray, origin: FloatArray
-    ) -> View:
-        """Return m situations a decision period after the box was at `origin`, see `View`."""
-        outline = self.box.outline
-        return View(robots, box, gaps, self._goal, origin, 1.0, outline, self.box.friction_radius)
+    def situations(
+        self, poses: FloatArray, gaps: FloatArray, origins: FloatArray
+    ) -> SituationBatch:
+        """Return ``m`` situations one decision period after the box was at its origin.
 
-    def states_at(self, view: View, speeds: FloatArray) -> FloatArray:
+        Parameters
+        ----------
+        poses
+            ``(m, M + 1, 3)`` of the box and the robots.
+        gaps
+            ``(m, M)`` between robots and box [m].
+        origins
+            ``(m, 3)`` former poses of the box.
+        """
+        last = np.ascontiguousarray(poses.transpose(1, 2, 0))
+        apart, before = np.ascontiguousarray(gaps.T), np.ascontiguousarray(origins.T)
+        return SituationBatch(last[1:], last[0], apart, self._goal, before, 1.0, self.box.shape)
+
+    def states_at(self, batch: SituationBatch, speeds: FloatArray) -> FloatArray:
         """Return the states ``(m, n, d)`` of all agents in m situations.
 
         `speeds` are those commanded ``(m, n)`` [m/s].
         """
-        shared = self.space.observe(view)
+        shared = self.space.shared(batch, range(len(self.groups))).swapaxes(0, 1)
         m, n_robots, _ = shared.shape
         n_own = self.state_space.n_own
-        poses = view.robots
+        poses = batch.robots.transpose(2, 0, 1)
         if self.space.own_needs_pose:
             poses = poses[:, self.body]
         states = np.empty((m, n_robots, len(self.groups[0]), self.state_space.n_variables))
@@ -384,13 +396,12 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
         poses, gaps, readings = one.world.advance_many(
             self._addresses, self._speeds, one.settings.action_repeat, self._last, self._wrenches
         )
-        boxes = np.ascontiguousarray(poses[:, 0])
-        self._boxes = boxes
-        view = one.view_of(poses[:, 1:], boxes, gaps, before)
-        states = one.states_at(view, self._speeds)
-        away = view.distance
-        reached = one.task.reached(away, view.turn)
-        paid = reward(one.task, away, away - view.before, view.turn, gaps < TOUCHING, readings)
+        batch = one.situations(poses, gaps, before)
+        self._boxes = np.ascontiguousarray(poses[:, 0])
+        states = one.states_at(batch, self._speeds)
+        away, approach, turn = progress_of(batch)
+        reached = one.task.reached(away, turn)
+        paid = reward(one.task, away, -approach, turn, gaps < TOUCHING, readings)
         if one.settings.reward.of == "robot":
             paid = paid[:, one.body]
         rewards = np.broadcast_to(paid, joint_actions.shape)

@@ -175,8 +175,8 @@ def policy_of(
             placed[robot] = point + at
             seen = replace(situation, robots=placed)
             here = BoxPrediction(seen, prediction.model, prediction.premises)
-            view = here.poses(choose(here)[None])
-            moved.append(view.robots[0, robot] - placed[robot])
+            after = here.poses(choose(here)[None])
+            moved.append(after.robots[robot, :, 0] - placed[robot])
         ways, turns = np.split(np.array(moved), [2], axis=1)
         fields.append(Field(robot, points, ways, wrap(turns[:, 0]), others[:, :2]))
     return BoxPolicyMap(tuple(fields), box, robots[0])

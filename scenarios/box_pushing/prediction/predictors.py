@@ -22,12 +22,12 @@ import numpy as np
 
 from ....core.numerics import FloatArray, IntArray
 from ....core.rules.rule_base import RuleBase
-from ..states.relational import View
+from ..states.situations import SituationBatch
 from ..world.boxes import BoxSpec
 from ..world.robots import compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
-from .prediction import BoxPrediction, Premises, Situation
+from .prediction import BoxPrediction, Premises, PresentState
 from .push import PushModel
 from .settings import BeliefSettings
 
@@ -106,7 +106,7 @@ class ExactPrediction(BoxPrediction):
     merges: ClassVar[bool] = False  # wheels that command one twist may yet slip differently
 
     def __init__(
-        self, situation: Situation, model: PushModel, premises: Premises, future: Future
+        self, situation: PresentState, model: PushModel, premises: Premises, future: Future
     ) -> None:
         super().__init__(situation, model, premises)
         self.future = future
@@ -114,13 +114,15 @@ class ExactPrediction(BoxPrediction):
     def best_responses(self, rules: RuleBase) -> None:
         """Return that every joint action is to be played."""
 
-    def _after(self, choices: IntArray, seconds: float) -> View:
+    def _after(self, choices: IntArray, seconds: float) -> SituationBatch:
         periods = round(seconds / CONTROL_PERIOD)
         rows, which = np.unique(choices, axis=0, return_inverse=True)
         commands = self.wheel_commands.speeds[np.arange(rows.shape[1]), rows]
         played = [self.future.after(each.ravel(), periods) for each in commands]
         poses, gaps = (np.array(part)[which] for part in zip(*played, strict=True))
-        return self._view_of(poses[:, 1:], poses[:, 0], gaps, seconds)
+        situations_last = np.ascontiguousarray(poses.transpose(1, 2, 0))
+        gaps = np.ascontiguousarray(gaps.T)
+        return self._batch(situations_last[1:], situations_last[0], gaps, seconds)
 
     def after(self, joint_action: IntArray) -> ExactPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""

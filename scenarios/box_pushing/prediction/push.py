@@ -149,8 +149,7 @@ def push(
     Returns
     -------
     tuple
-        Robot poses ``(m, M, 3)``, box poses ``(m, 3)`` and gaps ``(m, M)`` [m]; in memory the
-        combinations stand next to each other.
+        Robot poses ``(m, M, 3)``, box poses ``(m, 3)`` and gaps ``(m, M)`` [m].
     """
     by_robot = np.ascontiguousarray(choices.T)
     after, boxes, gaps = pushed(robots, box, twists, by_robot, seconds, model)
@@ -166,10 +165,9 @@ def pushed(
     seconds: float,
     model: PushModel,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what `push` does with the combinations last: ``(M, 3, m)``, ``(3, m)``, ``(M, m)``.
+    """Return what `push` does with situations last: ``(M, 3, m)``, ``(3, m)``, ``(M, m)``.
 
-    So are the choices, ``(M, m)``. Transposing within a kernel would take as long to compile as
-    half of the arithmetic.
+    So are the choices, ``(M, m)``.
     """
     contacts = contacts_of(robots, box, twists, seconds, model)
     return pushed_on(contacts, box, choices, seconds, model)

@@ -19,7 +19,9 @@ from ....core.interface.prediction import Exploring
 from ....core.numerics import FloatArray, IntArray, njit
 from ....core.rules.kernels.compact_states import total_compact
 from ....core.rules.kernels.fuzzy import Packed
-from ..states.relational_lanes import Wanted, relational
+from ..states.situations import SituationBatch
+from ..states.variables import evaluate
+from ..world.geometry import BoxShape
 from .push import Contacts, PushModel, contacts_of, pushed_on
 from .wheel_commands import choices_of, speeds_of
 
@@ -33,8 +35,8 @@ class Outlook(NamedTuple):
     """``(3,)`` pose."""
     goal: FloatArray
     """``(3,)`` pose."""
-    before: float
-    """Distance of the box from the goal [m]."""
+    shape: BoxShape
+    """Outline of the box."""
     seconds: float
     """How far it is predicted [s]."""
     periods: float
@@ -52,7 +54,7 @@ class Outlook(NamedTuple):
     every: IntArray
     """``(M,)`` numbers of all robots."""
     columns: IntArray
-    """Of the state variables, see `Columns`."""
+    """Columns of `evaluate`."""
     weights: tuple[FloatArray, FloatArray, FloatArray]
     """Consequent weights, see `total_compact`, as what follows."""
     agents: IntArray
@@ -73,23 +75,12 @@ class _Plan(NamedTuple):
 
 
 @njit(cache=True)
-def _worths(choices: IntArray, contacts: Contacts, outlook: Outlook, wanted: Wanted) -> FloatArray:
+def _worths(choices: IntArray, contacts: Contacts, outlook: Outlook) -> FloatArray:
     """Return what wheel commands ``(M, m)`` are worth to the mean agent ``(m,)``."""
     robots, box, gaps = pushed_on(contacts, outlook.box, choices, outlook.seconds, outlook.model)
-    shared = relational(
-        robots,
-        box,
-        gaps,
-        outlook.goal,
-        outlook.box,
-        outlook.before,
-        outlook.periods,
-        outlook.model.edges,
-        outlook.model.friction_radius,
-        outlook.every,
-        outlook.columns,
-        *wanted,
-    )
+    origins = np.expand_dims(outlook.box, 1)
+    batch = SituationBatch(robots, box, gaps, outlook.goal, origins, outlook.periods, outlook.shape)
+    shared = evaluate(batch, outlook.every, outlook.columns)
     own = np.expand_dims(speeds_of(choices, outlook.speeds), 2)
     weights, agents, firsts = outlook.weights, outlook.agents, outlook.firsts
     total = total_compact(weights, agents, firsts, outlook.kinds, own, shared, outlook.packed)
@@ -189,7 +180,6 @@ def respond(
     order: IntArray,
     n_actions: int,
     outlook: Outlook,
-    wanted: Wanted,
     exploring: Exploring,
     rng: np.random.Generator,
 ) -> IntArray:
@@ -203,8 +193,8 @@ def respond(
         ``(M,)`` the robots in the order of decision.
     n_actions
         A.
-    outlook, wanted
-        What is predicted, and which state variables, see `Columns`.
+    outlook
+        What is predicted.
     exploring
         How agents explore.
     rng
@@ -224,7 +214,7 @@ def respond(
     for i in range(n):
         for c in range(len(choices)):
             by_robot[i, c] = choices[c, i]
-    worths = _worths(by_robot, contacts, outlook, wanted)
+    worths = _worths(by_robot, contacts, outlook)
     best = draw(worths, rng)
     joint = starts[best].copy()
     plan = _Plan(choices[best], np.empty((n, n_indices)), np.full((n, n), -1))
@@ -241,7 +231,7 @@ def respond(
                 reach = min(k + depth, n)
                 ahead = order[k:reach]
                 # A kernel more between this and `_worths` would take three seconds to compile.
-                worths = _worths(_varied(ahead, plan, outlook), contacts, outlook, wanted)
+                worths = _worths(_varied(ahead, plan, outlook), contacts, outlook)
                 _value(ahead, value, worths, plan, outlook)
             if decides:
                 own = joint[r * wheels : (r + 1) * wheels]

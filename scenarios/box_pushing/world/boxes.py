@@ -30,7 +30,7 @@ from shapely.validation import explain_validity
 
 from ....core.numerics import FloatArray, nx
 from ....core.plugins.words import closest
-from .geometry import Moments, Outline, moments, ring_edges
+from .geometry import BoxShape, Moments, Outline, moments, ring_edges
 from .settings import GRAVITY, BoxSettings
 
 Vertices = Sequence[tuple[float, float]]
@@ -313,6 +313,12 @@ class BoxSpec:
         Ground friction resists pure turning with `friction_force` times this lever.
         """
         return self.moments.radial / self.area
+
+    @cached_property
+    def shape(self) -> BoxShape:
+        """Outline and friction radius, for kernels."""
+        outline = self.outline
+        return BoxShape(outline.edges, outline.rounding, self.friction_radius)
 
     @cached_property
     def friction_points(self) -> FloatArray:

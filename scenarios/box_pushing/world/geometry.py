@@ -57,6 +57,17 @@ class Outline:
         return float(np.hypot(ends[:, 0], ends[:, 1]).max()) + self.rounding
 
 
+class BoxShape(NamedTuple):
+    """Outline of a box, and how it resists turning, for kernels."""
+
+    edges: FloatArray
+    """Edges of the `Outline` ``(n_edges, 4)`` [m]."""
+    rounding: float
+    """Margin by which the outline is grown [m]."""
+    friction_radius: float
+    """Lever with which ground friction resists turning [m]."""
+
+
 def ring_edges(vertices: FloatArray) -> FloatArray:
     """Return the edges ``(n, 4)`` of a closed ring of vertices ``(n, 2)``."""
     return np.hstack([vertices, np.roll(vertices, -1, axis=0)])

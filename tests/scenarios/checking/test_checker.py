@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_agents import View, state_variable
+from nested_agents import Situation, state_variable
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.core.interface.prediction import Blocks, Prediction
@@ -20,6 +20,7 @@ from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents.scenarios.box_pushing.states.situations import Robot
 from nested_agents.scenarios.box_pushing.world.settings import (
     WheelFailure,
 )
@@ -333,24 +334,24 @@ def off_by(distance: float, *, together: bool = False) -> Callable[[], Scenario]
 
 
 @state_variable("m", 0.0, 1.1)
-def per_period(view: View, robot: int) -> Any:
+def per_period(situation: Situation, robot: Robot) -> Any:
     """Mean something else where several periods are looked ahead."""
-    return view.distance / view.periods
+    return situation.distance / situation.periods
 
 
 times = count()
 
 
 @state_variable("1", 0.0, 1000.0)
-def stale(view: View, robot: int) -> Any:
+def stale(situation: Situation, robot: Robot) -> Any:
     """Depend on how often it was asked for."""
-    return np.full(len(view.box), float(next(times) % 7))
+    return np.full(np.shape(situation.distance), float(next(times) % 7))
 
 
 @state_variable("m", 0.0, 0.5, common=True)
-def not_common(view: View, robot: int) -> Any:
+def not_common(situation: Situation, robot: Robot) -> Any:
     """Differ between robots, unlike what is said of it."""
-    return np.minimum(view.gaps[:, robot], 0.5)
+    return np.minimum(robot.gap, 0.5)
 
 
 def perceiving(variable: StateVariable, robots: int = 1) -> Callable[[], Scenario]:
@@ -613,7 +614,7 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     ),
     "not common": (
         perceiving(not_common, 2),
-        "predictions: not_common, said to be common, is .* of agent 2 and .* of agent 0",
+        "values: not_common, said to be common, is .* of agent 2 and .* of agent 0",
     ),
     "lead not common": (
         space(n_own=1, common=("lead",)),
