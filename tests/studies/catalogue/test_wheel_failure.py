@@ -139,9 +139,7 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
     analysis = analyse(results.frames())
     for line in analysis.table:
         assert list(line.estimates) == ["before", "just after", "end"]
-    assert (
-        "No recovery is measured where no episode before the failure succeeded." in analysis.notes
-    )
+    assert "Recovery is not measured without successes before the failure." in analysis.notes
 
 
 @pytest.mark.parametrize(
