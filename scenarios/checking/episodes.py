@@ -122,7 +122,8 @@ def differences(
         else:
             for name in one:
                 if bits(one[name]) != bits(other[name]):
-                    yield f"{place} {name}: {one[name]!r:.40} and {other[name]!r:.40}"
+                    values = (" ".join(str(record[name]).split()) for record in (one, other))
+                    yield f"{place} {name} = {' and '.join(f'{value:.40}' for value in values)}"
 
 
 def bits(value: object) -> tuple[object, ...]:
