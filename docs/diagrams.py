@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 
 from nested_agents.core.agents.cost import Problem
-from nested_agents.core.rules.kernels.fuzzy import Partition
+from nested_agents.core.values.partitions import Partition
 from nested_agents.studies.presentation import figures
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
 from nested_agents.studies.results import published

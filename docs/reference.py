@@ -60,7 +60,7 @@ MODULES = {
         "functions.settings", "functions.agents", "agents.mixed",
         "agents.team", "agents.fuzzy", "agents.peer",
         "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
-        "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
+        "values.partitions", "values.rule_base", "learners.learner", "learners.td",
         "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",
         "evaluators.best_response", "evaluators.coordination", "coordination.graphs",
         "adaptation.predictors", "adaptation.self_model", "adaptation.foresight",

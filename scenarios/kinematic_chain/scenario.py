@@ -23,7 +23,7 @@ from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.words import expect
-from ...core.rules.rule_base import RuleBase
+from ...core.values.rule_base import RuleBase
 from ..faults.settings import Failures
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
 from .responses import Options, respond
@@ -352,7 +352,7 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
 
         None if values are no sums over the default variables.
         """
-        simple = self.arm.settings.state_space == SIMPLE and rules.compact
+        simple = self.arm.settings.state_space == SIMPLE and rules.is_triangular
         alone = len(rules.terms) == len(rules.partitions)
         alone = alone and all(len(term) == 1 for term in rules.terms)
         return partial(self._respond, rules) if simple and alone else None

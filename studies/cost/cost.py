@@ -32,7 +32,7 @@ from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.agents import Counts
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
-from ...core.rules.rule_base import RuleBaseSettings
+from ...core.values.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap

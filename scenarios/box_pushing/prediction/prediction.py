@@ -18,7 +18,7 @@ from ....core.evaluators.best_response import RespondingPrediction, Responses, S
 from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
-from ....core.rules.rule_base import RuleBase
+from ....core.values.rule_base import RuleBase
 from ..states.situations import SituationBatch
 from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
@@ -158,7 +158,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         None where a state variable, or a rule base of all rules, is not of what is compiled.
         """
         space = self.premises.space
-        simple = space.is_built_in and not space.own_needs_pose and rules.compact
+        simple = space.is_built_in and not space.own_needs_pose and rules.is_triangular
         alone = len(self.situation.speeds) == 1
         if alone or not simple:
             return None
@@ -187,8 +187,8 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
             weights=weights,
             agents=agents,
             firsts=firsts,
-            kinds=rules.kinds,
-            packed=rules.layout,
+            terms=rules.terms_by_owner,
+            variables=rules.layout[0],
         )
         order = search.order[::wheels] // wheels
         n_actions = len(premises.action_set)

@@ -21,7 +21,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray
-from ....core.rules.rule_base import RuleBase
+from ....core.values.rule_base import RuleBase
 from ..states.situations import SituationBatch
 from ..world.boxes import BoxSpec
 from ..world.robots import compliance

@@ -17,8 +17,7 @@ from ....core.evaluators.best_response import MOST_AHEAD
 from ....core.evaluators.drawing import draw, explored
 from ....core.interface.prediction import Exploring
 from ....core.numerics import FloatArray, IntArray, njit
-from ....core.rules.kernels.compact_states import total_compact
-from ....core.rules.kernels.fuzzy import Packed
+from ....core.values.triangular import summed_values
 from ..states.situations import SituationBatch
 from ..states.variables import evaluate
 from ..world.geometry import BoxShape
@@ -56,11 +55,11 @@ class Outlook(NamedTuple):
     columns: IntArray
     """Columns of `evaluate`."""
     weights: tuple[FloatArray, FloatArray, FloatArray]
-    """Consequent weights, see `total_compact`, as what follows."""
+    """Consequent weights, see `summed_values`, as what follows."""
     agents: IntArray
     firsts: IntArray
-    kinds: tuple[IntArray, IntArray, IntArray]
-    packed: Packed
+    terms: tuple[IntArray, IntArray, IntArray]
+    variables: FloatArray
 
 
 class _Plan(NamedTuple):
@@ -83,7 +82,7 @@ def _worths(choices: IntArray, contacts: Contacts, outlook: Outlook) -> FloatArr
     shared = evaluate(batch, outlook.every, outlook.columns)
     own = np.expand_dims(speeds_of(choices, outlook.speeds), 2)
     weights, agents, firsts = outlook.weights, outlook.agents, outlook.firsts
-    total = total_compact(weights, agents, firsts, outlook.kinds, own, shared, outlook.packed)
+    total = summed_values(weights, agents, firsts, outlook.terms, own, shared, outlook.variables)
     return total / len(agents)
 
 

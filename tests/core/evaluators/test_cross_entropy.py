@@ -12,7 +12,7 @@ from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberatio
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.studies.spec.spec import Spec

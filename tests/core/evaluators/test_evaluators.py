@@ -21,7 +21,7 @@ from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberatio
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks, Prediction, Tables
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2
