@@ -255,7 +255,7 @@ class ChainEnvironments(StackedEnvironments[KinematicChain]):
         )
         states = arm._states.of_joints(view, 0, self._angles.shape[1]).transpose(1, 0, 2)
         rewards = arm._reward(view.distance, view.approach)
-        self._distance = view.distance
+        self._distance = view.distance.copy()
         terminated = view.distance < settings.tolerance
         truncated = ~terminated & (self._steps >= settings.most_decisions)
         rewards_by_agent = np.broadcast_to(rewards[:, None], joint_actions.shape)

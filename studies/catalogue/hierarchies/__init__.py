@@ -47,9 +47,7 @@ REFERENCE = "chain"
 """Reference of comparisons, if it is among the hierarchies."""
 DECIDING = "decision [ms]"
 """Title of the time of a decision."""
-MESSAGES = (
-    "Messages: decisions communicated. Broadcast states, which predictors use, are not counted."
-)
+MESSAGES = "Messages: communicated decisions, without the states broadcast for prediction."
 
 
 def check(spec: Spec) -> None:
