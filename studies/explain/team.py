@@ -42,7 +42,7 @@ from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.printing import printable
 from ...core.values.partitions import Partition
 from ...core.values.rule_base import RuleBase
-from ...scenarios.checking.predictions import apart
+from ...scenarios.checking.predictions import state_differences
 from ..errors import WIDTH, SpecError, refused
 from ..store.database import STAGE, columns
 from ..store.durable import TEAM
@@ -403,7 +403,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
                 break
             states = reached
             for name, guess in guesses.items():
-                errors[name].append(apart(scenario, states, guess))
+                errors[name].append(state_differences(scenario, states, guess))
     index = [variable.name for variable in scenario.state_space.variables]
     roots = {name: np.sqrt(np.square(e).mean(axis=(0, 1))) for name, e in errors.items()}
     return pd.DataFrame(roots, index=index)

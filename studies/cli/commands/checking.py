@@ -1,4 +1,4 @@
-"""The command ``check``: whether scenarios keep what they promise."""
+"""Command ``check``: contract test of scenarios."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...trials.trial import Trial
 
 SHORT = "{:.2g}".format
-"""Format of numbers."""
+"""How numbers are printed."""
 LESSONS = 8
 """Episodes from which a predictor has learned when its errors are shown."""
 
@@ -30,9 +30,9 @@ class ScenarioCase(NamedTuple):
     """A scenario that is checked."""
 
     label: str
-    """Name of the scenario."""
+    """What it is called."""
     build: Callable[[], object]
-    """Makes a new instance."""
+    """Makes it anew."""
     episodes: list[int]
     """Numbers of the episodes that are played: the first, and those in which failures begin."""
 
@@ -43,14 +43,15 @@ class ScenarioCase(NamedTuple):
 @options.trust
 @options.changes
 def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int:
-    """Check what every scenario must promise, such as equal bits for equal seeds.
+    """Check the contract of scenarios, such as equal results for equal seeds.
 
-    A table shows the range and the observed values of each variable, and the root mean square error
-    of its prediction compared with that of persistence. If agents learn a dynamics model, a second
-    table shows its errors after a few episodes.
+    A table shows the range and the observed values of every variable, and the root mean square
+    errors of its prediction and of persistence. If agents learn a model, a second table shows
+    its errors after a few episodes.
 
-    SPEC.toml is a spec; all its conditions are checked. FILE.py:NAME is a function or class in a
-    Python file that makes a scenario. A class with a nested class Settings gets their defaults.
+    SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
+    file that makes a scenario of one's own. A class with a nested class Settings is given these
+    with their defaults.
     """
     from pandas import DataFrame
 
@@ -66,17 +67,17 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
     faults = 0
     for case in cases:
         try:
-            findings = check_scenario(case.build, steps=steps, episodes=case.episodes)
+            report = check_scenario(case.build, steps=steps, episodes=case.episodes)
         except ScenarioError as error:
             faults += 1
             print_text(f"FAULT   {case.label}: {error}")
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            for kind, text in findings.remarks():
+            for kind, text in report.remarks():
                 label = f"{case.label}: " if kind == "passed" else ""
                 print_wrapped(f"{label}{text}", f"{kind}  ", 8)
-            frame = DataFrame(findings.variables)
+            frame = DataFrame(report.variables)
             _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
     if is_spec and not faults:
         faults += _report_order(source, changes, steps)
@@ -155,7 +156,7 @@ def _case_of_file(source: str) -> ScenarioCase:
 
 
 def _factory_of(source: str) -> Callable[[], object]:
-    """Return a function that makes a user's scenario with its default settings."""
+    """Return what makes a scenario of one's own, by its own settings as they are by default."""
     from ....core.plugins.sources import active
     from ....scenarios import SCENARIOS
 

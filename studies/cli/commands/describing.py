@@ -242,13 +242,13 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
 @click.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.number("--seconds", "S", 1.0, "How long each condition is timed [s].")
-@options.formats("table", "csv", text="How to print it; CSV has times of parts in seconds.")
+@options.formats("table", "csv", text="Output format; CSV has the times of parts in seconds.")
 @options.changes
 def profile(spec: Path, seconds: float, form: str, changes: tuple[str, ...]) -> int:
-    """Tell what the time of a decision goes to, condition by condition, and what it tries.
+    """Show the time of a decision part by part, and the joint actions that it tries.
 
-    Every condition of SPEC.toml acts and learns for a while; nothing is kept. Its processor time is
-    told by part, and the joint actions that its evaluator tries compared with the formulas.
+    Each condition of SPEC.toml acts and learns for a while; nothing is kept. The table has the
+    processor time by part, and compares the joint actions tried with the formulas.
     """
     from ...cost.profile import profile as profile_of
     from ...presentation.progress import say
