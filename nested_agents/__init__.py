@@ -98,6 +98,7 @@ _PLACES = {
     "plan": ("studies.api.planning", "plan"),
     "policy_seed": ("core.agents.loop", "policy_seed"),
     "power": ("studies.results.power", "power"),
+    "profile": ("studies.cost.profile", "profile"),
     "rate": ("studies.results.statistics", "rate"),
     "reevaluate": ("studies.api.reevaluation", "reevaluate"),
     "run": ("studies.api.running", "run"),

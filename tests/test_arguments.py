@@ -42,6 +42,7 @@ VALID: dict[str, dict[str, object]] = {
     "plan": {"spec": SPEC},
     "policy_seed": {"seed": 0},
     "power": {"effect": 0.2, "deviation": 0.25, "seeds": 5, "comparisons": 1},
+    "profile": {"spec": SPEC},
     "rate": {"outcomes": SCORES},
     "reevaluate": {"study": "none"},
     "run": {"spec": SPEC, "out": "out"},
@@ -115,7 +116,7 @@ SEQUENCES: dict[tuple[str, str], tuple[object, ...]] = {
     ("cost_table", "memberships"): (3,),
     ("Hierarchy", "agents"): ("a",),
     ("Hierarchy", "edges"): (("a", "b"),),
-    ("Hierarchy", "neighbours"): (("a", "b"),),
+    ("Hierarchy", "neighbors"): (("a", "b"),),
     ("state_variable", "centres"): (0.0,),
     ("state_variable", "labels"): ("near",),
 }

@@ -189,7 +189,7 @@ def format_view(view: HierarchyView, form: Form) -> str:
         tried = format_count(view.tries[i])
         rows.append((str(rank + 1), names[i], str(len(below[i])), tried, subordinates))
     legend = [
-        "In order of decision. lookahead: number of agents whose actions the agent searches over;",
+        "In order of decision. lookahead: number of agents that the agent searches over;",
         "tries: joint actions a step with exhaustive search (large teams try fewer).",
     ]
     return "\n".join([view.title, *view.remarks, "", *align(rows, "><>><"), "", *legend])

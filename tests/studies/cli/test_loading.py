@@ -124,7 +124,9 @@ def test_a_database_of_another_study_is_noted_by_all_that_read_it(
     text = (own / "study.toml").read_text()
     (own / "study.toml").write_text(text.replace("steps = 5", "steps = 6"))
     said = " ".join(" ".join(said_by(capsys, command, own)[1:]).split())
-    assert "study.toml: is not the spec of results.sqlite in its folder, which has the results" in said
+    assert (
+        "study.toml: is not the spec of results.sqlite in its folder, which has the results" in said
+    )
     assert "steps = 6 here, 5 there" in said
 
 
