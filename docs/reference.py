@@ -88,7 +88,7 @@ MODULES = {
         "errors", "spec.spec", "spec.keys", "spec.presets", "spec.schema", "trials.trial",
         "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.power", "results.contrasts", "results.aggregates", "results.published",
+        "results.power", "results.comparison", "results.aggregates", "results.published",
         "catalogue.study", "cost.cost", "cost.profile", "cost.table",
     )),
 }  # fmt: skip

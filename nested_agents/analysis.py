@@ -32,7 +32,7 @@ from .studies.results.analysis import (
     ratio,
     select_shared,
 )
-from .studies.results.contrasts import Group, contrasts
+from .studies.results.comparison import ComparisonGroup, compare_conditions
 from .studies.results.notation import format_estimate, format_number, format_p, wrapped
 from .studies.results.power import deviation_of, power_lines
 from .studies.results.results import CPU, NOTHING, Results, Sizes
@@ -66,11 +66,11 @@ __all__ = [
     "Array",
     "BySeed",
     "Case",
+    "ComparisonGroup",
     "Difference",
     "Estimate",
     "Figures",
     "Friedman",
-    "Group",
     "HierarchyCase",
     "Results",
     "Sizes",
@@ -78,9 +78,9 @@ __all__ = [
     "adjust",
     "analyse_as",
     "bootstrap",
+    "compare_conditions",
     "compare_hierarchies",
     "compare_with_first",
-    "contrasts",
     "courses_of",
     "deviation_of",
     "difference",

@@ -23,8 +23,8 @@ from nested_agents.analysis import (
     Friedman,
     Group,
     Results,
+    compare_conditions,
     compare_with_first,
-    contrasts,
     format_number,
     format_p,
     friedman,
@@ -43,7 +43,7 @@ def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("training")
     if any({"name", "topology"} <= results.columns.get(c, {}).keys() for c in conditions):
-        by_order = contrasts(results, results.main.name, by="topology")
+        by_order = compare_conditions(results, results.main.name, by="topology")
         groups = [group for group in by_order.groups if group.differences]
         equal = map(equivalence, groups) if results.main.is_rate else ()  # `MARGIN` is of rates
         notes = (*equal, *by_order.notes)

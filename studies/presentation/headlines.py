@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..results.analysis import Difference, estimate_of
-from ..results.contrasts import contrasts
+from ..results.comparison import compare_conditions
 from ..results.notation import format_estimate, wrapped
 from ..results.results import Results
 from ..results.statistics import LEVEL
@@ -79,7 +79,7 @@ def _sentence(
     results: Results, team: str, control: str, settings: Mapping[str, Mapping[str, Any]]
 ) -> str:
     """Return what is said of a team that learns, and of its controls."""
-    compared = contrasts(results, results.main.name, "evaluation", reference=team)
+    compared = compare_conditions(results, results.main.name, "evaluation", reference=team)
     less = {d.condition: d for d in compared.differences}
     counted = count(len(results.seeds(team)), "seed")
     is_learned = control in less and _is_below(less[control])

@@ -17,6 +17,7 @@ from shutil import get_terminal_size
 from typing import Any, Literal, NamedTuple, TextIO
 
 import numpy as np
+from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -238,6 +239,23 @@ class SummaryTable:
         return in_csv(pd.DataFrame(columns))
 
     @property
+    def json(self) -> str:
+        """The whole table as JSON with every digit; unknown bounds are null.
+
+        A row has ``condition``, ``seeds``, and ``value``, ``low`` and ``high`` by title.
+        """
+        rows = []
+        for line in self.lines:
+            estimates = {
+                title: dict(zip(("value", "low", "high"), map(_finite, estimate), strict=True))
+                for title, estimate in line.estimates.items()
+                if title in self.titles
+            }
+            row = {"condition": line.condition, "seeds": line.seeds, "estimates": estimates}
+            rows.append(json.dumps(row))
+        return "[" + ",\n ".join(rows) + "]\n"
+
+    @property
     def markdown(self) -> str:
         """The whole table in Markdown."""
         lines = [["condition", "seeds", *self.titles], ["---"] * (2 + len(self.titles))]
@@ -267,6 +285,12 @@ class SummaryTable:
 
     def _repr_html_(self) -> str:
         return self.html
+
+
+def _finite(value: ArrayLike) -> float | None:
+    """Return a number of JSON, which has no infinity and no NaN."""
+    number = float(np.asarray(value))
+    return number if np.isfinite(number) else None
 
 
 def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTable:

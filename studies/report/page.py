@@ -19,7 +19,7 @@ from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Analysis, identity_lines
-from ..results.contrasts import contrasts, missing_reference
+from ..results.comparison import compare_conditions, missing_reference
 from ..results.notation import format_estimate, whole
 from ..results.results import read
 from ..results.statistics import LEVEL
@@ -64,7 +64,7 @@ def page(directory: Path) -> str:
         figures |= growth_figures(results)
     notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
-        notes = contrasts(
+        notes = compare_conditions(
             results, results.main.name
         ).notes  # what `compare` says of it, this included
     notes = (*missing_reference(results), *notes)

@@ -1,8 +1,10 @@
-"""The power of paired comparisons: which differences a number of seeds can find.
+"""Power of comparisons: which differences a number of seeds detects.
 
-Power is that of finding one difference of a given size among several comparisons: as Holm's first
-step has it, p times their number must stay below `LEVEL`. The differences of single seeds are taken
-for independent and normal.
+Power is the probability that one difference of a given size is significant among several
+comparisons. As in the first step of Holm's method, p times their number must be below `LEVEL`. The
+power of paired runs assumes that the differences of single seeds are independent and normal. The
+power of independent runs is that of the two-sample t test, whose level the permutation of labels
+keeps.
 """
 
 import math
@@ -17,7 +19,7 @@ from textwrap import wrap
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.numerics import quadrature, special
+from ...core.numerics import optimize, quadrature, special
 from ...core.plugins.words import expect, expect_within
 from ..errors import WIDTH
 from .notation import format_number, wrapped
@@ -43,6 +45,8 @@ RATES = 1.07
 """By how much more success rates seem to deviate: they have ties and bounds, which cost a test some
 power. Without it studies of ten episodes find up to 0.04 less than is promised, with it up to 0.03,
 see `research.power`."""
+ROUNDING = 1e-12
+"""Relative deviation that counts as rounding: values that deviate by less are equal."""
 FEW_PATTERNS = 32
 """If fewer patterns of signs are extreme enough to be significant, the power is simulated."""
 SIMULATED = 4000
@@ -206,8 +210,11 @@ def deviation_of(samples: Sequence[ArrayLike], *, of_rates: bool) -> float | Non
     >>> deviation_of([[2.0] * 5], of_rates=False)
     """
     arrays = [np.asarray(sample, dtype=float) for sample in samples if np.size(sample) > 1]
+    largest = max((float(abs(array).max()) for array in arrays), default=0.0)
     squares = sum(float(((array - array.mean()) ** 2).sum()) for array in arrays)
     freedom = float(sum(len(array) - 1 for array in arrays))
+    if squares <= freedom * (ROUNDING * largest) ** 2:
+        squares = 0.0
     if of_rates:
         squares += SUPPOSED * len(arrays) * USUAL_DEVIATION**2
         freedom += SUPPOSED * len(arrays)
@@ -290,33 +297,37 @@ def power_text(
     Examples
     --------
     >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
-    Power: 5 seeds and 2 comparisons cannot give an adjusted p below 0.05, whatever
-      the outcome. It needs at least 7 seeds; for a difference of 0.20, about 18.
+    Power: 5 seeds cannot give an adjusted p below 0.05 among 2 comparisons,
+      whatever the outcome. At least 7 seeds are needed; a difference of 0.20 needs
+      about 18.
     >>> print(*power_text(20, 1, 0.25, 0.2, "evaluation success"), sep="\n")
-    Power: with 20 seeds, a difference of 0.17 is found with probability 0.80 in
-      evaluation success. For a difference of 0.20 it takes about 15 seeds.
+    Power: 20 seeds detect a difference of 0.17 with power 0.80 in evaluation
+      success. A difference of 0.20 needs about 15 seeds.
     """
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
-    among = f" and {comparisons} comparisons" if comparisons > 1 else ""
+    detect = f"{counted} detect{'s' * (seeds == 1)}"
+    among = f" among {comparisons} comparisons" if comparisons > 1 else ""
     needed = seeds_needed(comparisons)
     enough = seeds_for(smallest, deviation, comparisons) if smallest and deviation else None
     goal = format_number(smallest or 0.0)
     within = f" in {measure}" if measure else ""
     if seeds < needed:
         text = (
-            f"{counted}{among} cannot give an adjusted p below 0.05{within}, whatever the outcome. "
-            f"It needs at least {needed} seeds"
+            f"{counted} cannot give an adjusted p below {LEVEL:g}{among}{within}, whatever the "
+            f"outcome. At least {needed} seeds are needed"
         )
-        text += f"; for a difference of {goal}, about {enough}." if enough else "."
+        text += f"; a difference of {goal} needs about {enough}." if enough else "."
     elif deviation is None:
-        text = f"{counted}{among} that deviate by nothing{within}: how small a difference they "
-        text += "would find cannot be determined."
+        text = (
+            f"unknown{within}, because all seeds have the same difference. A further seed may "
+            "deviate from them; more seeds show by how much."
+        )
     else:
         least = format_number(detectable(deviation, seeds, comparisons))
-        text = f"with {counted}{among}, a difference of {least}{unit} is found with "
-        text += f"probability {format_number(WANTED)}{within}."
+        text = f"{detect} a difference of {least}{unit} with power {format_number(WANTED)}"
+        text += f"{among}{within}."
         if enough and goal != least:
-            text += f" For a difference of {goal} it takes about {enough} seeds."
+            text += f" A difference of {goal} needs about {enough} seeds."
     return wrapped(f"Power: {text}")
 
 
@@ -370,9 +381,8 @@ def exponent_text(
     Examples
     --------
     >>> print(*exponent_text([2, 4, 8, 16], 20), sep="\n")
-    Exponents: with 20 seeds of sizes 2 to 16, those that differ by 0.21 are
-      significantly different with probability 0.80. A difference of 0.20 takes about
-      23 seeds, or sizes to 32.
+    Exponents: 20 seeds of sizes 2 to 16 detect a difference of exponents of 0.21
+      with power 0.80. A difference of 0.20 needs about 23 seeds, or sizes up to 32.
     """
     goal = format_number(APART)
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
@@ -382,17 +392,17 @@ def exponent_text(
         larger.append(2.0 * larger[-1])
         if larger[-1] > LARGEST:
             break
-    takes = f"A difference of {goal} takes about {enough} seeds" if enough else ""
+    needs = f" A difference of {goal} needs about {enough} seeds" if enough else ""
     if seeds < seeds_needed(comparisons):
-        text = f"{counted} are too few for a significant difference, "
-        text += f"at least {seeds_needed(comparisons)} are needed. {takes}."
+        text = f"{counted} are too few for a significant difference; at least "
+        text += f"{seeds_needed(comparisons)} are needed.{needs}{'.' * bool(needs)}"
     else:
         least = format_number(detectable(deviation / _reach(sizes), seeds, comparisons))
-        text = f"with {counted} of sizes {sizes[0]:g} to {sizes[-1]:g}, those that differ by "
-        text += f"{least} are significantly different with probability {format_number(WANTED)}."
-        if len(larger) > len(sizes) and takes:
-            up_to = f", or sizes to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
-            text += f" {takes}{up_to}."
+        text = f"{counted} of sizes {sizes[0]:g} to {sizes[-1]:g} detect a difference of "
+        text += f"exponents of {least} with power {format_number(WANTED)}."
+        if len(larger) > len(sizes) and needs:
+            up_to = f", or sizes up to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
+            text += f"{needs}{up_to}."
     return wrapped(f"Exponents: {text}")
 
 
@@ -420,3 +430,70 @@ def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool =
     deviation = deviation_of(samples, of_rates=of_rates)
     smallest = SMALLEST if of_rates else None
     return power_text(min(map(len, samples)), len(samples), deviation, smallest, measure)
+
+
+def detectable_independent(
+    deviation: float, counts: tuple[int, int], comparisons: int = 1, wanted: float = WANTED
+) -> float:
+    """Return the smallest difference that independent runs detect with the wanted power.
+
+    It is infinite if no permutation of labels can be significant with so few runs.
+
+    Parameters
+    ----------
+    deviation
+        Standard deviation of single runs, in the unit of the difference.
+    counts
+        Numbers of runs of the two conditions, 2 or more each.
+    comparisons
+        Number of comparisons over which p is adjusted.
+    wanted
+        The power.
+
+    Examples
+    --------
+    >>> round(detectable_independent(1.0, (20, 20)), 2), detectable_independent(1.0, (3, 3))
+    (0.91, inf)
+    """
+    first, second = counts
+    level = LEVEL / comparisons
+    mirrored = 2 if first == second else 1  # a sample and its complement are equally extreme
+    if mirrored / math.comb(first + second, first) >= level:
+        return math.inf
+    freedom = first + second - 2
+    beyond = float(special.stdtrit(freedom, 1.0 - level / 2.0))
+    scale = math.sqrt(1.0 / first + 1.0 / second)
+    reach = optimize.brentq(lambda d: power_of_t(freedom, d, beyond) - wanted, 0.0, beyond + 10.0)
+    return deviation * scale * float(reach)
+
+
+def independent_power_lines(
+    groups: Sequence[tuple[Array, Array]], comparisons: int, measure: str = ""
+) -> list[str]:
+    """Return lines on which difference independent runs detect.
+
+    Parameters
+    ----------
+    groups
+        Values of the runs of both conditions, by comparison.
+    comparisons
+        Number of comparisons over which p is adjusted.
+    measure
+        Title of the measure.
+    """
+    if not groups:
+        return []
+    deviation = deviation_of([own for pair in groups for own in pair], of_rates=False)
+    counts = min(((len(own), len(base)) for own, base in groups), key=sorted)
+    counted = f"{counts[0]} and {counts[1]} independent runs"
+    among = f" among {comparisons} comparisons" if comparisons > 1 else ""
+    within = f" in {measure}" if measure else ""
+    least = detectable_independent(deviation or 1.0, counts, comparisons)
+    if math.isinf(least):
+        text = f"{counted} cannot give an adjusted p below {LEVEL:g}{among}{within}."
+    elif deviation is None:
+        text = f"unknown{within}, because the runs of each condition are all equal."
+    else:
+        text = f"{counted} detect a difference of {format_number(least)} with power "
+        text += f"{format_number(WANTED)}{among}{within}."
+    return wrapped(f"Power: {text}")

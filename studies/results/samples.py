@@ -112,7 +112,11 @@ def of_numbers(
     means = _checked_means(sizes, values)
     if not (means > 0.0).all():
         size = sizes[int(np.argmin(means))]
-        raise ValueError(f"the mean at size {size:g} is {means.min():.4g}, allowed: positive means")
+        raise ValueError(
+            f"the mean at size {size:g} is {means.min():.4g}, allowed: positive means. A law of "
+            "growth describes quantities above 0: fit another measure, as --measure steps, or "
+            "fit a cost (the negated return) from a table of scores"
+        )
     linear = np.log(means) + values / means - 1.0
     unseen = np.zeros(values.shape, dtype=bool)
     return Sample(sizes, linear, values, unseen, np.ones(len(sizes)), LOG, bounds=bounds)

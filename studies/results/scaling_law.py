@@ -15,7 +15,7 @@ from ..errors import SpecError
 from ..spec.tables import label_but
 from . import laws
 from .analysis import Summary
-from .contrasts import title_of, values_of
+from .comparison import title_of, values_of
 from .notation import format_estimate, format_number, format_p, wrapped
 from .power import APART, seeds_for
 from .results import Results
@@ -100,7 +100,7 @@ class ScalingLaw(NamedTuple):
         pairs = [(g, laws.compare(law, base[1])) for g, law in known[1:] if _alike(law, base[1])]
         if not pairs:
             return []
-        lines = [f"Exponents, less that of {base[0]}:"]
+        lines = [f"Exponents, minus that of {base[0]}:"]
         ps = holm([contrast.p for _, contrast in pairs]).tolist()
         for (group, contrast), p in zip(pairs, ps, strict=True):
             word = "differs" if p < LEVEL else "no significant difference"

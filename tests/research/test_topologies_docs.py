@@ -9,7 +9,7 @@ import pytest
 from published_tables import print_table
 
 import nested_agents as na
-from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.notation import format_estimate, format_number, format_p
 from nested_agents.studies.results.results import Results
 from nested_agents.studies.results.statistics import Estimate, bootstrap, paired_permutation
@@ -154,7 +154,8 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
 )
 def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
     for name in names:
-        for group in contrasts(na.load(RESULTS / f"{name}.json").results, by="topology").groups:
+        results = na.load(RESULTS / f"{name}.json").results
+        for group in compare_conditions(results, by="topology").groups:
             rates = [line.estimates["evaluation success"].value for line in group.table]
             learner, orders, verdict, ends = re.findall(
                 r"(.+), (\d+) orders, within 0.1: (.+) (\[.+\])", equivalence(group)
@@ -167,7 +168,7 @@ def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
 
 def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
     fitted, ppo = (
-        contrasts(na.load(RESULTS / f"orders-line{own}.json").results, by="topology").table
+        compare_conditions(na.load(RESULTS / f"orders-line{own}.json").results, by="topology").table
         for own in ("", "-ppo")
     )
     for own, other in zip(fitted, ppo, strict=True):

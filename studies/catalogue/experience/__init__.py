@@ -141,7 +141,7 @@ def analyse(results: Results) -> Analysis:
     means = [results.means(condition, "evaluation", measure.name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
     compared = differences({title: pairs[1:]}, measure)
-    heads = {f"{title}, less that of {conditions[0]}": compared[title]}
+    heads = {f"{title}, minus that of {conditions[0]}": compared[title]}
     notes = [
         "after N: when evaluated after N joint decisions of training, of all environments.",
         *verdicts(heads, measure),
