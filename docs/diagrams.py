@@ -78,7 +78,7 @@ def idea() -> Figure:
         start, end = start + 0.27 * along, end - 0.27 * along
         arrow(axes, start + beside, end + beside, colour="black")
         arrow(axes, end - beside, start - beside, colour=GREEN)
-    axes.text(1.2, 2.12, "considers\nwhat 2\nmay do", color=GREEN, ha="right", va="center",
+    axes.text(1.2, 2.12, "looks ahead\nto what 2\nmay do", color=GREEN, ha="right", va="center",
               linespacing=1.1)  # fmt: skip
     axes.text(2.3, 2.12, "tells 3 what\nit decided", va="center", linespacing=1.1)
     for name, place in places.items():

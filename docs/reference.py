@@ -12,7 +12,7 @@ import click
 import nested_agents
 from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
-from nested_agents.scenarios.adapters.adapted import AdaptedWorld
+from nested_agents.scenarios.adapters.scenario import EnvironmentScenario
 from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
@@ -71,7 +71,7 @@ MODULES = {
     "scenarios": ("Where agents act.", (
         "box_pushing.config", "box_pushing.world.settings",
         "box_pushing.prediction.settings", "box_pushing.scenario",
-        "environments", "box_pushing.environments", "adapters.passing_down", "adapters.adapted",
+        "environments", "box_pushing.environments", "adapters.turns", "adapters.scenario",
         "adapters.settings", "box_pushing.states.relational",
         "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
         "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.starts",
@@ -201,7 +201,7 @@ def columns() -> Iterator[str]:
     yield "A scenario declares its own measures ([](../extending.md#a-scenario)). These are those"
     yield "of the built-in scenarios.\n"
     # Built only of an environment, or a task.
-    adapted = {"gymnasium": AdaptedWorld, "pettingzoo": AdaptedWorld}
+    adapted = {"gymnasium": EnvironmentScenario, "pettingzoo": EnvironmentScenario}
     for kind in SCENARIOS.built_in:
         yield f"### `{kind}`\n"
         declared = adapted.get(kind) or SCENARIOS.parsed(kind).build()

@@ -25,7 +25,7 @@ import pettingzoo
 
 if TYPE_CHECKING:
     from .core.interface.scenario import Scenario
-    from .scenarios.adapters.passing_down import PassingDownEnv
+    from .scenarios.adapters.turns import TurnBasedEnv
     from .scenarios.environments import AgentsEnv, JointEnv
 
 WORLDS = {
@@ -119,7 +119,7 @@ def _world(kind: str, table: Mapping[str, Any]) -> Scenario:
 
 def turns(
     kind: str, steps: int, topology: str | Mapping[str, Any] = "chain", **options: Any
-) -> PassingDownEnv:
+) -> TurnBasedEnv:
     """Return a PettingZoo AEC environment whose agents take turns from the top down.
 
     Parameters
@@ -134,14 +134,14 @@ def turns(
     ValueError
         If there is no such key or topology, or a value is out of range; one line.
     """
-    from .scenarios.adapters.passing_down import PassingDownEnv
+    from .scenarios.adapters.turns import TurnBasedEnv
     from .topologies import build, parse
 
     env = parallel(kind, steps, **options)
     settings = parse(topology)
     world = env.scenario
     hierarchy = build(settings, world.agents, world.groups, world.interactions)
-    return PassingDownEnv(env, hierarchy, settings.failures)
+    return TurnBasedEnv(env, hierarchy, settings.failures)
 
 
 register()

@@ -75,7 +75,9 @@ def evaluator_of(
         value_of=decision.value_of,
         unseen=decision.unseen,
         plan=decision.plan,
-        handed_down=hierarchy.told == "ancestors" and not placement.messages_fail and not private,
+        handed_down=hierarchy.communication == "ancestors"
+        and not placement.messages_fail
+        and not private,
         first=next((i for i in hierarchy.order if i in own), members[0]),
         is_private=private,
     )

@@ -145,7 +145,7 @@ class BestResponse(Aggregation):
         self.require("teammates", problem.teammates, "best-response", why)
         hierarchy, groups = problem.hierarchy, problem.groups
         n = len(hierarchy)
-        nobody = problem.unseen != "plan" and not any(map(hierarchy.below, range(n)))
+        nobody = problem.unseen != "plan" and not any(map(hierarchy.searched, range(n)))
         if problem.plan == "common" and nobody:
             raise ValueError(
                 "learner.decision.plan = 'common': nobody considers another, so that there is "
@@ -165,7 +165,7 @@ class BestResponse(Aggregation):
         self._numbers = np.arange(len(self._actions[sizes[0]]))
         # Per agent, whom it considers, itself included, in the order of decision; those of its
         # body; the others.
-        considered = [{i, *hierarchy.below(i)} for i in range(n)]
+        considered = [{i, *hierarchy.searched(i)} for i in range(n)]
         self._free = [tuple(j for j in hierarchy.order if j in who) for who in considered]
         body = self._body_of
         self._own = [tuple(j for j in self._free[i] if body[j] == body[i]) for i in range(n)]
@@ -380,7 +380,7 @@ def _planners(problem: DecisionProblem) -> list[int]:
     for i, view in views.items():
         same = (j for j, other in views.items() if other == view)
         if problem.plan == "private":
-            givers = hierarchy.above(i) if problem.handed_down else ()
+            givers = hierarchy.senders(i) if problem.handed_down else ()
             same = (j for j in same if j in givers)
         planners[i] = next(same, i)
     return [planners[i] for i in range(len(hierarchy))]
@@ -394,7 +394,7 @@ def _kept_up(problem: DecisionProblem, planners: list[int]) -> list[bool]:
     hierarchy, kept = problem.hierarchy, {}
     for planner in set(planners):
         users = [i for i in hierarchy.order if planners[i] == planner]
-        told_all = all({*users[:k]} <= {*hierarchy.above(i)} for k, i in enumerate(users))
+        told_all = all({*users[:k]} <= {*hierarchy.senders(i)} for k, i in enumerate(users))
         kept[planner] = problem.handed_down and told_all
     return [kept[planner] for planner in planners]
 

@@ -85,7 +85,7 @@ class Coordination(Aggregation):
     ) -> None:
         super().__init__(problem)
         hierarchy = problem.hierarchy
-        if hierarchy.edges or not hierarchy.neighbours:
+        if hierarchy.edges or not hierarchy.neighbors:
             raise ValueError(
                 f"learner.decision.evaluator = {name!r}: the topology joins no neighbours, "
                 "use coordination-graph"
@@ -99,7 +99,7 @@ class Coordination(Aggregation):
             why = f"{name} adds up own values over neighbours, allowed: {allowed!r}"
             self.require(key, value, allowed, why)
         n = len(hierarchy)
-        self.scopes = [tuple(sorted((i, *hierarchy.below(i)))) for i in range(n)]
+        self.scopes = [tuple(sorted((i, *hierarchy.searched(i)))) for i in range(n)]
         try:
             self._maximiser = maximiser(self.scopes, n, self.n_actions)
         except ValueError as error:
@@ -175,7 +175,7 @@ class CrossEntropy(Aggregation):
         super().__init__(problem)
         self.require("rule", problem.rule, "reward", f"{settings.kind} plans by 'reward' only")
         hierarchy = problem.hierarchy
-        if len(hierarchy.below(hierarchy.order[0])) < len(hierarchy) - 1:
+        if len(hierarchy.searched(hierarchy.order[0])) < len(hierarchy) - 1:
             raise ValueError(
                 f"learner.decision.evaluator = {settings.kind!r}: needs a topology whose first "
                 "agent is above all others and plans for them, as in a chain"

@@ -71,17 +71,17 @@ class ExactEnumeration(Aggregation):
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
         n, a = len(self.hierarchy), self.n_actions
-        self._below = [combinations(self.hierarchy.below(i), a) for i in range(n)]
+        self._below = [combinations(self.hierarchy.searched(i), a) for i in range(n)]
         uniform = problem.teammates == "uniform"
         self._expected = np.full((n, a), 1.0 / a) if uniform else np.zeros((0, 0))
         self._tried: list[Tried] = []
         self._means: tuple[tuple[object, ...], FloatArray] | None = None
-        if self.hierarchy.joint_actions(a) >= a**n:
+        if self.hierarchy.count_joint_actions(a) >= a**n:
             places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
             self._tried = [self._tried_by(i, places) for i in range(n)]
 
     def _tried_by(self, agent: int, places: IntArray) -> Tried:
-        below = np.array(self.hierarchy.below(agent), dtype=np.int64)
+        below = np.array(self.hierarchy.searched(agent), dtype=np.int64)
         own = np.arange(self.n_actions)[:, None] * places[agent]
         given = places.copy()
         given[agent] = given[below] = 0
@@ -102,7 +102,7 @@ class ExactEnumeration(Aggregation):
             expected = deliberation.frequencies if empirical else self._expected
             weights, joint = deliberation.own_weights, deliberation.joint_action
             return self.rules.enumerate(weights, blocks, tried, joint, expected)
-        below, probabilities = self.hierarchy.below(agent), None
+        below, probabilities = self.hierarchy.searched(agent), None
         if problem.teammates == "empirical":
             probabilities = probabilities_of(deliberation.frequencies, below)
         elif conditional:
@@ -167,7 +167,7 @@ class Sampling(Aggregation):
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        below, a = self.hierarchy.below(deliberation.agent), self.n_actions
+        below, a = self.hierarchy.searched(deliberation.agent), self.n_actions
         frequencies, rng = deliberation.frequencies, deliberation.rng
         empirical = self.problem.teammates == "empirical"
         probabilities = None
@@ -203,7 +203,7 @@ class AutoSettings(EvaluatorSettings):
         hierarchy = problem.hierarchy
         if problem.unseen == "plan" or problem.plan == "common":
             return EVALUATORS.parsed("best-response")
-        free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
+        free = max(1 + len(hierarchy.searched(i)) for i in range(len(hierarchy)))
         if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MOST_JOINT_ACTIONS:
             return EVALUATORS.parsed("exact")
         is_large = free > self.sampling_up_to or problem.value_of != "own"

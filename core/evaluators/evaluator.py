@@ -165,7 +165,7 @@ def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
     every = range(len(hierarchy))
     if value_of == "team":
         return [np.arange(len(hierarchy))] * len(hierarchy)
-    below = [hierarchy.below(i) if value_of == "below" else () for i in every]
+    below = [hierarchy.searched(i) if value_of == "below" else () for i in every]
     return [np.array(sorted((i, *below[i]))) for i in every]
 
 
@@ -306,7 +306,7 @@ class Aggregation(Evaluator):
         joint = np.empty((a, len(tried), n), dtype=np.int64)
         joint[:] = deliberation.joint_action
         joint[:, :, agent] = np.arange(a)[:, None]
-        joint[:, :, list(self.hierarchy.below(agent))] = tried
+        joint[:, :, list(self.hierarchy.searched(agent))] = tried
         return self.worth(deliberation, joint.reshape(-1, n)).reshape(a, -1)
 
     def drawn(self, probabilities: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:

@@ -1,7 +1,7 @@
 """Fitted Q: values of actions, regressed without a predictor (Ernst, Geurts and Wehenkel 2005).
 
 An agent values its own actions in the state that it is in, given the actions that it is told; it
-needs no prediction of where they lead, and considers nobody. Its rule base is over its state
+needs no predictor and no lookahead. Its rule base is over its state
 variables and, for each agent that tells it something, a variable with a membership function at
 every action and one for ``nobody``; every rule has as many consequents as the agent has actions. So
 the hierarchy says what an agent can make its action depend on: agents that are told nothing are
@@ -79,7 +79,8 @@ class FittedQSettings(LearnerSettings):
         self._check_decision()
         if self.mirrored and n_told:
             raise ValueError(
-                "learner.mirrored = true: messages have no mirror image; set topology.told = 'none'"
+                "learner.mirrored = true: messages have no mirror image; set "
+                "topology.communication = 'none'"
             )
         told = [choice(f"told{k + 1}", (*actions.names, NOBODY)) for k in range(n_told)]
         names = tuple(variable.name for variable in told)

@@ -17,7 +17,7 @@ from matplotlib.patches import Circle
 
 from ...core.numerics import FloatArray
 from ..movies import Scene, film
-from .variables import postures_of
+from .variables import forward_kinematics
 
 Recording = Mapping[str, FloatArray]
 
@@ -31,14 +31,15 @@ FAILED = "#B00020"
 
 
 class _ChainScene(Scene):
-    """A figure on which any moment of a recording can be drawn."""
+    """A figure that shows any step of a recording."""
 
     def __init__(self, recording: Recording) -> None:
         super().__init__((SIDE, SIDE), (0.15, 0.1, 0.83, 0.83))
         self.recording = recording
         angles = recording["angles"]
         reach = float(recording["reach"])
-        self.places = postures_of(angles, reach / angles.shape[1])
+        places = forward_kinematics(angles.T, reach / angles.shape[1])
+        self.places = places.transpose(1, 0, 2)
         ends = -1.05 * reach, 1.05 * reach
         self.axes.set(xlim=ends, ylim=ends)
         self.axes.add_patch(Circle((0, 0), reach, fill=False, ec="#dddddd", lw=1))

@@ -28,7 +28,7 @@ from ...core.evaluators.evaluator import DecisionProblem, Deliberation
 from ...core.interface.agents import Counts
 from ...core.numerics import FloatArray
 from .scenario import ChainPrediction
-from .variables import ends_of, jacobian_of
+from .variables import forward_kinematics, jacobian
 
 
 class _Scripted(ABC):
@@ -53,10 +53,10 @@ class _Scripted(ABC):
             raise ValueError(
                 f"learner.decision.evaluator: {type(self).__name__} moves a kinematic-chain only"
             )
-        above = list(self.problem.hierarchy.above(agent))
+        above = list(self.problem.hierarchy.senders(agent))
         turns = np.zeros(len(prediction.angles))
         turns[above] = prediction.turns[above, deliberation.joint_action[above]]
-        places = ends_of(prediction.angles + turns, prediction.arm.length)
+        places = forward_kinematics(prediction.angles + turns, prediction.arm.length)
         return -np.abs(prediction.turns[agent] - self._wanted(prediction, agent, places))
 
     @abstractmethod
@@ -79,14 +79,14 @@ class DampedLeastSquares(_Scripted):
     settings: Settings
 
     def _wanted(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
-        above = list(self.problem.hierarchy.above(agent))
+        above = list(self.problem.hierarchy.senders(agent))
         least = prediction.turns.min(axis=1)
         most = prediction.turns.max(axis=1)
         free = most > least
         free[above] = False
         if not free[agent]:
             return 0.0
-        moves = jacobian_of(places)
+        moves = jacobian(places)
         drift = np.where(free, 0.0, prediction.turns.mean(axis=1))
         drift[above] = 0.0
         error = prediction.goal - places[-1] - drift @ moves

@@ -163,10 +163,10 @@ def messages(text: str, n: int) -> tuple[int, int]:
     if text == SINGLE_AGENT:
         return 2 * (n - 1), 2 * (n > 1)
     hierarchy = _hierarchy(WAYS.get(text, (text,))[0], n)
-    if not hierarchy.neighbours:
-        return hierarchy.messages, hierarchy.depth - 1
+    if not hierarchy.neighbors:
+        return hierarchy.n_messages, hierarchy.depth - 1
     rounds = MaxPlusSettings().rounds
-    return (rounds * hierarchy.messages, rounds) if text == "max-plus" else (2 * n - 2, 2 * n - 2)
+    return (rounds * hierarchy.n_messages, rounds) if text == "max-plus" else (2 * n - 2, 2 * n - 2)
 
 
 def broadcasts(text: str, n: int) -> int:
@@ -262,7 +262,7 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
     hierarchy = build(settings, line_up.agents, pairs(n))
     usual = "variable-elimination" if settings.kind == "coordination-graph" else "exact"
     evaluator = text if text in WAYS else usual
-    if settings.kind == "coordination-graph" and not hierarchy.neighbours:
+    if settings.kind == "coordination-graph" and not hierarchy.neighbors:
         evaluator = "exact"  # a single agent has no neighbors
     decision = DecisionSettings(rule="value", evaluator=evaluator)
     return LEARNER.model_copy(update={"decision": decision}), line_up, hierarchy

@@ -179,7 +179,7 @@ def _profile(names: tuple[str, str], own: Arrangement, steps: int, wanted: float
         evaluator=search_method(team),
         decisions=decisions,
         tried=(team.counts.joint_actions - before) / decisions,
-        formula=team.hierarchy.joint_actions(len(team.action_set)),
+        formula=team.hierarchy.count_joint_actions(len(team.action_set)),
         seconds=each,
     )
 

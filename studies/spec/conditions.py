@@ -137,8 +137,8 @@ class ConditionSettings(Settings):
         if not self.learner.uses_hierarchy:
             ignored = topology != parse("chain")
             return (f"topology: left out, {learner} passes no actions down",) if ignored else ()
-        ignored = topology.considers != "descendants"
-        return (f"topology.considers: left out, {learner} considers nobody",) if ignored else ()
+        ignored = topology.lookahead != "descendants"
+        return (f"topology.lookahead: left out, {learner} has no lookahead",) if ignored else ()
 
     def remarks(self) -> tuple[str, ...]:
         """Return whose plans do not know whose weights, a line for each part of a mixed team.
@@ -148,7 +148,7 @@ class ConditionSettings(Settings):
         learner = self.learner
         if isinstance(learner, WrittenSettings) and not learner.value:
             return ("learner.value: nothing is worth anything, so that actions are random",)
-        if not isinstance(learner, MixedSettings) or self.topology.considers == "none":
+        if not isinstance(learner, MixedSettings) or self.topology.lookahead == "none":
             return ()
         return tuple(
             f"learner.parts[{k}]: plans for agents of other parts by its own values alone: nobody "

@@ -12,7 +12,9 @@ that a TOML file would have for them.
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
@@ -94,12 +96,12 @@ def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
     """Return the table of the topology of just these agents and edges, or neighbours."""
     relations = {}
     if isinstance(graph, Hierarchy):
-        if graph.edges and graph.neighbours:
+        if graph.edges and graph.neighbors:
             raise SpecError("topology: a hierarchy of edges and neighbours has no table in a spec")
         agents: list[str] = list(graph.agents)
-        pairs = [(agents[a], agents[b]) for a, b in graph.edges or graph.neighbours]
-        of_neighbours = bool(graph.neighbours)
-        relations = {"told": graph.told, "considers": graph.considers}
+        pairs = [(agents[a], agents[b]) for a, b in graph.edges or graph.neighbors]
+        of_neighbours = bool(graph.neighbors)
+        relations = {"communication": graph.communication, "lookahead": graph.lookahead}
     else:
         agents = list(map(str, graph))
         pairs = [(str(a), str(b)) for a, b in graph.edges]
@@ -158,6 +160,8 @@ class Spec(Settings):
     ['ridge 1.0', 'ridge 100.0', 'online']
     """
 
+    title: str | None = None
+    """Title of the report. By default, the first sentence of the comment at the top of the file."""
     study: str = "learning-curve"
     """Which study, by name."""
     preset: str = "default"
@@ -364,6 +368,8 @@ class Spec(Settings):
             raise SpecError(f"{title}: is not valid TOML: {error}") from None
         except RecursionError:
             raise SpecError(f"{title}: is nested too deeply") from None
+        if comment := first_sentence(text):
+            table = {"title": comment, **table}
         for change in changes:
             with refused(f"--set {change}: "):
                 table = _changed(table, assignment(change))
@@ -433,6 +439,17 @@ class Spec(Settings):
         if not self.keep_teams:  # studies of before there was a choice say no more
             del table["keep_teams"]
         return {key: value for key, value in table.items() if value not in ([], ())}
+
+
+def first_sentence(text: str) -> str:
+    r"""Return the first sentence of the comment at the top of a TOML text; empty without one.
+
+    >>> first_sentence("# Do two robots learn? See Fig. 5.\nstudy = 'scaling'")
+    'Do two robots learn?'
+    """
+    lines = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    comment = " ".join(line[1:].strip() for line in lines if not line.startswith("#:"))
+    return re.split(r"(?<=[?!])\s|[.:](?:\s|$)", comment, maxsplit=1)[0].strip()
 
 
 def _changed(table: TomlTable, change: TomlTable) -> TomlTable:

@@ -194,7 +194,7 @@ def test_kept_teams_are_evaluated_again_as_it_says(tmp_path, monkeypatch, capsys
         again = again.replace(large, less)
     exec(again, {"__name__": "__main__"})
     assert re.findall(r"^(\S.*?)  ", capsys.readouterr().out, re.MULTILINE) == [
-        "chain", "tree:2", "{told = 'none'}",
+        "chain", "tree:2", "{communication = 'none'}",
     ]  # fmt: skip
     exec(acting, {"na": na})
     assert capsys.readouterr().out.startswith("[")

@@ -27,7 +27,7 @@ STUDIES = {
     "chain-order": {**FITTED, "sweep": {"topology": ["chain", "chain:reversed"]}},
     "hierarchies": {**FITTED, "sweep": {"topology": ["chain", "independent"]}},
     "scaling": {**FITTED, "sweep": {"scenario.particles": [2, 3]}},
-    "edges": {**FITTED, "evaluations": {"told only": {"topology": {"considers": "none"}}}},
+    "edges": {**FITTED, "evaluations": {"told only": {"topology": {"lookahead": "none"}}}},
     "experience": {**BESIDE_RANDOM, "decisions": 20},
 }
 

@@ -84,7 +84,7 @@ def test_it_acts_learns_saves_and_loads(case: tuple[LineUp, Hierarchy], tmp_path
     assert np.isfinite(fuzzy(team).learner.theta).all()
     assert (np.abs(fuzzy(team).learner.theta).sum(axis=1) > 0).all()  # every agent learned
     assert fuzzy(team).evaluator is not None
-    assert fuzzy(team).evaluator.counts.joint_actions == 4 * hierarchy.joint_actions(4)
+    assert fuzzy(team).evaluator.counts.joint_actions == 4 * hierarchy.count_joint_actions(4)
     team.save(tmp_path / "team.npz")
     other = team_of(scenario, hierarchy)
     other.load(tmp_path / "team.npz")

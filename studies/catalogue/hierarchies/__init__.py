@@ -48,7 +48,9 @@ REFERENCE = "chain"
 """The hierarchy that others are compared with, if it is there."""
 DECIDING = "decision [ms]"
 """Title of the time that a decision takes."""
-MESSAGES = "Messages: decisions told. States that are broadcast, to predict by, come on top."
+MESSAGES = (
+    "Messages: decisions communicated. Broadcast states, which predictors use, are not counted."
+)
 
 
 def check(spec: Spec) -> None:

@@ -67,7 +67,7 @@ def measure(trial: Trial) -> TrialResult:
     numbers = {
         "robots": float(len(session.world.groups)),
         "agents": float(len(hierarchy)),
-        "messages": float(hierarchy.messages),
+        "messages": float(hierarchy.n_messages),
         "joint_actions": tried / len(session.deciding),
         "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
         "weight_bytes": float(team.weight_bytes),

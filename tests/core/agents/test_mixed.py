@@ -169,7 +169,7 @@ def test_slots_follow_who_is_told() -> None:
     assert [slot.agents.tolist() for slot in one_by_one] == [[0], [1], [2], [3]]
     assert one_by_one[3].senders.tolist() == [0, 2]
     assert one_by_one[3].receivers.tolist() == [3, 3]
-    silent = Hierarchy("abc", [("a", "b"), ("b", "c")], told="none")
+    silent = Hierarchy("abc", [("a", "b"), ("b", "c")], communication="none")
     assert [slot.agents.tolist() for slot in slots_of(silent, [0] * 3, [True])] == [[0, 1, 2]]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_up_environments import Huge, Keyed, Reusing, Wide, WideUnsaid
 
-from nested_agents.scenarios.adapters.adapted import from_pettingzoo
+from nested_agents.scenarios.adapters.scenario import from_pettingzoo
 from nested_agents.scenarios.checking.checker import ScenarioError, check_scenario
 
 

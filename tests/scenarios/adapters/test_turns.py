@@ -11,7 +11,7 @@ from pettingzoo import ParallelEnv
 from pettingzoo.test import api_test, seed_test
 
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.scenarios.adapters.passing_down import PassingDownEnv
+from nested_agents.scenarios.adapters.turns import TurnBasedEnv
 from nested_agents.scenarios.box_pushing.environments import RobotsEnv, WheelsEnv
 
 FAST: Any = {"action_repeat": 2}
@@ -85,7 +85,7 @@ class Climbing(Leaving):
         return self._told(), paid, dict.fromkeys(names, False), breaks, infos
 
 
-def of_joint_steps(env: PassingDownEnv, act: Any) -> Any:
+def of_joint_steps(env: TurnBasedEnv, act: Any) -> Any:
     """Yield an agent's observation and action with what `last` says that its next turn brought."""
     begun: dict[str, tuple[Any, int]] = {}
     for name in env.agent_iter():
@@ -102,10 +102,10 @@ def of_joint_steps(env: PassingDownEnv, act: Any) -> Any:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: PassingDownEnv(WheelsEnv(FAST, steps=15)),
-        lambda: PassingDownEnv(WheelsEnv(FAST, steps=15), TREE),
-        lambda: PassingDownEnv(RobotsEnv(FAST, steps=15)),
-        lambda: PassingDownEnv(Leaving()),
+        lambda: TurnBasedEnv(WheelsEnv(FAST, steps=15)),
+        lambda: TurnBasedEnv(WheelsEnv(FAST, steps=15), TREE),
+        lambda: TurnBasedEnv(RobotsEnv(FAST, steps=15)),
+        lambda: TurnBasedEnv(Leaving()),
     ],
 )
 def test_pettingzoo_finds_nothing(make: Any) -> None:
@@ -118,7 +118,7 @@ def test_pettingzoo_finds_nothing(make: Any) -> None:
 
 
 def test_it_is_the_world_of_the_parallel_environment() -> None:
-    turns, parallel = PassingDownEnv(WheelsEnv(FAST, steps=6), TREE), WheelsEnv(FAST, steps=6)
+    turns, parallel = TurnBasedEnv(WheelsEnv(FAST, steps=6), TREE), WheelsEnv(FAST, steps=6)
     turns.reset(seed=4)
     told = parallel.reset(seed=4)[0]
     rng = np.random.default_rng(0)
@@ -133,7 +133,7 @@ def test_it_is_the_world_of_the_parallel_environment() -> None:
             assert not ended
             assert not broken
             passed = np.zeros((4, 4))
-            for superior in TREE.above(place):
+            for superior in TREE.senders(place):
                 passed[superior, actions[TREE.agents[superior]]] = 1
             assert (seen[own:] == passed.ravel()).all()
             turns.step(actions[name])
@@ -146,7 +146,7 @@ def test_it_is_the_world_of_the_parallel_environment() -> None:
 
 
 def test_what_is_passed_is_of_this_step_alone() -> None:
-    env = PassingDownEnv(RobotsEnv(FAST, steps=3))
+    env = TurnBasedEnv(RobotsEnv(FAST, steps=3))
     env.reset(seed=0)
     env.step(np.array([1, 3]))
     assert env.observe("robot1")[-16:].tolist() == [0] * 16
@@ -156,7 +156,7 @@ def test_what_is_passed_is_of_this_step_alone() -> None:
 
 
 def test_who_has_left_passes_nothing_down() -> None:
-    env = PassingDownEnv(Leaving())
+    env = TurnBasedEnv(Leaving())
     env.reset()
     for _ in range(3):
         env.step(1)
@@ -170,7 +170,7 @@ def test_who_has_left_passes_nothing_down() -> None:
 
 @pytest.mark.parametrize("make", [EndsForAll, CutForAll])
 def test_the_key_for_all_ends_the_turns(make: Any) -> None:
-    env = PassingDownEnv(make())
+    env = TurnBasedEnv(make())
     env.reset(seed=0)
     acted = 0
     for _ in env.agent_iter(100):
@@ -182,7 +182,7 @@ def test_the_key_for_all_ends_the_turns(make: Any) -> None:
 
 
 def test_between_turns_of_a_step_nothing_is_to_be_learned() -> None:
-    env = PassingDownEnv(Climbing(plays=5))
+    env = TurnBasedEnv(Climbing(plays=5))
     env.reset()
     for first in (0, 1, 2):
         before = env.observe("a")[:1]
@@ -196,7 +196,7 @@ def test_between_turns_of_a_step_nothing_is_to_be_learned() -> None:
 
 def test_one_reward_for_a_joint_step_is_learned_from() -> None:
     plays, rng = 800, np.random.default_rng(0)
-    env = PassingDownEnv(Climbing(plays))
+    env = TurnBasedEnv(Climbing(plays))
     env.reset()
     values: dict[tuple[str, bytes], Any] = {}
     rewards: dict[str, list[float]] = {"a": [], "b": []}
@@ -222,11 +222,14 @@ def test_one_reward_for_a_joint_step_is_learned_from() -> None:
 @pytest.mark.parametrize(
     ("act", "complaint"),
     [
-        (lambda: PassingDownEnv(Leaving(), Hierarchy(["a", "x"], [])), "agents a, x, those of the"),
+        (
+            lambda: TurnBasedEnv(Leaving(), Hierarchy(["a", "x"], [])),
+            "agents a, x, allowed: a, b, c",
+        ),
         (lambda: _of(action_space=gymnasium.spaces.Box(0, 1)), "actions of 'a': Box"),
         (lambda: _of(action_space=gymnasium.spaces.Discrete(2, start=1)), "actions of 'a'"),
         (lambda: _of(observation_space=gymnasium.spaces.Discrete(3)), "observations of 'a'"),
-        (lambda: _started().step(2), r"action 2 of a, allowed Discrete\(2\)"),
+        (lambda: _started().step(2), r"action 2 of a, allowed: Discrete\(2\)"),
         (lambda: _started().step(None), "action None of a"),
     ],
 )
@@ -236,14 +239,14 @@ def test_refusals(act: Any, complaint: str) -> None:
     assert "\n" not in str(raised.value)
 
 
-def _of(**spaces: Any) -> PassingDownEnv:
+def _of(**spaces: Any) -> TurnBasedEnv:
     env = Leaving()
     for name, space in spaces.items():
         setattr(env, name, lambda agent, space=space: space)
-    return PassingDownEnv(env)
+    return TurnBasedEnv(env)
 
 
-def _started() -> PassingDownEnv:
-    env = PassingDownEnv(Leaving())
+def _started() -> TurnBasedEnv:
+    env = TurnBasedEnv(Leaving())
     env.reset()
     return env

@@ -3,7 +3,7 @@
 import pytest
 from made_up_environments import HugeActions, Numbered, Unnamed, Walkers
 
-from nested_agents.scenarios.adapters.adapted import from_pettingzoo
+from nested_agents.scenarios.adapters.scenario import from_pettingzoo
 
 
 def test_agents_are_called_by_the_ids_of_players() -> None:
@@ -19,5 +19,5 @@ def test_agents_are_called_by_the_ids_of_players() -> None:
 
 
 def test_actions_without_bounds_are_refused() -> None:
-    with pytest.raises(ValueError, match="allowed: bounds within 1,000,000, wrap it in Rescale"):
+    with pytest.raises(ValueError, match="allowed: bounds within 1,000,000; wrap it in Rescale"):
         from_pettingzoo(HugeActions)

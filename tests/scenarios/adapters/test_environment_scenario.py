@@ -39,9 +39,9 @@ from made_up_environments import (
 from pettingzoo import ParallelEnv
 
 from nested_agents.core.learners import check_prediction
-from nested_agents.scenarios.adapters.adapted import from_gymnasium, from_pettingzoo
+from nested_agents.scenarios.adapters.scenario import from_gymnasium, from_pettingzoo
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings, PettingZooSettings
-from nested_agents.scenarios.adapters.simulators import ONLY, Played
+from nested_agents.scenarios.adapters.simulators import SINGLE, EnvironmentStep
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
@@ -301,30 +301,30 @@ IMAGE = Box(0, 255, (8, 8, 3), np.uint8)
         (lambda: GymnasiumSettings(id="Pendulum-v1", actions=1), "actions = 1"),
         (lambda: GymnasiumSettings(id="CartPole").build(), "'CartPole': .* such as CartPole-v1"),
         (lambda: GymnasiumSettings(id="CartPole-v1", centres={"o0": (1, 0)}).build(), "-v1': var"),
-        (lambda: PettingZooSettings(id="no/module").build(), "extras of nested-agents are mpe"),
+        (lambda: PettingZooSettings(id="no/module").build(), "nested-agents has the extras mpe"),
         (lambda: PettingZooSettings(id="json").build(), "scenario.id = 'json'"),
         (lambda: from_gymnasium(Odd(IMAGE)), r"images of shape \(8, 8, 3\)"),
-        (lambda: from_gymnasium(Odd(Text(3))), "observations: Text"),
+        (lambda: from_gymnasium(Odd(Text(3))), "observation: Text"),
         (lambda: from_gymnasium(Odd(done=Text(3))), "actions: Text"),
         (lambda: from_gymnasium(Odd(done=Discrete(1))), "actions: agents have 1 each"),
         (lambda: from_gymnasium(Odd(done=Box(-np.inf, 1.0, (2,)))), "wrap it in RescaleAction"),
-        (lambda: from_gymnasium(Carts(), variables={"a": 2}), r"give scenario\.ranges\.a"),
-        (lambda: from_gymnasium(Carts(), variables={"a": 9}), "a = 9: must be a numb"),
+        (lambda: from_gymnasium(Carts(), variables={"a": 2}), r"set scenario\.ranges\.a"),
+        (lambda: from_gymnasium(Carts(), variables={"a": 9}), "a = 9, allowed: a numb"),
         (lambda: from_gymnasium(Carts(), variables={"a": "b"}), "0 to 3 or o0, o1, o2, o3"),
-        (lambda: from_gymnasium(Carts(), variables={"a": (1, 1, 1)}), "one for each of 2"),
-        (lambda: from_gymnasium(Carts(), ranges={"b": (0.0, 1.0)}), r"ranges\.b: no state variab"),
+        (lambda: from_gymnasium(Carts(), variables={"a": (1, 1, 1)}), "one for each of 2 bodies"),
+        (lambda: from_gymnasium(Carts(), ranges={"b": (0.0, 1.0)}), r"ranges\.b: no such"),
         (lambda: from_gymnasium(Carts(), ranges={"o0": (1.0, 0.0)}), "the lower end first"),
-        (lambda: from_gymnasium(Carts(), centres={"b": (0.0, 1.0)}), r"centres\.b: no state varia"),
+        (lambda: from_gymnasium(Carts(), centres={"b": (0.0, 1.0)}), r"centres\.b: no such"),
         (lambda: from_gymnasium(Carts(), centres={"o0": (1.0, 0.0)}), "centres .* must increase"),
-        (lambda: from_gymnasium(Carts(), success={"b": (0.0, 1.0)}), r"success\.b: no state vari"),
+        (lambda: from_gymnasium(Carts(), success={"b": (0.0, 1.0)}), r"success\.b: no such"),
         (lambda: from_gymnasium(Carts(), success={"o0": 3.0}), "o0 must be a range"),
         (lambda: from_gymnasium(Carts(), success={"return": (0, 1)}), "return must be a number"),
         (lambda: from_gymnasium(Carts(), angles={"a": {"cos": 1, "sin": 1}}), "two numbers"),
         (lambda: from_gymnasium(Carts(), angles={"o1": 0}), "another state variable has this"),
-        (lambda: from_gymnasium(Grown(Box(0.0, 1.0, (2,)))).reset(0), "observed are 3 numbers, of"),
+        (lambda: from_gymnasium(Grown(Box(0.0, 1.0, (2,)))).reset(0), "at reset: 3 numbers"),
         (lambda: from_gymnasium(Broken()), "cannot be played, TypeError: no state"),
-        (lambda: from_gymnasium(Carts(), neutral=5), "neutral = 5: allowed 0 to 4"),
-        (lambda: from_gymnasium(Carts(), groups=((1,), (0,))), r"groups = \[\[1\], \[0\]\]"),
+        (lambda: from_gymnasium(Carts(), neutral=5), "neutral = 5, allowed: 0 to 4"),
+        (lambda: from_gymnasium(Carts(), groups=((1,), (0,))), r"\[\[1\], \[0\]\], allowed: each"),
         (lambda: from_gymnasium(Locked(), predictor="copy"), "cannot be copied, TypeError"),
         (lambda: from_gymnasium(Hidden(), predictor="copy"), "does something else than the orig"),
     ],
@@ -338,29 +338,29 @@ def test_what_cannot_be_adapted_is_refused_in_one_line(make: Any, message: str) 
 @pytest.mark.parametrize(
     ("env", "message"),
     [
-        (Blind, "observations of agent_1: o1 is nan at step 4, allowed: finite numbers"),
-        (BlindUnsaid, "observations of agent_1: o1 is nan at step 4, allowed: finite numbers"),
-        (KeyedApart, "of agent_0 keys are place, time, of agent_1 hour, place, allowed: the same"),
-        (Lacking, "observations of agent_0 at step 2: there is no 'time', which their space has"),
+        (Blind, "observation of agent_1 at step 4: o1 = nan, allowed: finite numbers"),
+        (BlindUnsaid, "observation of agent_1 at step 4: o1 = nan, allowed: finite numbers"),
+        (KeyedApart, "keys of agent_0 are place, time, of agent_1 hour, place, allowed: the same"),
+        (Lacking, "observation of agent_0 at step 2: key 'time' is missing"),
         (Leaving, "cannot be played, SystemExit: 0"),
         (Ordering, r"cannot be played, RuntimeError: \\x1b\[2J"),
-        (Late, "'agent_1' observes nothing at the start, allowed: environments in which all"),
-        (Uninvited, "'agent_9' at step 1 is none of possible_agents"),
-        (Unseeing, "'agent_1' acts, and observations at step 3 do not have it"),
-        (Unpaid, "'agent_1' acts, and rewards at step 1 do not have it"),
-        (Nameless, "possible_agents is missing or empty: let __init__ set it to a list"),
+        (Late, "observations at reset: 'agent_1' is missing, allowed: agents that are present"),
+        (Uninvited, "agents at step 1: 'agent_9' is not in possible_agents"),
+        (Unseeing, "observations at step 3: 'agent_1' is missing"),
+        (Unpaid, "rewards at step 1: 'agent_1' is missing"),
+        (Nameless, "possible_agents is missing or empty, allowed: all agents"),
         (Ambiguous, "agents 1, 1: their names must differ"),
-        (Masked, "actions of agent_0: observations have action_mask, .* wrap it so that an"),
-        (MaskedBeside, "actions of agent_0: infos have action_mask, .* wrap it so that an"),
-        (PaidTwice, r"reward of agent_0 at step 1 of shape \(2,\), allowed: one number"),
-        (PaidNothing, "reward of agent_0 at step 3 is nan, allowed: a finite number"),
-        (OldParallel, "step returns 4 values: the old interface, .*; allowed: 5, what is obse"),
-        (OldParallelStart, "reset returns no pair of what is observed and infos: the old interf"),
-        (OldCart, "step returns 4 values: the old interface, .*; allowed: 5, what is observed"),
-        (OldStartCart, "reset returns no pair of what is observed and infos: the old interface"),
+        (Masked, "actions of agent_0: observation has action_mask, .* wrap yours so that an"),
+        (MaskedBeside, "actions of agent_0: info has action_mask, .* wrap yours so that an"),
+        (PaidTwice, r"reward of agent_0 at step 1 = array.*, allowed: one finite number"),
+        (PaidNothing, "reward of agent_0 at step 3 = nan, allowed: one finite number"),
+        (OldParallel, "step returns 4 values, allowed: 5, .*Gymnasium before 0.26"),
+        (OldParallelStart, "reset must return observation and info .Gymnasium before 0.26"),
+        (OldCart, "step returns 4 values, allowed: 5, .*Gymnasium before 0.26"),
+        (OldStartCart, "reset must return observation and info .Gymnasium before 0.26"),
         (UndecidedCart, "terminated at step 1 = None, allowed: true or false"),
-        (Chosen, r"observations of agent_0 at step 3: side: \[-1\] is outside of Discrete"),
-        (Truncating, r"observations of agent_0 at the start: .* are no numbers of Box\(-1, 1"),
+        (Chosen, r"observation of agent_0 at step 3: side: \[-1\], allowed: Discrete"),
+        (Truncating, r"observation of agent_0 at reset: .*, allowed: Box\(-1, 1"),
     ],
 )
 def test_what_an_environment_does_wrong_is_said_when_it_is_built(env: Any, message: str) -> None:
@@ -413,7 +413,7 @@ def test_tables_and_discrete_observations() -> None:
     world = from_gymnasium(Odd(table), variables={"x": 0, "y": "goal1", "each": ("goal0", 1)})
     assert [v.name for v in world.state_space.variables] == ["x", "y", "each"]
     observed = {"goal": np.array([0.3, -0.4]), "odds": np.array([0, 1])}
-    states = world.states_of(Played({ONLY: observed}, {}, False, False, 0))
+    states = world.states_of(EnvironmentStep({SINGLE: observed}, {}, False, False, 0))
     assert states == pytest.approx(np.array([[0.3, -0.4, 0.3], [0.3, -0.4, -0.4]]))
     named = Dict({"height": Box(0.0, 1.0, (1,)), "side": Discrete(2)})
     names = [v.name for v in from_gymnasium(Odd(named)).state_space.variables]

@@ -91,7 +91,10 @@ def test_a_study_keeps_the_file_and_asks_for_trust(
         (GymnasiumSettings(id=f"{FILE}:Nobody"), f"{FILE} has no 'Nobody'"),
         (GymnasiumSettings(id=FILE), "must be written path/to/file.py:name"),
         (GymnasiumSettings(id="nothing.py:Cart"), "nothing.py: No such file"),
-        (PettingZooSettings(id="sisl/multiwalker-v0"), "has registered no such id; did you mean"),
+        (
+            PettingZooSettings(id="sisl/multiwalker-v0"),
+            "is not registered with PettingZoo; did you mean",
+        ),
     ],
 )
 def test_what_cannot_be_made_is_refused_by_its_id(
