@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.aggregates import Aggregates, aggregate
-from ..results.analysis import Difference
 from ..results.comparison import ComparisonTable
+from ..results.differences import Difference
 from ..store import durable
 
 if TYPE_CHECKING:

@@ -35,8 +35,8 @@ from ..presentation.headlines import below_random, headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.choices import choose_trials
 from ..results.comparison import compare_conditions, missing_reference, power_with_first
+from ..results.joining import join_sizes
 from ..results.notation import wrapped
-from ..results.parts import join_sizes
 from ..results.results import Results, read
 from ..spec.conditions import ConditionSettings
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of

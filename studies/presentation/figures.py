@@ -16,8 +16,10 @@ from numpy.typing import ArrayLike
 
 from ...core.fonts import cover_text
 from ..results.aggregates import Aggregates
-from ..results.analysis import Difference, Figures
-from ..results.statistics import LEVEL, Estimate, stack_estimates
+from ..results.analysis import Figures
+from ..results.differences import Difference
+from ..results.permutation_tests import LEVEL
+from ..results.statistics import Estimate, stack_estimates
 from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")

@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from ..results.analysis import Difference, estimate_of
+from ..results.analysis import estimate_of
 from ..results.comparison import compare_conditions
+from ..results.differences import Difference
 from ..results.notation import format_estimate, wrapped
+from ..results.permutation_tests import LEVEL
 from ..results.results import Results
-from ..results.statistics import LEVEL
 from ..spec.controls import (
     LEARN_NOTHING,
     TROUBLESHOOTING,

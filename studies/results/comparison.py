@@ -13,21 +13,10 @@ from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
-from .analysis import (
-    MIN_RUNS,
-    NOTHING,
-    BySeed,
-    Difference,
-    Pair,
-    Summary,
-    differences,
-    identity_lines,
-    select_shared,
-    steps_estimate,
-    verdicts,
-)
+from .analysis import NOTHING, Summary, identity_lines, steps_estimate, verdicts
+from .differences import MIN_RUNS, BySeed, Difference, Pair, differences, select_shared
 from .notation import wrapped
-from .power import power_lines
+from .power_text import power_lines
 from .recovery import RECOVERY, recovery_by_seed
 from .results import SECONDS, STEPS, Results, describe_number, row_means
 from .series import LAST_STEP

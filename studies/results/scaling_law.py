@@ -17,10 +17,12 @@ from . import laws
 from .analysis import Summary
 from .comparison import title_of, values_of
 from .notation import format_estimate, format_number, format_p, wrapped
-from .power import APART, seeds_for
+from .permutation_tests import LEVEL, holm
+from .power import seeds_for
+from .power_text import APART
 from .results import Results
 from .samples import GEOMETRIC, of_numbers, of_rates, of_times
-from .statistics import LEVEL, NOT_NEGATIVE, Array, bootstrap, holm
+from .statistics import NOT_NEGATIVE, Array, bootstrap
 
 WINDOW = 5
 """Episodes in a row whose mean success must reach a criterion."""

@@ -11,8 +11,9 @@ from published_tables import print_table
 import nested_agents as na
 from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.notation import format_estimate, format_number, format_p
+from nested_agents.studies.results.permutation_tests import paired_permutation
 from nested_agents.studies.results.results import Results
-from nested_agents.studies.results.statistics import Estimate, bootstrap, paired_permutation
+from nested_agents.studies.results.statistics import Estimate, bootstrap
 from nested_agents.studies.store.database import EVALUATION
 from research import RESULTS, equal_treatment
 from research.studies.chain_order import equivalence

@@ -9,7 +9,8 @@ conditions and both measures.
 
 from collections.abc import Sequence
 
-from ...results.analysis import Analysis, Figures, Pair, Summary, estimate_of, judged, phases_of
+from ...results.analysis import Analysis, Figures, Summary, estimate_of, judged, phases_of
+from ...results.differences import Pair
 from ...results.results import Results
 from ...results.statistics import exactly
 from ..study import measure as measure

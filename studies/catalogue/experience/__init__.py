@@ -15,15 +15,8 @@ import numpy as np
 
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import (
-    EVALUATED,
-    Analysis,
-    Figures,
-    Summary,
-    differences,
-    estimate_of,
-    verdicts,
-)
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, verdicts
+from ...results.differences import differences
 from ...results.results import CPU, Results
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, stack_estimates
 from ...spec.spec import Spec

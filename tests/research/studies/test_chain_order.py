@@ -9,7 +9,8 @@ import pytest
 from made_up_results import NOTHING, Arrays
 
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.analysis import Analysis, Difference
+from nested_agents.studies.results.analysis import Analysis
+from nested_agents.studies.results.differences import Difference
 from nested_agents.studies.spec.spec import Spec
 from research import SPECS
 from research.studies import chain_order as chain_order

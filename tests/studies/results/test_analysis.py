@@ -8,18 +8,16 @@ from made_up_results import ablation
 from scipy import stats
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.studies.results.analysis import (
+from nested_agents.studies.results.analysis import estimate_of, estimate_over_seeds, verdicts
+from nested_agents.studies.results.comparison import compare_conditions
+from nested_agents.studies.results.differences import (
     Difference,
     difference,
     differences,
-    estimate_of,
-    estimate_over_seeds,
     paired_difference,
     ratio,
     select_shared,
-    verdicts,
 )
-from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.results import (
     STEPS,
     Results,

@@ -10,7 +10,7 @@ from nested_agents.core.interface.measures import NO_SUCCESS
 from nested_agents.studies.catalogue.study import analyse_as
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results.comparison import compare_conditions
-from nested_agents.studies.results.statistics import LEVEL
+from nested_agents.studies.results.permutation_tests import LEVEL
 
 CHANCES = {
     ("chain", "team", 2): 0.9,

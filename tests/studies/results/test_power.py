@@ -3,27 +3,30 @@ import pytest
 from scipy import special, stats
 
 from nested_agents.studies.results import curves, laws, samples
-from nested_agents.studies.results.analysis import Difference, adjust, verdict_lines
+from nested_agents.studies.results.analysis import verdict_lines
+from nested_agents.studies.results.differences import Difference, adjust
 from nested_agents.studies.results.notation import format_number
+from nested_agents.studies.results.permutation_tests import (
+    LEVEL,
+    independent_permutation,
+    paired_permutation,
+)
 from nested_agents.studies.results.power import (
     detectable,
     detectable_independent,
     deviation_of,
-    exponent_text,
-    independent_power_lines,
     power,
-    power_lines,
     power_of_t,
-    power_text,
     seeds_for,
     seeds_needed,
 )
-from nested_agents.studies.results.statistics import (
-    LEVEL,
-    bootstrap,
-    independent_permutation,
-    paired_permutation,
+from nested_agents.studies.results.power_text import (
+    exponent_text,
+    independent_power_lines,
+    power_lines,
+    power_text,
 )
+from nested_agents.studies.results.statistics import bootstrap
 
 
 def found_in_simulation(

@@ -10,18 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from nested_agents.studies.results.statistics import (
+from nested_agents.studies.results.permutation_tests import (
     BITS,
     EXACT,
-    RESAMPLES,
     _flips,
-    bootstrap,
     friedman,
     holm,
     paired_permutation,
-    rate,
-    rates,
 )
+from nested_agents.studies.results.statistics import RESAMPLES, bootstrap, rate, rates
 
 RNG = np.random.default_rng(0)
 
