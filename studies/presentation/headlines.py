@@ -1,4 +1,4 @@
-"""A sentence for each team that learns: whether it has learned, and beside what."""
+"""A sentence for each learning team: whether it learned, compared with its controls."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,11 +19,11 @@ from ..spec.controls import (
 from .progress import count
 
 MOST = 3
-"""Teams that learn of which sentences are made; of more, tables and verdicts tell."""
+"""Largest number of learning teams that have sentences; more are left to the tables."""
 
 
 def headlines(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return sentences that say what the teams of a study have learned, in evaluation.
+    """Return sentences on what the teams of a study have learned, by evaluation.
 
     They are judged by `Results.main`. A team has learned if it is significantly better than the
     control that differs from it in learning alone, p adjusted over all conditions. None of teams
@@ -53,7 +53,7 @@ def headlines(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tu
 def below_random(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
     """Return a remark on the learners whose evaluation ends below that of random actions, in lines.
 
-    Learners are judged by the means of `Results.main`, beside the random control of their scenario.
+    Learners are judged by the means of `Results.main`, by the random control of their scenario.
     """
     main = results.main
     there = {c: settings[c] for c in results.of_phase("evaluation") if c in settings}

@@ -44,7 +44,7 @@ def stratified_bootstrap(tasks: Tasks, statistic: Callable[[Tasks], Array]) -> E
     tasks
         Scores ``(n_runs,)`` of each task.
     statistic
-        Function of tasks whose resamples are the first axis of each.
+        Function of tasks; resamples are the first axis of each.
     """
     rng = np.random.default_rng(0)
     drawn = [rng.integers(len(own), size=(RESAMPLES, len(own))) for own in tasks]

@@ -72,7 +72,7 @@ def estimate_over_seeds(values: Array, measure: Measure) -> Estimate:
 
 
 def steps_estimate(means: Array, steps: Measure) -> Estimate:
-    """Return the mean length of episodes, whose interval ends at the longest allowed.
+    """Return the mean length of episodes with an interval up to the longest allowed.
 
     Unlike the interval of a share, it has no width where all episodes are equally long.
     """
@@ -121,7 +121,7 @@ class Analysis:
 NOTHING = "Nothing to compare: no two conditions have two seeds each."
 TESTS = {
     True: "permutation of signs over seeds",
-    False: "permutation of labels of independent samples, whose intervals are Welch's",
+    False: "permutation of labels of independent samples, with Welch's intervals",
 }
 """Names of the tests of paired and of independent samples."""
 TWO_TESTS = (

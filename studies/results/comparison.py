@@ -284,7 +284,7 @@ def values_by_seed(
     """Return a measure, its values by condition, and their phase.
 
     Values have a row for each seed and a column for each episode, or one column for a number of
-    trials or a measure of recovery, whose phase is empty.
+    trials or a measure of recovery, which have an empty phase.
 
     Raises
     ------

@@ -83,7 +83,7 @@ def differences(
     groups
         Pairs to compare by group, see `compare_pair`.
     measure
-        The measure whose means are compared, whose range limits the intervals.
+        The compared measure; its range limits the intervals.
     """
     compared = [
         (group, difference)
@@ -135,7 +135,7 @@ def compare_pair(
 
 
 def _adjusted(compared: Sequence[Difference]) -> list[Difference]:
-    """Return differences whose p is adjusted over all of them by Holm's method."""
+    """Return differences with p adjusted over all of them by Holm's method."""
     ps = holm([d.raw for d in compared]).tolist()
     return [replace(d, p=p) for d, p in zip(compared, ps, strict=True)]
 
@@ -143,7 +143,7 @@ def _adjusted(compared: Sequence[Difference]) -> list[Difference]:
 def adjust(
     compared: Sequence[tuple[str, str, Array, Array, Estimate]],
 ) -> tuple[Difference, ...]:
-    """Return differences of paired values ``(n_seeds,)`` whose estimates are given.
+    """Return differences of paired values ``(n_seeds,)`` with given estimates.
 
     p is adjusted over all of them by Holm's method.
 

@@ -19,7 +19,7 @@ from .long_form import name_key
 from .results import Results, StepLimits, assemble
 
 Part = tuple[StudyOutline, Results]
-"""What a part consists of, and what it measured."""
+"""Outline and results of a part."""
 
 
 def join_parts(parts: Sequence[Part]) -> Part | None:
@@ -74,7 +74,7 @@ def join_sizes(
     Parameters
     ----------
     results
-        Combined results, whose conditions name their study as `DIRECTORY`.
+        Combined results with a column `DIRECTORY`.
     tables
         Specs by study.
     settings

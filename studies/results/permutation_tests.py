@@ -102,7 +102,7 @@ def paired_permutation(
 
 
 BITS = 8
-"""Number of signs whose patterns have a table of sums; longer patterns add up several tables."""
+"""Number of signs of a table of sums; longer patterns add up several tables."""
 
 
 @lru_cache(maxsize=2)

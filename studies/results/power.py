@@ -3,8 +3,7 @@
 Power is the probability that one difference of a given size is significant among several
 comparisons. As in the first step of Holm's method, p times their number must be below `LEVEL`. The
 power of paired runs assumes that the differences of single seeds are independent and normal. The
-power of independent runs is that of the two-sample t test, whose level the permutation of labels
-keeps.
+power of independent runs is that of the two-sample t test.
 """
 
 import math
@@ -34,11 +33,11 @@ USUAL_LOG_DEVIATION = 0.5
 """The same of logarithms, as of decisions to a criterion: three in four of 279 comparisons that are
 published have less."""
 SUPPOSED = 4.0
-"""Seeds of `USUAL_DEVIATION` that are supposed beside those seen: a few that agree tell little."""
+"""Number of seeds of `USUAL_DEVIATION` that are added, because a few equal seeds say little."""
 RATES = 1.07
-"""By how much more success rates seem to deviate: they have ties and bounds, which cost a test some
-power. Without it studies of ten episodes find up to 0.04 less than is promised, with it up to 0.03,
-see `research.power`."""
+"""Factor on the deviation of success rates, because their ties and bounds reduce the power. Without
+it studies of ten episodes detect up to 0.04 less than is said, with it up to 0.03, see
+`research.power`."""
 ROUNDING = 1e-12
 """Relative deviation that counts as rounding: values that deviate by less are equal."""
 FEW_PATTERNS = 32
@@ -187,7 +186,7 @@ def _check(**arguments: float) -> None:
 def deviation_of(samples: Sequence[ArrayLike], *, of_rates: bool) -> float | None:
     """Return the standard deviation of the differences of single seeds, pooled over comparisons.
 
-    Of rates, `SUPPOSED` seeds of `USUAL_DEVIATION` count beside those of every comparison, and it
+    For rates, `SUPPOSED` seeds of `USUAL_DEVIATION` are added to each comparison, and it
     is `RATES` times as large. None if it cannot be known.
 
     Parameters
@@ -248,7 +247,7 @@ def power_of_t(freedom: int, shift: float, beyond: float) -> float:
 
 @cache
 def _simulated(effect: float, seeds: int, extreme: int) -> float:
-    """Return the share of simulated studies whose observed signs are among the most extreme.
+    """Return the share of simulated studies with observed signs among the most extreme.
 
     A pattern of signs is at least as extreme as the observed one if the sizes that it takes for
     negative sum up to no more than those that are. There are never more than `extreme` such

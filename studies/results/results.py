@@ -1,8 +1,7 @@
-"""What the finished trials of a study measured, as two tidy frames: episodes and trials.
+"""Results of a study as two tidy frames: episodes and trials.
 
-Tables, comparisons, figures, reports and exported files are functions of these frames. A column's
-unit and meaning stand in ``frame.attrs["columns"]`` by its name. A part
-of a study's trials can be chosen, and several studies put together.
+Tables, comparisons, figures, reports and exported files are functions of these frames. Units and
+meanings of the columns are in ``frame.attrs["columns"]`` by name.
 """
 
 from __future__ import annotations
@@ -73,10 +72,10 @@ class Results:
     phases: tuple[str, ...] = ()
     """The phases of the episodes: training, evaluation, then others."""
     columns: Mapping[str, SpecTable] = field(default_factory=dict)
-    """By condition, what tells it from the others, see
+    """Swept keys with their values by condition, see
     `nested_agents.studies.spec.conditions.Condition`."""
     measures: tuple[Measure, ...] = (SUCCESS,)
-    """What is measured of an episode, of any condition; success first."""
+    """Measures of episodes of any condition, success first."""
     usage: tuple[str, ...] = ()
     """Names of the numbers that differ from run to run, times first."""
     pairs_episodes: bool = False
@@ -106,14 +105,14 @@ class Results:
         return {name: values for name, values in own.items() if name not in others}
 
     def has(self, condition: str, phase: str = "", measure: str = "") -> bool:
-        """Tell whether a condition has finished trials, episodes of a phase, a measure of them."""
+        """Return whether a condition has finished trials, episodes of a phase, or a measure."""
         rows = self._rows.get((phase, condition))
         if rows is None or not measure:
             return rows is not None if phase else condition in self._finished
         return measure in self._measured and not np.isnan(self._measured[measure][rows]).any()
 
     def has_any(self, condition: str, phase: str, measure: str) -> bool:
-        """Tell whether any episode of a phase has a measure, or it is none of episodes."""
+        """Return whether any episode of a phase has a measure."""
         rows = self._rows.get((phase, condition), np.empty(0, int))
         values = self._measured.get(measure, np.zeros(len(self.episodes)))
         return not np.isnan(values[rows]).all()
@@ -179,7 +178,7 @@ class Results:
         return row_means(self.by_seed(condition, phase, measure))
 
     def other_evaluations(self, condition: str) -> dict[str, str]:
-        """Return the phases of a condition's evaluations beside its own, by their names."""
+        """Return the phases of a condition's further evaluations by name."""
         return {
             phase.removeprefix(EVALUATION): phase
             for phase in self.phases
@@ -188,7 +187,7 @@ class Results:
 
     @cached_property
     def main(self) -> Measure:
-        """The measure that is compared: the first, or the return if that never varies.
+        """The measure that is compared by default: the first, or the return if that never varies.
 
         Where returns are left out, it is the first measure that can vary.
         """
@@ -279,7 +278,7 @@ def assemble(
     measures: tuple[Measure, ...],
     usage: Iterable[str],
 ) -> Results:
-    """Return results whose frames are those given, below each other, their columns described.
+    """Return results with the rows of all given frames, and descriptions of the columns.
 
     Rates are truth values. The other arguments are attributes of `Results`.
     """

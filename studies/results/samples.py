@@ -20,7 +20,7 @@ class Scale(NamedTuple):
     """A scale on which means are fitted."""
 
     quantity: str
-    """Name of the quantity whose logarithm is fitted."""
+    """Name of the quantity; its logarithm is fitted."""
     curves: tuple[Curve, ...]
     """Laws, simple ones first."""
     back: Callable[[Array], Array]
@@ -55,7 +55,7 @@ class Sample(NamedTuple):
     sizes: Array
     """``(m,)`` in ascending order, 1 or more."""
     values: Array
-    """``(n_seeds, m)`` linearized values on the scale, whose mean is fitted."""
+    """``(n_seeds, m)`` linearized values on the scale; their mean is fitted."""
     observed: Array
     """``(n_seeds, m)`` the values themselves."""
     censored: BoolArray

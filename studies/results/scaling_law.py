@@ -1,4 +1,4 @@
-"""How the results of a study grow with the size of its teams: laws by groups of conditions."""
+"""Growth of a study's results with the team size: laws by groups of conditions."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ class ScalingLaw(NamedTuple):
     title: str
     """Title of the measure."""
     size: str
-    """What is counted: robots, joints, agents."""
+    """Name of the size: robots, joints, agents."""
     fits: tuple[Fitted, ...]
-    """By group."""
+    """Laws by group."""
     predicted: tuple[int, ...]
     """Sizes that are predicted besides those that were run."""
     remarks: tuple[str, ...] = ()
@@ -70,7 +70,7 @@ class ScalingLaw(NamedTuple):
 
     @property
     def legend(self) -> tuple[str, ...]:
-        """How the table's values and intervals are computed, in lines."""
+        """Computation of the table's values and intervals, in lines."""
         text = "Intervals of parameters: 95%, seeds resampled, Student's."
         scales = {law.sample.scale for _, law, *_ in self.fits if law is not None}
         if self.predicted:
@@ -112,8 +112,8 @@ class ScalingLaw(NamedTuple):
         seeds = seeds_for(APART, spread, len(pairs)) if spread > 0.0 else None
         if seeds is not None:
             lines += wrapped(
-                f"Power: exponents that differ by {format_number(APART)} are significantly "
-                f"different with probability 0.80 by about {seeds} seeds at these sizes."
+                f"Power: about {seeds} seeds at these sizes detect a difference of exponents of "
+                f"{format_number(APART)} with power 0.80."
             )
         return lines
 

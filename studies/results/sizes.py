@@ -8,7 +8,7 @@ from typing import NamedTuple
 from .results import Results
 
 UNKNOWN = "agent groups"
-"""What bodies are called if their number is not swept."""
+"""Name of the bodies if their number is not swept."""
 
 
 class Sizes(NamedTuple):
@@ -24,13 +24,13 @@ class Sizes(NamedTuple):
     """
 
     counts: Mapping[str, int]
-    """By condition."""
+    """Number by condition."""
     keys: Sequence[str] = ()
     """Swept keys that are this number, whatever the scenario calls it."""
 
     @classmethod
     def of(cls, results: Results, conditions: Iterable[str]) -> Sizes:
-        """Return those of conditions whose trials have counted them."""
+        """Return the sizes of conditions from the counts of their trials."""
         counts = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
         swept = {c: results.columns.get(c, {}) for c in counts}
         keys = dict.fromkeys(key for row in swept.values() for key in row)
@@ -39,12 +39,12 @@ class Sizes(NamedTuple):
 
     @property
     def word(self) -> str:
-        """What bodies are called, in the plural."""
+        """Name of the bodies in the plural."""
         names = (k.removeprefix("scenario.") for k in self.keys if k.startswith("scenario."))
         return next(names, UNKNOWN)
 
     def shown(self, number: int) -> str:
-        """Return a number in words; nothing if it is the same everywhere, and nobody named it."""
+        """Return a number with its name; nothing if it is the same everywhere and not swept."""
         if not self.keys and len(set(self.counts.values())) == 1:
             return ""
         return f"{number} {self.word.removesuffix('s') if number == 1 else self.word}"

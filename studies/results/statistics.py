@@ -155,7 +155,7 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     of episodes is divided by the design effect (Kish 1965), ``1 + (n_episodes - 1) r``, where r is
     the correlation of the episodes of a run. It measures how much more the rates of the runs vary
     than those of independent episodes. Because a few failures say little about r, it is estimated
-    with `PRIOR_FAILURES` further failures in runs whose episodes all end equally. If every episode
+    with `PRIOR_FAILURES` further failures in runs with equal ends of all episodes. If every episode
     of every run ended the same way, the interval is that of one episode a run.
 
     Parameters
@@ -240,7 +240,8 @@ def probability_higher(pairs: Sequence[tuple[Array, Array]]) -> Estimate:
     """Return the probability that a run scores higher than one of the reference, ties half.
 
     It is the mean of Mann and Whitney's U over tasks, divided by the number of pairs of runs
-    (Agarwal et al. 2021). The interval of 95% has the percentiles of runs resampled within tasks.
+    (Agarwal et al. 2021). The interval of 95% has the percentiles of runs resampled within
+    tasks. At 0 and 1 it is as wide as Wilson's for the smaller number of runs.
 
     Parameters
     ----------
@@ -258,8 +259,13 @@ def probability_higher(pairs: Sequence[tuple[Array, Array]]) -> Estimate:
         n_own, n_base = won.shape
         means = _resample_weights(n_own, 2 * task) @ won
         drawn += (means * _resample_weights(n_base, 2 * task + 1)).sum(axis=1) / len(wins)
+    value = np.mean([won.mean() for won in wins])
     low, high = np.quantile(drawn, [0.025, 0.975])
-    return Estimate(np.mean([won.mean() for won in wins]), low, high)
+    z = float(special.ndtri(0.975))
+    reach = z**2 / (sum(min(won.shape) for won in wins) + z**2)  # as Wilson's at 0 and 1
+    low = min(low, 1.0 - reach) if value == 1.0 else low
+    high = max(high, reach) if value == 0.0 else high
+    return Estimate(value, low, high)
 
 
 @lru_cache(maxsize=8)

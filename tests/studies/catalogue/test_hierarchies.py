@@ -56,7 +56,7 @@ def test_differences_are_those_that_compare_prints() -> None:
 def test_with_few_seeds_nothing_can_be_told() -> None:
     analysis = analyse(hierarchies(CHANCES, seeds=5).frames())
     text = "\n".join(analysis.notes)
-    assert "Power: 5 seeds and 8 comparisons cannot give an adjusted p below 0.05" in text
+    assert "Power: 5 seeds cannot give an adjusted p below 0.05 among 8 comparisons" in text
     assert "worse" not in text
 
 
