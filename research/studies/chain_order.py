@@ -19,9 +19,9 @@ import numpy as np
 from nested_agents import Analysis, Study
 from nested_agents.analysis import (
     LEVEL,
+    ComparisonGroup,
     Figures,
     Friedman,
-    Group,
     Results,
     compare_conditions,
     compare_with_first,
@@ -54,7 +54,7 @@ def analyse(results: Results) -> Analysis:
     return replace(compared, notes=notes, cases=tests)
 
 
-def equivalence(group: Group) -> str:
+def equivalence(group: ComparisonGroup) -> str:
     """Return whether the orders of a group are equal but for `MARGIN`, in words."""
     low = min(float(d.estimate.low) for d in group.differences)
     high = max(float(d.estimate.high) for d in group.differences)

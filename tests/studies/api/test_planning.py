@@ -32,7 +32,7 @@ def test_a_plan_shows_trials_time_memory_and_power() -> None:
 def test_more_seeds_find_smaller_differences() -> None:
     plans = [na.plan(SPEC.model_copy(update={"seeds": n}), timed=False) for n in (8, 20, 40)]
     smallest = [
-        re.search(r"a difference of (0\.\d+) is found", " ".join(str(plan).split()))[1]
+        re.search(r"a difference of (0\.\d+) with power", " ".join(str(plan).split()))[1]
         for plan in plans
     ]
     assert smallest == sorted(smallest, reverse=True)
