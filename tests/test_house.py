@@ -186,16 +186,16 @@ def test_no_folders_import_each_other_in_a_circle(graph: nx.DiGraph) -> None:
 
 def test_a_circle_of_folders_is_named() -> None:
     roof_and_ground = {
-        "nested_agents.core": ("from .rules import base", True),
-        "nested_agents.core.rules": ("", True),
-        "nested_agents.core.rules.base": ("def f():\n    from ..spaces import S", False),
+        "nested_agents.core": ("from .values import base", True),
+        "nested_agents.core.values": ("", True),
+        "nested_agents.core.values.base": ("def f():\n    from ..spaces import S", False),
         "nested_agents.core.spaces": ("", False),
     }
     graph = imports_between(roof_and_ground)
     packages = {module for module, (_, is_package) in roof_and_ground.items() if is_package}
     assert circles(graph) == []
     assert circles(folders_of(graph, packages)) == [
-        "nested_agents.core <-> nested_agents.core.rules"
+        "nested_agents.core <-> nested_agents.core.values"
     ]
 
 

@@ -21,8 +21,8 @@ import numpy as np
 
 from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
-from ..rules.kernels.fuzzy import Partition
-from ..rules.rule_base import RuleBase
+from ..values.partitions import Partition
+from ..values.rule_base import RuleBase
 from .adaptive import Adaptive, DynamicsModel
 from .learned_prediction import LearnedPrediction, TabulatedPrediction
 from .predictors import DrivenBodies, LearnedPredictorSettings, Mirror, driven_states

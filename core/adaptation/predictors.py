@@ -25,9 +25,9 @@ from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray, IntArray, njit
 from ..plugins.settings import PartSettings, Positive, unwritten
-from ..rules.kernels.compact_states import active_compact
-from ..rules.kernels.fuzzy import Packed, Partition
-from ..rules.rule_base import RuleBase
+from ..values.partitions import Partition
+from ..values.rule_base import RuleBase
+from ..values.triangular import Layout, active_rules
 from .adaptive import DynamicsModel
 
 
@@ -225,7 +225,7 @@ def driven_states(
     periods: FloatArray,
     horizon: int,
     passes: int,
-    packed: Packed,
+    layout: Layout,
 ) -> FloatArray:
     """Return the states ``(m, b, v)`` of bodies some decisions ahead, the drivers being held.
 
@@ -245,7 +245,7 @@ def driven_states(
         Decisions ahead.
     passes
         How often each is computed: by the rules of where it begins, then of the middle of the way.
-    packed
+    layout
         Layout of the rule base.
     """
     m, b, k = drivers.shape
@@ -262,7 +262,7 @@ def driven_states(
             for at in range(m * b):
                 for x in range(v):
                     begun[at, x] = middle[at, x] = states[at, x]
-        rules, strengths = active_compact(middle, packed)
+        rules, strengths = active_rules(middle, layout)
         for c in range(m):
             moved[:] = 0.0
             for i in range(b):

@@ -27,7 +27,7 @@ from .plain import as_explorer, as_learner
 from .valuing import Present, evaluator_of, is_private
 from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
 
-SHAPED = ("learner.theta", "learner.trace", "learner.reach", "seen", "explorer", "generator")
+SHAPED = ("learner.theta", "learner.trace", "seen", "explorer", "generator")
 """What of a memory has a shape that the settings fix."""
 
 

@@ -10,7 +10,7 @@ from ..interface.agents import Placement
 from ..interface.scenario import Scenario
 from ..learners.learner import LearnerSettings
 from ..numerics import IntArray
-from ..rules.rule_base import RuleBase
+from ..values.rule_base import RuleBase
 from .plain import as_evaluator
 
 

@@ -32,7 +32,7 @@ from pydantic import Field
 from ..interface.prediction import Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
-from ..rules.rule_base import Pooled, RuleBase
+from ..values.rule_base import PooledWeights, RuleBase
 from .drawing import drawn_equal
 from .enumeration import combinations
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
@@ -46,7 +46,7 @@ CUTS = (0.25, 0.5, 0.75)
 class Search(NamedTuple):
     """What all agents look for their best responses by, who hear all."""
 
-    pooled: Pooled
+    pooled: PooledWeights
     """The weights of all."""
     starts: IntArray
     """``(m, n)`` the joint actions of which the best is improved."""

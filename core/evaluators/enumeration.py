@@ -12,7 +12,6 @@ from pydantic import Field
 
 from ..interface.prediction import Tables
 from ..numerics import FloatArray, IntArray
-from ..rules.kernels.dense import Tried
 from .evaluator import (
     EVALUATORS,
     Aggregation,
@@ -22,7 +21,7 @@ from .evaluator import (
     EvaluatorSettings,
 )
 
-MOST_JOINT_ACTIONS = 4**11
+MAX_JOINT_ACTIONS = 4**11
 """The most of some agents that are tried with each action of another: more fill the memory."""
 
 
@@ -34,10 +33,10 @@ def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
     ValueError
         If they are too many; before anything is allocated.
     """
-    if n_actions ** len(agents) > MOST_JOINT_ACTIONS:
+    if n_actions ** len(agents) > MAX_JOINT_ACTIONS:
         raise ValueError(
             f"learner.decision.evaluator: {n_actions} ** {len(agents)} joint actions of "
-            f"{len(agents)} agents would be tried, allowed {MOST_JOINT_ACTIONS}; use sampling"
+            f"{len(agents)} agents would be tried, allowed {MAX_JOINT_ACTIONS}; use sampling"
         )
     k = len(agents)
     grid = np.indices((n_actions,) * k).reshape(k, n_actions**k)
@@ -65,73 +64,73 @@ class ExactEnumeration(Aggregation):
     Raises
     ------
     ValueError
-        If an agent would have to try more than `MOST_JOINT_ACTIONS`.
+        If an agent would have to try more than `MAX_JOINT_ACTIONS`.
     """
 
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
         n, a = len(self.hierarchy), self.n_actions
         self._below = [combinations(self.hierarchy.searched(i), a) for i in range(n)]
-        uniform = problem.teammates == "uniform"
-        self._expected = np.full((n, a), 1.0 / a) if uniform else np.zeros((0, 0))
-        self._tried: list[Tried] = []
+        self._indices: list[IntArray] = []
+        self._given_places: list[IntArray] = []
         self._means: tuple[tuple[object, ...], FloatArray] | None = None
-        if self.hierarchy.count_joint_actions(a) >= a**n:
+        self._uses_tables = self.hierarchy.count_joint_actions(a) >= a**n
+        if self._uses_tables:
             places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
-            self._tried = [self._tried_by(i, places) for i in range(n)]
-
-    def _tried_by(self, agent: int, places: IntArray) -> Tried:
-        below = np.array(self.hierarchy.searched(agent), dtype=np.int64)
-        own = np.arange(self.n_actions)[:, None] * places[agent]
-        given = places.copy()
-        given[agent] = given[below] = 0
-        return own + self._below[agent] @ places[below], given, below
+            for agent in range(n):
+                below = list(self.hierarchy.searched(agent))
+                own = np.arange(a)[:, None] * places[agent]
+                self._indices.append((own + self._below[agent] @ places[below]).ravel())
+                given = places.copy()
+                given[[agent, *below]] = 0
+                self._given_places.append(given)
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        agent, problem = deliberation.agent, self.problem
-        conditional = problem.teammates == "conditional"
-        own_value = problem.rule == "value" and len(self.concerned[agent]) == 1
-        tables = None
-        if own_value and not conditional and self._tried:
-            tables = deliberation.prediction.tables()
-        if tables is not None:
-            tried, blocks = self._tried[agent], tables.blocks(agent)
-            self.count(agent, tried[0].size)
-            empirical = problem.teammates == "empirical"
-            expected = deliberation.frequencies if empirical else self._expected
-            weights, joint = deliberation.own_weights, deliberation.joint_action
-            return self.rules.enumerate(weights, blocks, tried, joint, expected)
-        below, probabilities = self.hierarchy.searched(agent), None
-        if problem.teammates == "empirical":
+        agent = deliberation.agent
+        below = self.hierarchy.searched(agent)
+        probabilities = None
+        if self.problem.teammates == "empirical":
             probabilities = probabilities_of(deliberation.frequencies, below)
-        elif conditional:
+        elif self.problem.teammates == "conditional":
             probabilities = np.stack([probabilities_of(rows, below) for rows in deliberation.given])
         return self.aggregate(deliberation, self._below[agent], probabilities)
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
-        """Value each own action with each of the joint actions below, from tables if there are."""
-        tables = deliberation.prediction.tables() if self._tried else None
-        if tables is None or not tables.rewarded:
+        """Return values ``(A, m)``, from tables of all joint actions if the prediction has them."""
+        tables = deliberation.prediction.tables() if self._uses_tables else None
+        if tables is None or (self.problem.rule != "value" and not tables.rewarded):
             return super().worths(deliberation, tried)
-        known, places, _ = self._tried[deliberation.agent]
-        indices = (known + int(deliberation.joint_action @ places)).ravel()
-        self.count(deliberation.agent, len(indices))
+        agent = deliberation.agent
+        given = int(deliberation.joint_action @ self._given_places[agent])
+        indices = self._indices[agent] + given
+        self.count(agent, len(indices))
         worth = self.combine(
             lambda: tables.reward_table()[indices],
-            lambda: self._mean(deliberation, tables)[indices],
+            lambda: self._table_values(deliberation, tables, indices),
         )
         return worth.reshape(self.n_actions, -1)
 
-    def _mean(self, deliberation: Deliberation, tables: Tables) -> FloatArray:
-        """Return the mean value ``(A ** n,)`` of all joint actions, once for a whole decision."""
-        weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
-        of = tables, weights, concerned
-        if self._means is None or any(a is not b for a, b in zip(self._means[0], of, strict=True)):
-            indices, value = np.arange(self.n_actions ** len(weights)), self.rules.block_values
-            each = [value(weights[i], tables.blocks(i), indices) for i in concerned]
-            self._means = of, np.add.reduce(each) / len(each)
-        return self._means[1]
+    def _table_values(
+        self, deliberation: Deliberation, tables: Tables, indices: IntArray
+    ) -> FloatArray:
+        """Return the values ``(m,)`` of joint-action indices ``(m,)`` to the deciding agent.
+
+        The mean over several agents is computed for all joint actions, once in a decision.
+        """
+        weights = deliberation.weights
+        concerned = self.concerned[deliberation.agent]
+        if len(concerned) == 1:
+            blocks = tables.blocks(deliberation.agent)
+            return self.rules.block_values(deliberation.own_weights, blocks, indices)
+        key = tables, weights, concerned
+        if self._means is None or any(a is not b for a, b in zip(self._means[0], key, strict=True)):
+            every = np.arange(self.n_actions ** len(weights))
+            values = [
+                self.rules.block_values(weights[i], tables.blocks(i), every) for i in concerned
+            ]
+            self._means = key, np.add.reduce(values) / len(values)
+        return self._means[1][indices]
 
 
 class SamplingSettings(EvaluatorSettings):
@@ -204,7 +203,7 @@ class AutoSettings(EvaluatorSettings):
         if problem.unseen == "plan" or problem.plan == "common":
             return EVALUATORS.parsed("best-response")
         free = max(1 + len(hierarchy.searched(i)) for i in range(len(hierarchy)))
-        if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MOST_JOINT_ACTIONS:
+        if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MAX_JOINT_ACTIONS:
             return EVALUATORS.parsed("exact")
         is_large = free > self.sampling_up_to or problem.value_of != "own"
         if is_large and problem.teammates == "best-response":

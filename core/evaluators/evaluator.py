@@ -20,7 +20,7 @@ from ..interface.prediction import Exploring, Prediction, rewards_of, states_by_
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import PartSettings
-from ..rules.rule_base import Pooled, RuleBase
+from ..values.rule_base import PooledWeights, RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]
 """By what a joint action is valued."""
@@ -194,12 +194,14 @@ class Learned:
         return not any(own[:64].any() or own.any() for own in each)
 
     @cached_property
-    def pooled(self) -> Pooled:
+    def pooled(self) -> PooledWeights:
         """Their weights, summed where they see the same."""
         theta = np.array([self.weights[i] for i in self.agents], dtype=float)
         bodies, firsts = np.unique(self._body_of[self.agents], return_index=True)
         summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
-        return Pooled((theta, *summed), self.agents, bodies, np.append(firsts, len(self.agents)))
+        return PooledWeights(
+            (theta, *summed), self.agents, bodies, np.append(firsts, len(self.agents))
+        )
 
 
 class Aggregation(Evaluator):
@@ -292,12 +294,12 @@ class Aggregation(Evaluator):
 
         return self.combine(lambda: rewards_of(prediction, joint_actions), values)
 
-    def mean(self, pooled: Pooled, prediction: Prediction, joint: IntArray) -> FloatArray:
+    def mean(self, pooled: PooledWeights, prediction: Prediction, joint: IntArray) -> FloatArray:
         """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""
         own, shared = states_by_group(prediction, joint, self.problem.groups, self.rules.n_own)
         if len(pooled.bodies) < len(shared):
             shared = shared[pooled.bodies]
-        return self.rules.total(pooled, own, shared) / len(pooled.agents)
+        return self.rules.summed_values(pooled, own, shared) / len(pooled.agents)
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""

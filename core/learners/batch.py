@@ -17,7 +17,7 @@ from pydantic import Field
 
 from ..numerics import FloatArray, IntArray, njit
 from ..plugins.settings import Fraction, Positive
-from ..rules.rule_base import RuleBase
+from ..values.rule_base import RuleBase
 from .learner import Learner, LearnerSettings
 
 TERMINAL, CUT_OFF = -1, -2

@@ -32,8 +32,8 @@ from ..interface.spaces import ActionSet, StateSpace, choice
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
 from ..plugins.settings import Positive
-from ..rules.kernels.fuzzy import Partition
-from ..rules.rule_base import RuleBase
+from ..values.partitions import Partition
+from ..values.rule_base import RuleBase
 from .batch import BatchTD, Earlier, Function, add_gram, row_values, solver
 from .learner import LearnerSettings
 

@@ -27,7 +27,7 @@ from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
 from ..plugins.settings import PartSettings, unwritten
-from ..rules.rule_base import RuleBase, RuleBaseSettings
+from ..values.rule_base import RuleBase, RuleBaseSettings
 
 CORE = __name__.rpartition(".learners")[0]
 """Where the rooms are in which agents are found by name."""

@@ -31,8 +31,8 @@ from pydantic import Field
 
 from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Fraction, NonNegative, Positive, unwritten
-from ..rules.kernels.updates import add_features, td_update
-from ..rules.rule_base import RuleBase
+from ..values.rule_base import RuleBase
+from ..values.updates import td_lambda_update
 from .learner import Learner, LearnerSettings
 
 
@@ -43,9 +43,9 @@ class Online(Learner):
     R / (1 - discount) and no next state.
     """
 
-    kept: tuple[str, ...] = ("theta", "trace", "reach")
+    kept: tuple[str, ...] = ("theta", "trace")
     """Names of the arrays that are saved: those of rows, and of agents the `traces`."""
-    traces = ("trace", "reach")
+    traces = ("trace",)
     reward_of: Literal["left", "entered"] = "left"
     """Whose reward is in the TD error of a step: of the state left, or of the one entered."""
 
@@ -57,7 +57,6 @@ class Online(Learner):
         self.weights = self.theta
         """The consequent weights that learn; those that decide, theta, may be an average."""
         self.trace: FloatArray = np.zeros((len(rows), rules.n_rules), rules.dtype)
-        self.reach: FloatArray = np.zeros((len(rows), rules.n_parts))
         self._previous: FloatArray | None = None
         self._rewards: FloatArray = np.zeros(len(rows))
 
@@ -74,14 +73,14 @@ class Online(Learner):
         if entered is not None:
             met = np.empty((len(states), 2, states.shape[1]))
             met[:, 0], met[:, 1] = states, entered
-        values = self.rules.each(self.of_agents, met)
+        values = self.rules.values_of_agents(self.of_agents, met)
         ahead = 0.0 if entered is None else self.discount * values[:, 1]
         return rewards + ahead - values[:, 0]
 
     def begin_episode(self) -> None:
         """Clear the traces."""
         if self._previous is not None:  # memory that is never written is never taken
-            self.trace[:], self.reach[:] = 0.0, 0.0
+            self.trace[:] = 0.0
         self._previous = None
 
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
@@ -211,12 +210,15 @@ class TDLambda(Online):
         lengths: FloatArray = np.ones(len(states))
         if self.settings.normalised:
             lengths = self.rules.squared_lengths(states)
-        states, to = map(np.ascontiguousarray, (states, states if entered is None else entered))
-        td_update(
-            self.weights, self.rows, self.trace, self.reach, states, to, rewards,
-            0.0 if entered is None else self.discount, self.settings.step_size, lengths,
-            self.discount * self.settings.trace_decay, self.rules.layout,
-        )  # fmt: skip
+        discount = 0.0 if entered is None else self.discount
+        step_sizes = self.settings.step_size / lengths
+        decay = self.discount * self.settings.trace_decay
+        active = self.rules.active(states)
+        active_next = active if entered is None else self.rules.active(entered)
+        constants = discount, step_sizes, decay
+        td_lambda_update(
+            self.weights, self.rows, self.trace, active, active_next, rewards, constants
+        )
         if self.settings.averaging > 1:
             self.updates += 1.0
             rate = 1.0 / min(float(self.updates), self.settings.averaging)
@@ -255,7 +257,7 @@ class OneStep(Online):
         if lengths is None:
             lengths = self.rules.squared_lengths(states)
         steps = self.settings.step_size * delta / lengths
-        add_features(self.weights, self.rows, states, steps, self.rules.layout)
+        self.rules.add_features(self.weights, self.rows, states, steps)
         return self.theta.size
 
 
@@ -307,7 +309,7 @@ class FMQ(OneStep):
     membership functions it is an approximation.
     """
 
-    kept = ("theta", "weights", "greatest", "hits", "visits", "trace", "reach")
+    kept = ("theta", "weights", "greatest", "hits", "visits", "trace")
 
     def __init__(self, settings: FMQSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
@@ -376,7 +378,7 @@ class QLearning(OneStep):
         if entered is not None:
             met = np.repeat(entered[:, None], len(self._choices), axis=1)
             met[:, :, self._columns] = self._choices
-            delta += self.discount * self.rules.each(self.of_agents, met).max(axis=1)
+            delta += self.discount * self.rules.values_of_agents(self.of_agents, met).max(axis=1)
         return self._step(states, delta)
 
 

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ..numerics import FloatArray, IntArray
-from ..rules.rule_base import RuleBase
+from ..values.rule_base import RuleBase
 from .learner import LearnerSettings
 from .td import Frozen
 

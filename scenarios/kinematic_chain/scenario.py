@@ -23,7 +23,7 @@ from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.words import expect
-from ...core.rules.rule_base import RuleBase
+from ...core.values.rule_base import RuleBase
 from ..faults.settings import Failures
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
 from .responses import Options, respond
@@ -255,7 +255,7 @@ class ChainEnvironments(StackedEnvironments[KinematicChain]):
         )
         states = arm._states.of_joints(view, 0, self._angles.shape[1]).transpose(1, 0, 2)
         rewards = arm._reward(view.distance, view.approach)
-        self._distance = view.distance
+        self._distance = view.distance.copy()
         terminated = view.distance < settings.tolerance
         truncated = ~terminated & (self._steps >= settings.most_decisions)
         rewards_by_agent = np.broadcast_to(rewards[:, None], joint_actions.shape)
@@ -352,7 +352,7 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
 
         None if values are no sums over the default variables.
         """
-        simple = self.arm.settings.state_space == SIMPLE and rules.compact
+        simple = self.arm.settings.state_space == SIMPLE and rules.is_triangular
         alone = len(rules.terms) == len(rules.partitions)
         alone = alone and all(len(term) == 1 for term in rules.terms)
         return partial(self._respond, rules) if simple and alone else None

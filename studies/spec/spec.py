@@ -1,13 +1,11 @@
-"""The spec of a study, as it stands in a TOML file, or in the objects of Python.
+"""The spec of a study, from a TOML file or from Python objects.
 
-``study``, ``preset``, ``seeds``, ``episodes``, ``steps``, ``evaluation``,
-``evaluation_steps``, ``keep_teams``, ``agents``, then the tables
-``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
-``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
-conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
-conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams. ``[tune]``
-are the values that `nested_agents.studies.api.tuning` tries. Objects are put in the words
-that a TOML file would have for them.
+The tables ``[scenario]``, ``[topology]`` and ``[learner]`` override those of the preset. Conditions
+are the combinations of ``[[overrides]]``, which are further tables by name, and ``[sweep]``, which
+has lists of values by dotted key. ``[[curriculum]]`` has stages of training before that of the
+conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams, and
+``[tune]`` the values that `nested_agents.studies.api.tuning` tries. Python objects are converted to
+the tables that a TOML file would hold.
 """
 
 from __future__ import annotations
@@ -56,23 +54,23 @@ REGISTRIES: dict[str, Registry] = {
     "exploration": EXPLORATIONS,
     "evaluator": EVALUATORS,
 }
-"""The registry of what stands at a key."""
+"""Registry of the things that a key names."""
 
 
 def plain(value: Any, key: str = "") -> Any:
-    """Return a table in which classes and functions are names, and their settings tables.
+    """Return a table with names instead of classes and functions, and tables instead of settings.
 
     Parameters
     ----------
     value
         A spec's table, or a part of it.
     key
-        Where it stands, the last part of its dotted key.
+        Last part of its dotted key.
 
     Raises
     ------
     SpecError
-        If an object is defined in no file, so that no worker could ever find it.
+        If an object is not defined in a file, so that workers cannot import it.
     """
     if isinstance(value, Mapping):
         table = {k: plain(v, key if k == "kind" else str(k)) for k, v in value.items()}
@@ -93,20 +91,22 @@ def plain(value: Any, key: str = "") -> Any:
 
 
 def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
-    """Return the table of the topology of just these agents and edges, or neighbours."""
+    """Return the table of a topology with these agents and edges, or neighbors."""
     relations = {}
     if isinstance(graph, Hierarchy):
         if graph.edges and graph.neighbors:
-            raise SpecError("topology: a hierarchy of edges and neighbours has no table in a spec")
+            raise SpecError(
+                "topology: a hierarchy with both edges and neighbors cannot be written in a spec"
+            )
         agents: list[str] = list(graph.agents)
         pairs = [(agents[a], agents[b]) for a, b in graph.edges or graph.neighbors]
-        of_neighbours = bool(graph.neighbors)
+        has_neighbors = bool(graph.neighbors)
         relations = {"communication": graph.communication, "lookahead": graph.lookahead}
     else:
         agents = list(map(str, graph))
         pairs = [(str(a), str(b)) for a, b in graph.edges]
-        of_neighbours = bool(pairs) and not graph.is_directed()
-    if of_neighbours:
+        has_neighbors = bool(pairs) and not graph.is_directed()
+    if has_neighbors:
         return {"kind": "coordination-graph", "edges": tuple(pairs), **relations}
     joined = {name for pair in pairs for name in pair}
     alone = tuple(name for name in agents if name not in joined)
@@ -114,7 +114,7 @@ def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
 
 
 def _of_settings(settings: Settings, registry: Registry | None) -> TomlTable:
-    """Return the table of settings; what is None leaves what lies below as it is."""
+    """Return the table of settings without values that are None."""
     table = settings.model_dump(exclude_none=True)
     if registry is not None and not table.get("kind"):
         owner = type(settings)
@@ -131,18 +131,18 @@ def _name(thing: object, registry: Registry) -> str:
 
 
 MOST_TRIALS = 100_000
-"""A larger grid is taken for a mistake."""
+"""Maximum number of trials of a study."""
 
 MOST_KEYS = 6
-"""A remark names no more of them."""
+"""Maximum number of keys in a remark."""
 FEW_KEYS = 2
-"""Nor of those that are left out, of which most users have never heard."""
+"""Maximum number of ignored keys in a remark."""
 
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 
 
 class Spec(Settings):
-    """What a study measures: conditions x seeds, and for how long.
+    """A study: its conditions, seeds and lengths.
 
     Examples
     --------
@@ -150,8 +150,7 @@ class Spec(Settings):
     >>> spec.seeds, [condition.label for condition in spec.conditions()]
     ((0, 1, 2), ['default', 'frozen'])
 
-    Keywords do as well. Tables may be made by any Python, and hold settings, classes, functions and
-    hierarchies:
+    Keywords work, too. Tables may hold settings, classes, functions and hierarchies:
 
     >>> from nested_agents.core.learners.td import TDLambdaSettings
     >>> ridges = [{"name": f"ridge {r}", "learner": {"ridge": r}} for r in (1.0, 100.0)]
@@ -163,43 +162,43 @@ class Spec(Settings):
     title: str | None = None
     """Title of the report. By default, the first sentence of the comment at the top of the file."""
     study: str = "learning-curve"
-    """Which study, by name."""
+    """Name of the study: what is measured and how it is analyzed."""
     preset: str = "default"
-    """The preset under the tables below."""
+    """Preset that the tables below override."""
     seeds: tuple[Seed, ...] = tuple(range(8))
-    """A list of seeds, or their number: n stands for 0 to n - 1."""
+    """List of seeds, or their number n for the seeds 0 to n - 1."""
     episodes: Length = 20
-    """Training episodes of a trial."""
+    """Number of training episodes of a trial."""
     decisions: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
-    """Joint decisions of a trial's training in place of `episodes`, where the study is
-    ``experience``; those of all environments count."""
+    """Joint decisions of training, counted over all environments. The study ``experience`` uses
+    them instead of `episodes`."""
     steps: Length = 450
-    """Most decisions in an episode."""
+    """Maximum number of decisions in an episode."""
     evaluation: Annotated[int, Field(ge=0, le=1_000_000)] = 10
-    """Episodes after training in which nothing is explored and nothing learned."""
+    """Number of evaluation episodes after training, without exploration and learning."""
     evaluation_steps: Length | None = None
-    """Most decisions in an episode of evaluation; as in training by default."""
+    """Maximum number of decisions in an evaluation episode. By default, as in training."""
     keep_teams: bool = False
-    """Whether trained teams are kept with their trials, to act, be explained and be re-evaluated
-    without training anew."""
+    """Whether trained teams are kept, so that they can act, be explained and be re-evaluated
+    without training again."""
     scenario: SpecTable = Field(default_factory=dict)
-    """Laid over the preset's scenario."""
+    """Changes of the scenario of the preset."""
     agents: Granularity | None = None
-    """What there is one agent for: each actuator (the default), each body, the team."""
+    """Granularity: one agent per actuator (the default), per body, or for the team."""
     topology: SpecTable = Field(default_factory=dict)
-    """Laid over the preset's topology; may be written as a string."""
+    """Changes of the topology of the preset; may be written as a string."""
     learner: SpecTable = Field(default_factory=dict)
-    """Laid over the preset's learner."""
+    """Changes of the learner of the preset."""
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
-    """Lists of values by dotted key; the conditions are all their combinations."""
+    """Lists of values by dotted key. The conditions are all their combinations."""
     tune: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
-    """Lists of values by dotted key that `nested-agents tune` draws from; nothing else reads it."""
+    """Lists of values by dotted key for `nested-agents tune`."""
     overrides: tuple[Override, ...] = ()
-    """Tables by name, each laid over those above and crossed with the sweep."""
+    """Tables by name. Each overrides those above and is combined with the sweep."""
     curriculum: Curriculum = ()
-    """Stages in which teams are trained before `episodes`, in scenarios laid over their own."""
+    """Stages of training before `episodes`, in changed scenarios."""
     evaluations: Mapping[Name, SpecTable] = Field(default_factory=dict)
-    """By name, changes of the scenario in which the trained teams are evaluated too; under
+    """Further evaluations of the trained teams by name: changes of the scenario and, under
     ``topology`` and ``learner.decision``, of how they decide."""
 
     _conditions: tuple[Condition, ...] = PrivateAttr(default=())

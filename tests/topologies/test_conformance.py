@@ -19,7 +19,7 @@ from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.td import TDLambdaSettings
-from nested_agents.core.rules.rule_base import RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBaseSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.topologies import TOPOLOGIES, Topology, build
 

@@ -1,7 +1,7 @@
-"""Where robots and box will be after a decision period: quasi-static pushing.
+"""Quasi-static pushing: poses of robots and box after a decision period.
 
-Robots are soft velocity servos: a robot whose wheels ask for the twist v* and that pushes with the
-wrench w moves with v* - W w, where W is its compliance. The box rests on distributed Coulomb
+Robots are soft velocity servos: a robot with commanded twist v* that pushes with the wrench w moves
+with v* - W w, where W is its compliance. The box rests on distributed Coulomb
 friction, described by the limit surface (Goyal, Ruina & Papadopoulos 1991) taken as an ellipsoid:
 under sliding its wrench is F D v / sqrt(v' D v) with D = diag(1, 1, rho^2), F the greatest
 friction force and rho the mean distance of the friction from the centre. At a contact the robot
@@ -47,16 +47,16 @@ ASKED = (
 )
 """The rows of a robot that hang on what it is asked for; there are no forces at first."""
 ROUNDED = 1e-9
-"""What rounding may make of a gap, or a way [m]."""
+"""Bound on rounding errors of a gap or a displacement [m]."""
 
 
 class PushModel(NamedTuple):
-    """What the push predictor believes of robots and box; ``M`` robots."""
+    """Model of ``M`` robots and a box."""
 
     edges: FloatArray
-    """Of the outline of the box, see `box_pushing.world.geometry.Outline`."""
+    """Edges of the box, see `box_pushing.world.geometry.Outline`."""
     rounding: float
-    """Of that outline [m]."""
+    """Margin around these edges [m]."""
     reach: float
     """Distance from the centre of the box within which all of it lies [m]."""
     radii: FloatArray
@@ -72,7 +72,7 @@ class PushModel(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """How robots stand and may touch the box at first, which is the same in all combinations."""
+    """Initial contacts, which do not depend on the combination of twists."""
 
     rows: FloatArray
     """``(M, FIXED)`` one number for each of the first rows of `push_lanes`."""
@@ -144,13 +144,12 @@ def push(
     seconds
         Decision period [s].
     model
-        What is believed of robots and box.
+        Model of robots and box.
 
     Returns
     -------
     tuple
-        Robot poses ``(m, M, 3)``, box poses ``(m, 3)`` and gaps ``(m, M)`` [m]; in memory the
-        combinations stand next to each other.
+        Robot poses ``(m, M, 3)``, box poses ``(m, 3)`` and gaps ``(m, M)`` [m].
     """
     by_robot = np.ascontiguousarray(choices.T)
     after, boxes, gaps = pushed(robots, box, twists, by_robot, seconds, model)
@@ -166,10 +165,9 @@ def pushed(
     seconds: float,
     model: PushModel,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what `push` does with the combinations last: ``(M, 3, m)``, ``(3, m)``, ``(M, m)``.
+    """Return what `push` does with situations last: ``(M, 3, m)``, ``(3, m)``, ``(M, m)``.
 
-    So are the choices, ``(M, m)``. Transposing within a kernel would take as long to compile as
-    half of the arithmetic.
+    So are the choices, ``(M, m)``.
     """
     contacts = contacts_of(robots, box, twists, seconds, model)
     return pushed_on(contacts, box, choices, seconds, model)
@@ -309,7 +307,7 @@ class PushBelief(NamedTuple):
 
     @classmethod
     def of(cls, model: PushModel, robots: Sequence[RobotSettings], stiffness: float) -> PushBelief:
-        """Return what is believed of robots whose wheels are taken to be so much stiffer."""
+        """Return the belief about robots, with an assumed factor on their stiffness."""
         parts = [
             stiffness * np.stack([resistance(robot, *part) for robot in robots])
             for part in ((1.0, 0.0), (0.0, 1.0))

@@ -19,7 +19,7 @@ CREEP = 0.002
 START_SPEED = 0.05
 """Speed of the box [m/s] from which the sweeps start."""
 MARGIN = 0.01
-"""How far [m] a moving box may carry its surface towards a robot within a substep."""
+"""Maximum motion of the box's surface towards a robot within a substep [m]."""
 
 # Where the rows of a robot begin: pose and heading, the twist that it is asked for, and its
 # contact. In the frame of the contact, n is into the box, t to its left.
@@ -35,7 +35,7 @@ MARGIN = 0.01
 ) = range(0, 20 * LANES, LANES)  # fmt: skip
 BODY_SIZE = ACTIVE + LANES
 FIXED = YIELD_TT // LANES + 1
-"""How many of the first rows are the same whatever a robot is asked for, but for that itself."""
+"""Number of leading rows that do not depend on the commanded twist, except the twist itself."""
 
 # Those of the box: pose and heading as for a robot, velocity, how readily it moves, the wrench of
 # all contacts on it.
@@ -50,7 +50,7 @@ LOCAL_X, LOCAL_Y, SQUARE, NEAR_X, NEAR_Y, SIDE, EDGE_X, EDGE_Y = range(
 BOX_SIZE = NEAREST + NEAREST_SIZE
 
 _EXACT = {"contract", "nsz"}
-"""What the compiler may do: multiply and add in one rounding, ignore the sign of zero."""
+"""Floating-point liberties: fused multiply-add, and zeros without sign."""
 
 
 @njit(cache=True, fastmath=_EXACT)

@@ -184,7 +184,9 @@ def test_a_reward_of_a_terminal_state_that_does_not_absorb_is_received_once(worl
         seen = look(world, states)
         ended = Transition(states, 2.0, True, False, {}, absorbing=absorbing)
         team.learn(Experience(seen, team.act(seen), ended, last=True))
-        values = fuzzy(team).rules.each(fuzzy(team).learner.theta, states[:, None])[:, 0]
+        values = fuzzy(team).rules.values_of_agents(fuzzy(team).learner.theta, states[:, None])[
+            :, 0
+        ]
         assert values == pytest.approx(value)
 
 

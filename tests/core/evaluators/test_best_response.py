@@ -25,7 +25,7 @@ from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.numerics import FloatArray
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2

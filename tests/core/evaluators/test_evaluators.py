@@ -10,7 +10,7 @@ import pytest
 
 from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.evaluators.enumeration import (
-    MOST_JOINT_ACTIONS,
+    MAX_JOINT_ACTIONS,
     ExactEnumeration,
     Sampling,
     SamplingSettings,
@@ -21,7 +21,7 @@ from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberatio
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks, Prediction, Tables
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2
@@ -304,7 +304,7 @@ def test_too_many_joint_actions_are_refused() -> None:
     names = [f"agent{i}" for i in range(13)]
     edges = [("agent0", name) for name in names[1:]]
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
-    assert MOST_JOINT_ACTIONS == A**11
+    assert MAX_JOINT_ACTIONS == A**11
     with pytest.raises(
         ValueError,
         match=r"^learner\.decision\.evaluator: 4 \*\* 12 joint actions of 12 agents would be",

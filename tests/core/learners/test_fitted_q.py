@@ -15,7 +15,7 @@ from nested_agents.core.interface.experience import Experience, Observation
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import REWARD_SCALE
 from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
 from nested_agents.studies.spec.spec import Spec
 

@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.learners.td import QLearningSettings
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 PLACE = Variable("place", "1", 0, 2, centres=(0.0, 1.0, 2.0))
 MOVE = Variable("move", "1", 0, 1, centres=(0.0, 1.0))

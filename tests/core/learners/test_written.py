@@ -6,7 +6,7 @@ import pytest
 import nested_agents as na
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.learners.written import Written, WrittenSettings
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions

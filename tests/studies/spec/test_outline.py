@@ -18,7 +18,7 @@ MODULES = {"core/team.py": "N = 3  # agents", "core/loop.py": "def loop(): pass"
 
 def test_all_that_computes_is_known_and_pictures_are_not() -> None:
     known = outline.modules()
-    assert {"core/agents/team.py", "scenarios/box_pushing/states/relational.py"} <= known.keys()
+    assert {"core/agents/team.py", "scenarios/box_pushing/states/variables.py"} <= known.keys()
     assert not [name for name in known if "pictures" in name or name.endswith("figure.py")]
     here = outline.present(None, {}, {})
     assert outline.changed(here, outline.present(here, {}, {})) == []

@@ -475,7 +475,7 @@ def test_a_class_stands_for_its_name_as_kind_of_a_table_too() -> None:
 
 
 def test_edges_beside_neighbours_have_no_table():
-    with pytest.raises(SpecError, match="of edges and neighbours has no table in a spec"):
+    with pytest.raises(SpecError, match="both edges and neighbors cannot be written in a spec"):
         plain(Hierarchy("abc", [("a", "b")], neighbors=[("a", "c")]), "topology")
 
 
@@ -525,10 +525,9 @@ def test_agents_are_laid_over_and_swept_as_topologies_are() -> None:
     ]
 
 
-def test_an_agent_for_every_actuator_is_no_part_of_an_identity() -> None:
+def test_an_agent_for_every_actuator_is_the_default() -> None:
     plain, robots = Spec.of({"sweep": {"agents": ["actuator", "body"]}}).conditions()
     assert plain.settings.canonical() == Spec().conditions()[0].settings.canonical()
-    assert "agents" not in plain.settings.model_dump()
     assert robots.settings.model_dump()["agents"] == "body"
 
 

@@ -122,7 +122,7 @@ def test_wrong_constants_are_found_out_by_pushing(believed):
     # After 80 decisions of which three quarters push. A wrong start was off by 1.4, 1.4 and 0.7.
     # How robots give way sideways is hardly to be seen in straight pushes.
     assert (np.abs(errors[-1])[[0, 2]] < [0.1, 0.2]).all()
-    box = abs(prediction.poses(joint[None]).box[0] - world.measure()["box_pose"])
+    box = abs(prediction.poses(joint[None]).boxes[:, 0] - world.measure()["box_pose"])
     assert box[:2].max() < 0.005
 
 

@@ -150,7 +150,7 @@ def test_it_predicts_the_world_within_millimetres() -> None:
             predicted = scenario.predict().poses(joint[None])
             before = scenario.world.box_pose.copy()
             scenario.step(joint)
-            errors.append(np.hypot(*(predicted.box[0] - scenario.world.box_pose)[:2]))
+            errors.append(np.hypot(*(predicted.boxes[:, 0] - scenario.world.box_pose)[:2]))
             moves.append(np.hypot(*(before - scenario.world.box_pose)[:2]))
             joint = rng.choice([0, 2, 2, 2], size=4)
     pushed = np.array(moves) > 0.005

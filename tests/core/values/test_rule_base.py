@@ -9,8 +9,8 @@ import pytest
 
 from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 LOW_HIGH = Partition((0.0, 1.0), "triangular")
 
@@ -162,7 +162,7 @@ def test_squared_lengths_and_values_by_row(membership: str) -> None:
     states, theta = rng.uniform(-0.2, 1.2, (6, 3)), rng.normal(size=(6, base.n_rules))
     features = base.features(states)
     assert base.squared_lengths(states) == pytest.approx((features**2).sum(axis=1), abs=1e-14)
-    assert base.each(theta, states[:, None])[:, 0] == pytest.approx(
+    assert base.values_of_agents(theta, states[:, None])[:, 0] == pytest.approx(
         (features * theta).sum(axis=1), abs=1e-12
     )
 
@@ -180,11 +180,14 @@ def test_wrong_shapes_are_refused_in_one_line(membership: str) -> None:
         (lambda: base.values(np.ones(2), one), "rule base: theta of shape (2,), must be (4,)"),
         (lambda: base.values(one, one), "rule base: theta of shape (1, 2), must be (4,)"),
         (
-            lambda: base.each(np.ones((1, 4)), np.zeros((2, 1, 2))),
+            lambda: base.values_of_agents(np.ones((1, 4)), np.zeros((2, 1, 2))),
             "rule base: theta of shape (1, 4), must be (2, 4)",
         ),
-        (lambda: base.each(np.ones((1, 4)), np.zeros((1, 1, 3))), sets.format((1, 1, 3))),
-        (lambda: base.each(np.ones((1, 4)), one), sets.format((1, 2))),
+        (
+            lambda: base.values_of_agents(np.ones((1, 4)), np.zeros((1, 1, 3))),
+            sets.format((1, 1, 3)),
+        ),
+        (lambda: base.values_of_agents(np.ones((1, 4)), one), sets.format((1, 2))),
         (lambda: base.squared_lengths(np.zeros((2, 3))), pairs.format((2, 3))),
         (lambda: base.active(np.zeros((2, 1))), pairs.format((2, 1))),
         (lambda: base.active(np.zeros((2, 1, 2))), pairs.format((2, 1, 2))),

@@ -5,17 +5,12 @@ from math import pi
 
 import numpy as np
 import pytest
-import rule_oracles as oracle
-from hypothesis import given
-from hypothesis import strategies as st
+import values_oracle as oracle
 
 from nested_agents.core.interface.prediction import Blocks
-from nested_agents.core.rules.kernels.dense_states import each_dense
-from nested_agents.core.rules.kernels.fuzzy import Partition, layout, unpack
-from nested_agents.core.rules.kernels.strengths import exponential, many_strengths
-from nested_agents.core.rules.kernels.updates import add_features
-from nested_agents.core.rules.kernels.updates import td_update as kernels_td_update
-from nested_agents.core.rules.rule_base import Pooled, RuleBase
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.rule_base import PooledWeights, RuleBase
+from nested_agents.core.values.updates import td_lambda_update
 
 N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2
 ROWS = np.arange(3)
@@ -90,35 +85,18 @@ def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
     assert base.block_values(theta, blocks, indices) == pytest.approx(expected, rel=0, abs=1e-12)
 
 
-@pytest.mark.parametrize("averaged", [False, True])
-@pytest.mark.parametrize("agent", [0, 1, 3])
-def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, averaged: bool) -> None:
-    theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
-    joint, probabilities = rng.integers(N_ACTIONS, size=N_AGENTS), rng.random((N_AGENTS, N_ACTIONS))
-    below = np.arange(agent + 1, N_AGENTS)
-    grid = np.indices((N_ACTIONS,) * (1 + len(below))).reshape(1 + len(below), -1)
-    every = np.tile(joint[:, None], grid.shape[1])
-    every[agent:] = grid
-    places = N_ACTIONS ** np.arange(N_AGENTS - 1, -1, -1)
-    values = oracle.block_values(base, theta, blocks, places @ every).reshape(N_ACTIONS, -1)
-    given = np.where(np.arange(N_AGENTS) < agent, places, 0)
-    indices = (places[agent:] @ grid).reshape(N_ACTIONS, -1)
-    tried = indices, given, below
-    expected = values.max(axis=1)
-    if averaged:
-        weights = np.ones(1)
-        for one in below:
-            weights = np.multiply.outer(weights, probabilities[one]).ravel()
-        expected = values @ (weights / weights.sum())
-    found = base.enumerate(
-        theta, blocks, tried, joint, probabilities if averaged else np.zeros((0, 0))
-    )
-    assert found == pytest.approx(expected, rel=0, abs=1e-12)
-    assert not base.enumerate(0.0 * theta, blocks, tried, joint, np.zeros((0, 0))).any()
-
-
-def td_update(base: RuleBase, *given: object) -> None:
-    kernels_td_update(*given, base.layout)
+def td_update(
+    base: RuleBase,
+    theta: np.ndarray,
+    rows: np.ndarray,
+    trace: np.ndarray,
+    states: np.ndarray,
+    entered: np.ndarray,
+    rewards: np.ndarray,
+    constants: tuple,
+) -> None:
+    active, active_next = base.active(states), base.active(entered)
+    td_lambda_update(theta, rows, trace, active, active_next, rewards, constants)
 
 
 @pytest.mark.parametrize("discount", [0.95, 0.0])
@@ -126,59 +104,40 @@ def test_td_update(base: RuleBase, rng: np.random.Generator, discount: float) ->
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
     theta_expected, trace_expected, lengths = theta.copy(), trace.copy(), np.array([1.0, 2.0, 0.5])
     rewards = np.array([-0.3, 0.0, 0.7])
-    reach = np.full((3, base.n_parts), 5.0)
     for _ in range(60):
         states, entered = states_of(rng, 6).reshape(2, 3, -1)
         now, ahead = (
             np.einsum("ij,ij->i", base.features(met), theta_expected) for met in (states, entered)
         )
-        td_update(
-            base, theta, ROWS, trace, reach, states, entered, rewards, discount, 0.1, lengths, 0.38
-        )
+        constants = discount, 0.1 / lengths, 0.38
+        td_update(base, theta, ROWS, trace, states, entered, rewards, constants)
         steps = 0.1 * (rewards + discount * ahead - now) / lengths
         oracle.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
     assert trace == pytest.approx(trace_expected, rel=0, abs=1e-12)
     assert theta == pytest.approx(theta_expected, rel=0, abs=1e-12)
 
 
-def test_strengths_of_many(rng: np.random.Generator) -> None:
-    base = RuleBase(partitions_of("sigmoid"), TERMS["order 1"])
-    lay = unpack(base.layout)
-    states = states_of(rng, 300)
-    states[-3:] = [[-90.0] * 4, [90.0] * 4, [1e6] * 4]
-    for j, partition in enumerate(base.partitions):
-        out = np.empty((lay.counts.max(), len(states)))
-        many_strengths(j, states[:, j], lay, out)
-        expected = partition.strengths(states[:, j]).T
-        assert out[: lay.counts[j]] == pytest.approx(expected, rel=0, abs=1e-14)
-
-
-def test_strengths_of_many_between_steep_sigmoids() -> None:
-    steep = Partition(tuple(np.linspace(0.0, 1.0, 9).tolist()), "sigmoid", steepness=120.0)
-    x = np.linspace(-2.0, 3.0, 501)
-    out = np.empty((9, len(x)))
-    many_strengths(0, x, unpack(layout([steep], [(0,)], 0)), out)
-    assert out == pytest.approx(steep.strengths(x).T, rel=0, abs=1e-13)
-
-
-@given(st.floats(-690, 690))
-def test_exponentials_are_exact_to_the_last_bits(x: float) -> None:
-    assert exponential(x) == pytest.approx(np.exp(x), rel=1e-15, abs=0)
+def test_forgotten_traces_become_zero() -> None:
+    base = RuleBase([Partition((0.0, 1.0), "triangular")], [(0,)])
+    theta, trace = np.zeros((1, 2)), np.full((1, 2), 1e-29)
+    states = np.array([[0.0]])
+    td_update(base, theta, ROWS[:1], trace, states, states, np.ones(1), (0.0, np.ones(1), 0.01))
+    assert trace.tolist() == [[1.0, 0.0]]
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_each(base: RuleBase, rng: np.random.Generator, count: int) -> None:
+def test_values_of_agents(base: RuleBase, rng: np.random.Generator, count: int) -> None:
     theta = rng.normal(size=(5, base.n_rules))
     states = states_of(rng, 5 * count).reshape(5, count, -1)
     expected = [base.features(states[i]) @ theta[i] for i in range(5)]
-    assert base.each(theta, states) == pytest.approx(np.array(expected), rel=0, abs=1e-12)
-    dense = each_dense(theta, states, base.layout)
-    assert dense == pytest.approx(np.array(expected), rel=0, abs=1e-12)
+    assert base.values_of_agents(theta, states) == pytest.approx(
+        np.array(expected), rel=0, abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
 @pytest.mark.parametrize("common", [(), (3,), (2, 3)])
-def test_total(
+def test_summed_values(
     terms: list, n_own: int, membership: str, rng: np.random.Generator, common: tuple[int, ...]
 ) -> None:
     common = tuple(j for j in common if j >= n_own)
@@ -192,12 +151,12 @@ def test_total(
     shared = shared[..., n_own:].copy()
     of_bodies = np.add.reduceat(theta, firsts[:-1], axis=0)
     weights = theta, of_bodies, theta.sum(axis=0)[None]
-    pooled = Pooled(weights, agents, np.arange(2), firsts)
+    pooled = PooledWeights(weights, agents, np.arange(2), firsts)
     expected = np.zeros(6)
     for row, agent in enumerate(agents):
         states = np.concatenate([own[agent], shared[0 if row < 2 else 1]], axis=1)
         expected += base.features(states) @ theta[row]
-    assert base.total(pooled, own, shared) == pytest.approx(expected, rel=0, abs=1e-11)
+    assert base.summed_values(pooled, own, shared) == pytest.approx(expected, rel=0, abs=1e-11)
 
 
 def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
@@ -212,14 +171,14 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
             oracle.block_values(base, wide[0][0], blocks, indices),
         ),
         (
-            base.each(theta, states[:, None])[:, 0],
+            base.values_of_agents(theta, states[:, None])[:, 0],
             np.einsum("ij,ij->i", base.features(states), wide[0]),
         ),
     ):
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
-    reach, lengths = np.full((3, base.n_parts), 5.0), np.ones(3)
     steps = 0.1 * (rewards - np.einsum("ij,ij->i", base.features(states), wide[0]))
-    td_update(base, theta, ROWS, trace, reach, states, states, rewards, 0.0, 0.1, lengths, 0.38)
+    constants = 0.0, np.full(3, 0.1), 0.38
+    td_update(base, theta, ROWS, trace, states, states, rewards, constants)
     oracle.td_update(base, *wide, states, steps, 0.38)
     assert theta.dtype == trace.dtype == np.float32
     assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
@@ -238,7 +197,9 @@ def test_block_values_agree_with_values_of_the_states(
 def test_a_states_array_in_any_memory_order(base: RuleBase, rng: np.random.Generator) -> None:
     theta, states = rng.normal(size=base.n_rules), states_of(rng, 12)
     assert (base.values(theta, np.asfortranarray(states)) == base.values(theta, states)).all()
-    assert (base.values(theta, states[::2]) == base.values(theta, states)[::2]).all()
+    found, expected = base.values(theta, states[::2]), base.values(theta, states)[::2]
+    # Matrix products of sigmoid rule bases round differently if there are fewer rows.
+    assert found == pytest.approx(expected, rel=0, abs=0 if base.is_triangular else 1e-12)
 
 
 @pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
@@ -250,7 +211,9 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     assert base.n_rules == 5**7
     theta, states = rng.normal(size=base.n_rules), rng.uniform(-4, 4, (4, 7))
     expected = [float(base.features(state[None])[0] @ theta) for state in states]
-    assert base.each(theta[None], states[None])[0] == pytest.approx(expected, rel=0, abs=1e-12)
+    assert base.values_of_agents(theta[None], states[None])[0] == pytest.approx(
+        expected, rel=0, abs=1e-12
+    )
     states = np.tile(states, (6, 1))
     states[:, 4:] += 0.01 * rng.normal(size=(24, 3))  # a few own blocks, shared ones near by
     expected = oracle.values(base, theta, states)
@@ -264,23 +227,10 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
 
     theta, trace = rng.normal(size=(2, 2, base.n_rules))
     theta_expected, trace_expected = theta.copy(), trace.copy()
-    rewards, lengths = np.array([1.0, -2.0]), np.ones(2)
-    reach = np.full((2, base.n_parts), 5.0)
+    rewards = np.array([1.0, -2.0])
     steps = 0.01 * (rewards - np.einsum("ij,ij->i", base.features(states[:2]), theta))
-    td_update(
-        base,
-        theta,
-        ROWS[:2],
-        trace,
-        reach,
-        states[:2],
-        states[:2],
-        rewards,
-        0.0,
-        0.01,
-        lengths,
-        0.3996,
-    )
+    constants = 0.0, np.full(2, 0.01), 0.3996
+    td_update(base, theta, ROWS[:2], trace, states[:2], states[:2], rewards, constants)
     oracle.td_update(base, theta_expected, trace_expected, states[:2], steps, 0.3996)
     assert np.abs(trace - trace_expected).max() <= 1e-12
     assert np.abs(theta - theta_expected).max() <= 1e-12
@@ -290,7 +240,7 @@ def test_add_features(base: RuleBase, rng: np.random.Generator) -> None:
     target, states = rng.normal(size=(3, base.n_rules)), states_of(rng, 3)
     weights = rng.normal(size=3)
     expected = target + weights[:, None] * base.features(states)
-    add_features(target, ROWS, states, weights, base.layout)
+    base.add_features(target, ROWS, states, weights)
     assert target == pytest.approx(expected, rel=0, abs=1e-12)
 
 
@@ -298,12 +248,11 @@ def test_agents_of_one_row_change_it_in_turn(base: RuleBase, rng: np.random.Gene
     rows, discount = np.array([1, 0, 1]), 0.95
     theta, trace = rng.normal(size=(2, base.n_rules)), np.zeros((3, base.n_rules))
     expected, trace_expected = theta.copy(), trace.copy()
-    reach, lengths, rewards = np.zeros((3, base.n_parts)), np.ones(3), rng.normal(size=3)
+    rewards = rng.normal(size=3)
+    constants = discount, np.full(3, 0.1), 0.38
     for _ in range(4):
         states, entered = states_of(rng, 6).reshape(2, 3, -1)
-        td_update(
-            base, theta, rows, trace, reach, states, entered, rewards, discount, 0.1, lengths, 0.38
-        )
+        td_update(base, theta, rows, trace, states, entered, rewards, constants)
         for i, row in enumerate(rows):
             one = slice(i, i + 1)
             f = oracle.values(base, expected[row], np.stack([states[i], entered[i]]))
@@ -313,6 +262,6 @@ def test_agents_of_one_row_change_it_in_turn(base: RuleBase, rng: np.random.Gene
             )
     assert theta == pytest.approx(expected, rel=0, abs=1e-12)
     target, weights = theta.copy(), rng.normal(size=3)
-    add_features(target, rows, states, weights, base.layout)
+    base.add_features(target, rows, states, weights)
     np.add.at(theta, rows, weights[:, None] * base.features(states))
     assert target == pytest.approx(theta, rel=0, abs=1e-12)

@@ -1,15 +1,16 @@
-"""Firing strengths: one in sum, non-negative, continuous, the paper's sigmoids."""
+"""Membership degrees sum to one, are non-negative and continuous, and match the paper."""
 
 from math import exp, pi
 
 import numpy as np
 import pytest
+import values_oracle as oracle
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.rules.kernels.fuzzy import Partition, layout, unpack
-from nested_agents.core.rules.kernels.strengths import strengths_of
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.triangular import active_rules, layout
 
 SHAPES = ("triangular", "sigmoid")
 
@@ -27,11 +28,10 @@ def partitions(draw: st.DrawFn, flattest: float = 1.0) -> Partition:
 
 
 def by_kernel(partition: Partition, x: np.ndarray) -> np.ndarray:
-    lay = unpack(layout([partition], [(0,)], 0))
-    out, room = np.empty((len(x), partition.size)), np.empty(lay.bounds.shape[1] + 1)
-    for row, value in zip(out, x, strict=True):
-        strengths_of(0, value, lay, row, room)
-    return out
+    rules, active = active_rules(x[:, None], layout([partition], [(0,)]))
+    strengths = np.zeros((len(x), partition.size))
+    np.add.at(strengths, (np.arange(len(x))[:, None], rules), active)
+    return strengths
 
 
 def places(partition: Partition) -> np.ndarray:
@@ -52,12 +52,19 @@ def test_strengths_are_a_partition_of_unity(partition: Partition, more: list[flo
 
 @given(partitions())
 @settings(max_examples=200)
-def test_the_kernel_computes_the_same(partition: Partition) -> None:
+def test_strengths_are_those_of_the_reference(partition: Partition) -> None:
     x, centres = places(partition), np.array(partition.centres)
-    # Where centres lie close together far from 0, their last digits are told apart by exponentials.
+    # Where centres lie close together far from 0, exponents lose digits.
     rounding = 4e-16 * partition.steepness * np.abs(centres).max() / np.diff(centres).min()
-    expected = pytest.approx(partition.strengths(x), rel=0, abs=1e-12 + rounding)
-    assert by_kernel(partition, x) == expected
+    expected = pytest.approx(oracle.strengths(partition, x), rel=0, abs=1e-12 + rounding)
+    assert partition.strengths(x) == expected
+
+
+@given(partitions().filter(lambda p: p.membership == "triangular"))
+@settings(max_examples=200)
+def test_active_rules_have_the_same_strengths(partition: Partition) -> None:
+    x = places(partition)
+    assert by_kernel(partition, x) == pytest.approx(partition.strengths(x), rel=0, abs=1e-12)
 
 
 @given(partitions().filter(lambda p: p.period), st.integers(-3, 3))
