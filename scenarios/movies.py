@@ -37,7 +37,7 @@ class Scene:
         self._moving: list[Artist] = []
 
     def draw(self, step: int) -> None:
-        """Draw a step in place of the one drawn before."""
+        """Replace the drawn step by another."""
         for artist in self._moving:
             artist.remove()
         self._moving = []

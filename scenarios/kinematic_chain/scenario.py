@@ -42,7 +42,7 @@ MAX_BEND = 2.5
 
 
 class KinematicChain(Scenario, Embodiment):
-    """A planar arm whose predictions are exact, and which supports self-models.
+    """A planar arm with exact predictions and support for self-models.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class KinematicChain(Scenario, Embodiment):
         return None if self.settings.failures else ChainEnvironments(self, count)
 
     def embodiment(self) -> Embodiment:
-        """Return the arm itself, whose joints support self-models."""
+        """Return the arm itself, because its joints support self-models."""
         return self
 
     def predict(self) -> ChainPrediction:
@@ -162,7 +162,7 @@ class KinematicChain(Scenario, Embodiment):
         return tuple(effects)
 
     def with_exact_prediction(self) -> KinematicChain:
-        """Return an equal arm whose predictions include failures."""
+        """Return an equal arm with predictions that include failures."""
         return type(self)(self.settings.model_copy(update={"predictor": "informed"}))
 
     def measure(self) -> dict[str, object]:

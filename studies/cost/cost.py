@@ -38,7 +38,7 @@ from ...topologies import build, parse
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 
 SINGLE_AGENT = "single-agent"
-"""Name of the single agent of Eq. 23, used in place of a topology."""
+"""Name of the single agent of Eq. 23, which replaces a topology."""
 MEMBERSHIPS = 5
 PAPER = Problem()
 """Quantities |S|, |A| and L of the paper's experiment."""

@@ -33,7 +33,7 @@ class Picture(NamedTuple):
     name: str
     """File name without suffix."""
     svg: Markup
-    """SVG element whose ids differ from those of other figures in the page."""
+    """SVG element with ids that differ from those of other figures in the page."""
     pdf: str
     """The same figure as PDF, in base64."""
     prefix: str
@@ -48,7 +48,7 @@ class Picture(NamedTuple):
 
 
 def pictures(figures: Mapping[str, Figure], prefix: str = "figure") -> list[Picture]:
-    """Return figures as elements of a page, whose ids begin with a prefix."""
+    """Return figures as elements of a page with ids that begin with a prefix."""
     drawings = []
     with apply_style():
         for number, (name, figure) in enumerate(figures.items(), 1):

@@ -24,7 +24,7 @@ from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
 from ..world.geometry import BoxShape
 from ..world.settings import InfraredSettings, Task, reward
-from .push import PushBelief, PushModel, outcomes, push, pushed
+from .push import PushBelief, PushModel, outcomes, push
 from .responses import Outlook, respond
 from .wheel_commands import (
     WheelCommands,
@@ -121,7 +121,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         now = self.situation
         twists = self.wheel_commands.twists
         by_robot = np.ascontiguousarray(choices.T)
-        robots, box, gaps = pushed(now.robots, now.box, twists, by_robot, seconds, self.model)
+        robots, box, gaps = push(now.robots, now.box, twists, by_robot, seconds, self.model)
         return self._batch(robots, box, gaps, seconds)
 
     def _batch(
@@ -214,11 +214,11 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         poses = []
         for r, count in enumerate(commands.counts):
             only = slice(r, r + 1)
-            every = np.arange(count)[:, None]
+            every = np.arange(count)[None]
             alone = model._replace(radii=model.radii[only], compliance=model.compliance[only])
             twists = commands.twists[only]
             seconds = self.premises.seconds
-            poses.append(push(now.robots[only], now.box, twists, every, seconds, alone)[0][:, 0])
+            poses.append(push(now.robots[only], now.box, twists, every, seconds, alone)[0][0].T)
         return poses
 
     @cached_property

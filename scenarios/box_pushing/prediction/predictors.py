@@ -45,7 +45,6 @@ def push_model(
     model = PushModel(
         edges=box.outline.edges,
         rounding=box.outline.rounding,
-        reach=box.reach,
         radii=np.array([robot.radius for robot in robots]),
         compliance=np.stack([compliance(robot) for robot in robots]) / belief.stiffness,
         friction_force=box.friction_force * belief.load,

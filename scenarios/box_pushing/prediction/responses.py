@@ -20,7 +20,7 @@ from ....core.values.triangular import summed_values
 from ..states.situations import SituationBatch
 from ..states.variables import evaluate
 from ..world.geometry import BoxShape
-from .push import Contacts, PushModel, contacts_of, pushed_on
+from .push import PushModel, push
 from .wheel_commands import choices_of, speeds_of
 
 
@@ -73,9 +73,11 @@ class _Plan(NamedTuple):
 
 
 @njit(cache=True)
-def _values_of(choices: IntArray, contacts: Contacts, outlook: Outlook) -> FloatArray:
+def _values_of(choices: IntArray, outlook: Outlook) -> FloatArray:
     """Return the mean value ``(m,)`` of wheel commands ``(M, m)`` over the agents."""
-    robots, box, gaps = pushed_on(contacts, outlook.box, choices, outlook.seconds, outlook.model)
+    robots, box, gaps = push(
+        outlook.robots, outlook.box, outlook.twists, choices, outlook.seconds, outlook.model
+    )
     origins = np.expand_dims(outlook.box, 1)
     batch = SituationBatch(robots, box, gaps, outlook.goal, origins, outlook.periods, outlook.shape)
     shared = evaluate(batch, outlook.every, outlook.columns)
@@ -206,13 +208,11 @@ def respond(
     n, n_indices = outlook.which.shape
     wheels = starts.shape[1] // n
     choices = choices_of(starts, outlook.which, n_actions)
-    robots, twists, model = outlook.robots, outlook.twists, outlook.model
-    contacts = contacts_of(robots, outlook.box, twists, outlook.seconds, model)
     by_robot = np.empty(choices.shape[::-1], np.int64)
     for i in range(n):
         for c in range(len(choices)):
             by_robot[i, c] = choices[c, i]
-    worths = _values_of(by_robot, contacts, outlook)
+    worths = _values_of(by_robot, outlook)
     best = draw(worths, rng)
     joint = starts[best].copy()
     plan = _Plan(choices[best], np.empty((n, n_indices)), np.full((n, n), -1))
@@ -228,8 +228,8 @@ def respond(
                 depth = min(2 * depth, MOST_AHEAD) if k == reach else 1
                 reach = min(k + depth, n)
                 ahead = order[k:reach]
-                # A kernel more between this and `_worths` would take three seconds to compile.
-                worths = _values_of(_varied(ahead, plan, outlook), contacts, outlook)
+                # A kernel more between this and `_values_of` would take three seconds to compile.
+                worths = _values_of(_varied(ahead, plan, outlook), outlook)
                 _value(ahead, value, worths, plan, outlook)
             if decides:
                 own = joint[r * wheels : (r + 1) * wheels]

@@ -40,7 +40,7 @@ def test_a_finished_study_has_everything(html):
     assert html.count('aria-label="hierarchy: default') == 1
     assert 'aria-label="hierarchy: frozen' not in html, "it is the same"
     assert "All 6 trials are done." in html
-    found = dict(re.findall(r"<li>(.*?): evaluation success is (\S+) ", html))
+    found = dict(re.findall(r"<li>(.*?): evaluation success is (\S+)\s", html))
     assert list(found) == ["default", "frozen"]
     assert all(f"<td>{value}<small>" in html for value in found.values())
     assert "evaluation success, minus that of default:" in html
