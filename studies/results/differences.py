@@ -92,10 +92,10 @@ def differences(
         if (difference := compare_pair(*pair, measure)) is not None
     ]
     adjusted = _adjusted([difference for _, difference in compared])
-    found = {group: tuple[Difference, ...]() for group in groups}
+    computed = {group: tuple[Difference, ...]() for group in groups}
     for (group, _), difference in zip(compared, adjusted, strict=True):
-        found[group] += (difference,)
-    return found
+        computed[group] += (difference,)
+    return computed
 
 
 def compare_pair(
@@ -152,13 +152,13 @@ def adjust(
     compared
         Condition, measure, values of the condition and of the reference, and their difference.
     """
-    found = []
+    computed = []
     for condition, measure, own, base, estimate in compared:
         p = paired_permutation(own, base)
-        found.append(
+        computed.append(
             Difference(condition, measure, len(own), estimate, p, p, own - base, values=(own, base))
         )
-    return tuple(_adjusted(found))
+    return tuple(_adjusted(computed))
 
 
 def independent_difference(own: Array, base: Array, measure: Measure) -> Estimate:
