@@ -42,7 +42,7 @@ class Online(Learner):
     kept: tuple[str, ...] = ("theta", "trace")
     """Names of saved arrays. Those in `traces` have one row per agent, the others one per row."""
     traces = ("trace",)
-    fixed_arrays = ("theta", "trace")
+    fixed_arrays: ClassVar[tuple[str, ...]] = ("theta", "trace")
     reward_of: Literal["left", "entered"] = "left"
     """Reward in the TD error of a step: that of the state left or of the state entered."""
 
