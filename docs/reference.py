@@ -89,7 +89,7 @@ MODULES = {
         "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
         "results.power", "results.contrasts", "results.aggregates", "results.published",
-        "catalogue.study", "cost.cost", "cost.profile", "cost.table",
+        "catalogue.study", "cost.cost", "cost.table",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""

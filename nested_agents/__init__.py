@@ -98,7 +98,6 @@ _PLACES = {
     "plan": ("studies.api.planning", "plan"),
     "policy_seed": ("core.agents.loop", "policy_seed"),
     "power": ("studies.results.power", "power"),
-    "profile": ("studies.cost.profile", "profile"),
     "rate": ("studies.results.statistics", "rate"),
     "reevaluate": ("studies.api.reevaluation", "reevaluate"),
     "run": ("studies.api.running", "run"),

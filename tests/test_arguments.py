@@ -42,7 +42,6 @@ VALID: dict[str, dict[str, object]] = {
     "plan": {"spec": SPEC},
     "policy_seed": {"seed": 0},
     "power": {"effect": 0.2, "deviation": 0.25, "seeds": 5, "comparisons": 1},
-    "profile": {"spec": SPEC},
     "rate": {"outcomes": SCORES},
     "reevaluate": {"study": "none"},
     "run": {"spec": SPEC, "out": "out"},

@@ -20,7 +20,7 @@ from .evaluator import (
     EvaluatorSettings,
 )
 
-MOST_JOINT_ACTIONS = 4**11
+MAX_JOINT_ACTIONS = 4**11
 """Maximum number of joint actions per own action; more would fill the memory."""
 
 
@@ -32,10 +32,10 @@ def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
     ValueError
         If there are too many; raised before memory is allocated.
     """
-    if n_actions ** len(agents) > MOST_JOINT_ACTIONS:
+    if n_actions ** len(agents) > MAX_JOINT_ACTIONS:
         raise ValueError(
             f"learner.decision.evaluator: {n_actions} ** {len(agents)} joint actions of "
-            f"{len(agents)} agents would be tried, allowed {MOST_JOINT_ACTIONS}; use sampling"
+            f"{len(agents)} agents would be tried, allowed {MAX_JOINT_ACTIONS}; use sampling"
         )
     k = len(agents)
     grid = np.indices((n_actions,) * k).reshape(k, n_actions**k)
@@ -62,7 +62,7 @@ class ExactEnumeration(Aggregation):
     Raises
     ------
     ValueError
-        If an agent would have to try more than `MOST_JOINT_ACTIONS`.
+        If an agent would have to try more than `MAX_JOINT_ACTIONS`.
     """
 
     def __init__(self, problem: DecisionProblem) -> None:
@@ -201,7 +201,7 @@ class AutoSettings(EvaluatorSettings):
         if problem.unseen == "plan" or problem.plan == "common":
             return EVALUATORS.parsed("best-response")
         free = max(1 + len(hierarchy.searched(i)) for i in range(len(hierarchy)))
-        if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MOST_JOINT_ACTIONS:
+        if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MAX_JOINT_ACTIONS:
             return EVALUATORS.parsed("exact")
         is_large = free > self.sampling_up_to or problem.value_of != "own"
         if is_large and problem.teammates == "best-response":

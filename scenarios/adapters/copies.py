@@ -22,7 +22,7 @@ from ...core.plugins.sources import format_error
 from .simulators import Player, Simulator
 
 SHARED_PACKAGES = ("pygame", "glfw", "OpenGL", "moderngl")
-"""Packages whose objects are shared by a simulator and its copies."""
+"""Packages of objects that a simulator and its copies share."""
 SHARED_TYPES = gymnasium.Space, gymnasium.envs.registration.EnvSpec, FunctionType, ModuleType
 """Types of objects that no step changes, which are shared, too."""
 
@@ -49,7 +49,7 @@ class PickledCopies(SimulatorCopies):
         self._layers = _layers(simulator)
         file = BytesIO()
         pickler = _Pickler(file, self._layers)
-        # By attribute, because environments that inherit EzPickle would be made anew.
+        # By attribute, because environments that inherit EzPickle would be constructed again.
         pickler.dump([vars(layer) for layer in self._layers])
         self._shared = pickler.shared
         self._saved = file.getvalue()
@@ -127,7 +127,7 @@ def find_copy_fault(simulator: Simulator, actions: Mapping[Player, object]) -> s
         for _ in range(2):
             with copies.open() as copied:
                 results.append(pickle.dumps([copied.step(actions) for _ in range(2)]))
-    except Exception as error:  # raised by code of others
+    except Exception as error:  # raised by the environment
         return format_error(error)
     results.append(pickle.dumps([simulator.step(actions) for _ in range(2)]))
     return "" if len(set(results)) == 1 else "a copy does something else than the original"

@@ -81,7 +81,7 @@ def _make(
         kind = "gymnasium" if isinstance(simulator, GymnasiumSimulator) else "pettingzoo"
         if (kind == "gymnasium") != isinstance(settings, GymnasiumSettings):
             raise ValueError(f"its environment is one of scenario.kind = {kind!r}")
-    except Exception as error:  # raised by code of others
+    except Exception as error:  # raised by the environment
         is_missing = isinstance(error, ImportError | gymnasium.error.DependencyNotInstalled)
         hint = " (nested-agents has the extras mpe and mujoco)" if is_missing else ""
         problem = f"cannot be made, {sources.format_error(error)}{hint}"

@@ -198,7 +198,7 @@ class EnvironmentScenario(Scenario):
             for joint_action in recording["joint_action"][1:]:
                 self.play(simulator, joint_action)
                 frames.append(simulator.env.render())
-        except Exception as error:  # raised by code of others, for example without a display
+        except Exception as error:  # raised by the environment, for example without a display
             raise ValueError(f"animation: {format_error(error)}") from None
         fps = float(simulator.env.metadata.get("render_fps", DEFAULT_FPS))
         film(frames.__getitem__, len(frames) - 1, self.settings.hold / fps, path)
@@ -243,7 +243,7 @@ def _inspect(settings: EnvironmentSettings, make: Maker) -> tuple[ActionMap, Sta
     """Return actions and state variables of an environment; report any fault in one line."""
     try:
         return inspect_environment(settings, make)
-    except (Exception, SystemExit) as error:  # raised by code of others
+    except (Exception, SystemExit) as error:  # raised by the environment
         is_refusal = isinstance(error, ValueError)
         fault = message(error) if is_refusal else f"cannot be played, {format_error(error)}"
         if fault.startswith("scenario.") or (is_refusal and not settings.id):

@@ -35,7 +35,7 @@ def _checked_success(success: Success) -> Success:
 
 
 class Direction(Settings):
-    """An angle whose cosine and sine are numbers of the observation."""
+    """An angle given by its cosine and sine in the observation."""
 
     cos: Entries
     """Number that holds the cosine."""

@@ -56,7 +56,7 @@ def when(step: int) -> str:
 
 
 class EnvironmentStep(NamedTuple):
-    """What an environment returned from ``reset`` or ``step``, by player."""
+    """Result of ``reset`` or ``step`` of an environment, by player."""
 
     observations: Mapping[Player, object]
     rewards: Mapping[Player, float]
@@ -215,7 +215,7 @@ class PettingZooSimulator(Simulator):
                 raise ValueError(f"{name} {when(self._steps)}: {player!r} is missing{hint}")
 
     def _flagged(self, flags: Mapping[Player, object], name: str) -> frozenset[Player]:
-        """Return the players whose flag is true."""
+        """Return the players with a true flag."""
         where = when(self._steps)
         return frozenset(p for p, flag in flags.items() if _flag(flag, f"{name} of {p} {where}"))
 

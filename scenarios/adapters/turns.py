@@ -28,7 +28,7 @@ from .simulators import Player, expand_all
 
 
 class TurnBasedEnv(parallel_to_aec_wrapper):
-    """A PettingZoo AEC environment whose agents act from the top of a hierarchy down.
+    """A PettingZoo AEC environment in which agents act from the top of a hierarchy down.
 
     An observation is that of `env`, followed by one entry for every action of every agent in the
     order of ``env.possible_agents``: 1 for the actions that were communicated in this step, else 0.

@@ -45,7 +45,7 @@ SENSING = 2**32 - 1
 
 
 class BoxPushing(Scenario, Embodiment):
-    """A box, a goal, and robots whose wheels are the agents.
+    """Box pushing: the agents are the wheels of robots, which push a box to a goal.
 
     It can be drawn, calibrated and predicted exactly.
 
@@ -125,11 +125,11 @@ class BoxPushing(Scenario, Embodiment):
             settings.prediction_horizon * CONTROL_PERIOD,
         )
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        # Whether the robots fit is better known now than in the middle of a study.
+        # Robots that do not fit around the box are refused now, not in the middle of a study.
         BoxPushing.reset(self, 0)
 
     def partners(self) -> tuple[int, ...]:
-        """Return for every wheel the one opposite on its robot, or itself if it is in the middle.
+        """Return the opposite wheel of every wheel, or itself if it is in the middle.
 
         Raises
         ------
@@ -168,7 +168,7 @@ class BoxPushing(Scenario, Embodiment):
         return self.action_set.apply(speeds, joint_actions, self._unit_speeds, self._limits)
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Command the wheels, let the world go on for one decision period, observe and reward."""
+        """Command the wheels, simulate one decision period, observe and reward."""
         self._speeds = self.commanded(self._speeds, joint_action)
         before = self.world.poses
         begin = perf_counter()
@@ -190,7 +190,7 @@ class BoxPushing(Scenario, Embodiment):
         sensed = perf_counter()
         twists = partial(_twists, before, self.world.poses, self._period, self.robot.radius)
         if terminated:
-            # Does the box come to rest within the tolerance when all wheels stop?
+            # The wheels stop; the box may leave the tolerance before it comes to rest.
             self._advance(np.zeros(len(self.agents)))
             measured["stopped_at_goal"] = self._reached()
         self._step += 1
@@ -200,7 +200,7 @@ class BoxPushing(Scenario, Embodiment):
         return Transition(states, received, terminated, truncated, measured, twists)
 
     def environments(self, count: int) -> BoxEnvironments | None:
-        """Return many such worlds in one call; None where something fails, is noisy or a user's."""
+        """Return a batch of environments; None with failures, noise or user-defined variables."""
         settings = self.settings
         is_noisy = settings.failures or settings.infrared.noise or self._playground is not None
         if is_noisy or not self.space.is_built_in or step_address() is None:
@@ -208,17 +208,17 @@ class BoxPushing(Scenario, Embodiment):
         return BoxEnvironments(self, count)
 
     def embodiment(self) -> Embodiment:
-        """Return itself: its robots are open to self-models."""
+        """Return itself: self-models can be learned for its robots."""
         return self
 
     def predict(self) -> BoxPrediction:
-        """Predict from the present state, every robot taken as nominal."""
+        """Predict from the current state; all robots are assumed to be nominal."""
         return self.predict_with(self.nominal_effects)
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> BoxPrediction:
-        """Predict, believing in these effects of the wheels and constants of the push."""
+        """Predict with the given effects of the wheels and constants of the push."""
         situation = PresentState(
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),
@@ -236,13 +236,13 @@ class BoxPushing(Scenario, Embodiment):
         return ExactPrediction(situation, model, self._premises, future)
 
     def with_exact_prediction(self) -> BoxPushing:
-        """Return a scenario alike that predicts one decision period by playing it."""
+        """Return an equal scenario that predicts one decision period by simulation."""
         exactly = {"predictor": "exact", "prediction_horizon": self.settings.action_repeat}
         exactly |= {"belief": BeliefSettings()}
         return type(self)(self.settings.model_copy(update=exactly))
 
     def constants_of_episode(self) -> dict[str, object]:
-        """Return the goal pose of the episode, and what is drawn."""
+        """Return the goal pose of the episode and the constants of drawing."""
         return {"goal_pose": self._goal, **self.settings.drawing}
 
     def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
@@ -256,12 +256,12 @@ class BoxPushing(Scenario, Embodiment):
         choose: Callable[[Prediction], IntArray],
         predict: Callable[[], Prediction | None],
     ) -> BoxPolicyMap:
-        """Return what those do around the box who choose so; the scenario begins another episode.
+        """Return the policy map of a team; the scenario is reset.
 
         Raises
         ------
         ValueError
-            If its predictions cannot begin anywhere.
+            If predictions can start from the current state of the simulation only.
         """
         from .pictures.policy import policy_of
 
@@ -295,7 +295,7 @@ class BoxPushing(Scenario, Embodiment):
         }
 
     def _advance(self, commands: FloatArray) -> None:
-        """Let the world go on for one decision period, the wheels being commanded `commands`."""
+        """Simulate one decision period with the given wheel speeds."""
         self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
 
     def _distance(self) -> float:
@@ -358,12 +358,11 @@ class BoxPushing(Scenario, Embodiment):
 
 
 class BoxEnvironments(StackedEnvironments[BoxPushing]):
-    """Many worlds of as many robots, without failures and without noise of sensors.
+    """Batch of environments without failures and without sensor noise.
 
-    Their physics is one compiled call. What each has is, bit by bit, what it has by itself.
-
-    Box2D keeps the bodies of a world where it likes, so that every place has a `World` of its own:
-    that in which the scenario has begun the episode.
+    Their physics is one compiled call, with the bits of each environment alone. Box2D decides where
+    bodies lie in memory; therefore each environment keeps the `World` in which the scenario started
+    its episode.
     """
 
     def allocate(self, scenario: BoxPushing, count: int) -> None:
@@ -378,18 +377,18 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
         self._boxes: FloatArray = np.zeros((count, 3))
 
     def store(self, index: int, scenario: BoxPushing) -> None:
-        """Swap the world of the scenario, whose episode starts, with that of an environment."""
-        begun = scenario.world
+        """Swap the worlds of the scenario, which has just been reset, and of an environment."""
+        world = scenario.world
         scenario.world = self._worlds[index]
-        self._worlds[index] = begun
-        self._addresses[index] = begun.addresses
+        self._worlds[index] = world
+        self._addresses[index] = world.addresses
         self._last[index] = 0.0
         self._wrenches[index] = 0.0
         self._speeds[index] = 0.0
-        self._boxes[index] = begun.box_pose
+        self._boxes[index] = world.box_pose
 
     def step(self, joint_actions: IntArray) -> Transitions:
-        """Command the wheels of all worlds for one decision period, observe and reward."""
+        """Command the wheels in all environments, simulate one decision period, and reward."""
         one = self.scenario
         before = self._boxes
         self._speeds = one.commanded(self._speeds, joint_actions)
@@ -411,7 +410,7 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
 def _twists(before: FloatArray, after: FloatArray, seconds: float, radius: float) -> FloatArray:
     """Return the mean twists of robots between poses ``(M + 1, 3)``, the box's standing first.
 
-    Without the box's where two robots were close: what it does tells nothing of the push then.
+    If two robots were close, the twist of the box is left out: they may have pushed each other.
     """
     twists = mean_twists(before, after, seconds)
     close = min(least_gap(before[1:], radius), least_gap(after[1:], radius)) <= APART

@@ -1,12 +1,12 @@
-"""Pictures of the kinematic chain, drawn from recordings: an episode as GIF or MP4.
+"""Animations of the kinematic chain from recordings.
 
 A recording is a mapping of arrays: ``angles (T + 1, n)`` [rad], ``speeds (T + 1, n)`` [rad/s],
-``failed (T + 1, n)``, ``goal (2,)`` [m], and constants of no dimension: ``reach`` and ``tolerance``
-[m], ``top_speed`` [rad/s], ``dt`` [s].
+``failed (T + 1, n)``, ``goal (2,)`` [m], and scalars ``reach`` and ``tolerance`` [m], ``top_speed``
+[rad/s], ``dt`` [s].
 
-Links are drawn from the base, a black square, to the tip, an orange dot with the trail of where it
-has been. Joints are the darker the faster their command; failed ones are crossed out. The
-dashed ring is the goal, as wide as the tolerance; the pale circle is the reach of the arm.
+The base is a black square, and the tip an orange dot with its trail. Joints with faster commands
+are darker, failed joints are crossed out. The dashed ring is the goal with the radius of the
+tolerance, the pale circle the reach of the arm.
 """
 
 from collections.abc import Mapping

@@ -42,7 +42,7 @@ MAX_BEND = 2.5
 
 
 class KinematicChain(Scenario, Embodiment):
-    """A planar arm whose predictions are exact, and which supports self-models.
+    """A planar arm with exact predictions and support for self-models.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class KinematicChain(Scenario, Embodiment):
         return None if self.settings.failures else ChainEnvironments(self, count)
 
     def embodiment(self) -> Embodiment:
-        """Return the arm itself, whose joints support self-models."""
+        """Return the arm itself, because its joints support self-models."""
         return self
 
     def predict(self) -> ChainPrediction:
@@ -162,7 +162,7 @@ class KinematicChain(Scenario, Embodiment):
         return tuple(effects)
 
     def with_exact_prediction(self) -> KinematicChain:
-        """Return an equal arm whose predictions include failures."""
+        """Return an equal arm with predictions that include failures."""
         return type(self)(self.settings.model_copy(update={"predictor": "informed"}))
 
     def measure(self) -> dict[str, object]:
@@ -255,7 +255,7 @@ class ChainEnvironments(StackedEnvironments[KinematicChain]):
         )
         states = arm._states.of_joints(view, 0, self._angles.shape[1]).transpose(1, 0, 2)
         rewards = arm._reward(view.distance, view.approach)
-        self._distance = view.distance
+        self._distance = view.distance.copy()
         terminated = view.distance < settings.tolerance
         truncated = ~terminated & (self._steps >= settings.most_decisions)
         rewards_by_agent = np.broadcast_to(rewards[:, None], joint_actions.shape)

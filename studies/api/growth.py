@@ -10,8 +10,11 @@ from html import escape
 from numbers import Integral
 from typing import TYPE_CHECKING
 
+from ...core.agents.fuzzy import FuzzyAgents
+from ...core.agents.team import Team
+from ...core.evaluators.enumeration import AutoSettings
+from ...core.evaluators.evaluator import Aggregation
 from ...core.plugins.words import expect, expect_each
-from ..cost.profile import search_method
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import scaling_law as laws_of_results
 from ..results.parts import join_sizes
@@ -102,6 +105,22 @@ def scaling_law(
     return Growth(law._replace(remarks=_method_remarks(study, results, size)))
 
 
+def _search_method(team: Team) -> str:
+    """Return the search methods of a team, or the kinds of learners that do not search."""
+    methods = []
+    for part in team.parts:
+        if not isinstance(part, FuzzyAgents):
+            methods.append(type(part).__name__)
+        elif not isinstance(part.evaluator, Aggregation):
+            methods.append(part.settings.kind)
+        else:
+            settings = part.settings.decision.evaluator
+            if isinstance(settings, AutoSettings):
+                settings = settings.chosen(part.evaluator.problem)
+            methods.append(settings.kind)
+    return " ".join(dict.fromkeys(methods))
+
+
 def _method_remarks(study: StudyResults, results: Results, size: str | None) -> tuple[str, ...]:
     """Return a sentence for each group of conditions whose search method changes with the size.
 
@@ -115,7 +134,7 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
         if condition in columns:
             row = columns[condition]
             with study._sources.active(), suppress(ValueError, ImportError):
-                method = search_method(arrange(settings, 0).team)
+                method = _search_method(arrange(settings, 0).team)
                 groups.setdefault(label_but(row, [key]), []).append((float(str(row[key])), method))
     name = key.rpartition(".")[2]
     changes: dict[str, list[str]] = {}

@@ -57,7 +57,6 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "topology": (".commands.describing", "List the topologies, or show one of them."),
         "check": (".commands.checking", "Check that scenarios satisfy their interface."),
         "cost": (".commands.describing", "Print the cost of hierarchies, by formula or measured."),
-        "profile": (".commands.describing", "Show the time of a decision, part by part."),
     },
 }
 """Groups of commands as `--help` shows them: the module of each command, imported on first use,

@@ -44,7 +44,7 @@ from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.printing import printable
 from ...core.values.partitions import Partition
 from ...core.values.rule_base import RuleBase
-from ...scenarios.checking.predictions import apart
+from ...scenarios.checking.predictions import state_differences
 from ..errors import WIDTH, SpecError, refused
 from ..store.database import STAGE, columns
 from ..store.durable import TEAM
@@ -396,7 +396,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         team.begin_world(world, episode)
         for _ in range(DECISIONS):
             joint = team.act(Observation(states, scenario), explore=False).joint_action
-            guesses = {"learned": _states(predictor.predict(states), joint), "as it is": states}
+            guesses = {"learned": _states(predictor.predict(states), joint), "persistence": states}
             given = scenario.predict() if scenario.horizon == horizon else None
             if given is not None:
                 guesses["given"] = _states(given, joint)
@@ -405,7 +405,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
                 break
             states = reached
             for name, guess in guesses.items():
-                errors[name].append(apart(scenario, states, guess))
+                errors[name].append(state_differences(scenario, states, guess))
     index = [variable.name for variable in scenario.state_space.variables]
     roots = {name: np.sqrt(np.square(e).mean(axis=(0, 1))) for name, e in errors.items()}
     return pd.DataFrame(roots, index=index)

@@ -88,7 +88,6 @@ def page(directory: Path) -> str:
         leads=(*verdict(table, rate, analysis), *headlines(results, there)),
         sentences=condition_sentences(table, rate, analysis),
         methods=methods(outline, settings, extent(outline)),
-        rate=rate,
         notes=unfolded((*notes, *control_lines(there), *below_random(results, there))),
         table=table,
         pictures=pictures(dict(sorted(figures.items(), key=is_secondary))),

@@ -33,11 +33,11 @@ class Picture(NamedTuple):
     name: str
     """File name without suffix."""
     svg: Markup
-    """SVG element whose ids differ from those of other figures in the page."""
+    """SVG element with ids that differ from those of other figures in the page."""
     pdf: str
     """The same figure as PDF, in base64."""
     prefix: str
-    """Id of the SVG element."""
+    """Prefix of the ids in the SVG element."""
     panels: tuple[str, ...]
     """View boxes of the panels and of the legend, which narrow screens stack; empty for one."""
 
@@ -48,7 +48,7 @@ class Picture(NamedTuple):
 
 
 def pictures(figures: Mapping[str, Figure], prefix: str = "figure") -> list[Picture]:
-    """Return figures as elements of a page, whose ids begin with a prefix."""
+    """Return figures as elements of a page with ids that begin with a prefix."""
     drawings = []
     with apply_style():
         for number, (name, figure) in enumerate(figures.items(), 1):
@@ -72,12 +72,13 @@ def panel_boxes(figure: Figure) -> tuple[str, ...]:
     scale = 72.0 / figure.dpi
     height = figure.bbox.height * scale
     boxes = []
-    for artist in (*panels, *figure.legends):
+    for artist in (*figure.legends, *panels):
         box = artist.get_tightbbox()
         if box is not None and box.width > 1.0:
-            x = box.x0 * scale - PANEL_MARGIN
-            y = height - box.y1 * scale - PANEL_MARGIN
-            sizes = (side * scale + 2 * PANEL_MARGIN for side in (box.width, box.height))
+            margin = PANEL_MARGIN if artist in panels else 0.0
+            x = box.x0 * scale - margin
+            y = height - box.y1 * scale - margin
+            sizes = (side * scale + 2 * margin for side in (box.width, box.height))
             boxes.append(" ".join(f"{value:.1f}" for value in (x, y, *sizes)))
     return tuple(boxes)
 

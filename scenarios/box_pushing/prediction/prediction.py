@@ -1,4 +1,4 @@
-"""Predictions of box pushing: what any joint action would lead to, computed when asked for.
+"""Predictions of box pushing: next states and rewards of joint actions, computed on request.
 
 The poses after a joint action come from the push predictor, at once for all robots. An agent's own
 block is predicted as if its robot pushed alone, so that it takes few values; in state spaces whose
@@ -24,7 +24,7 @@ from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
 from ..world.geometry import BoxShape
 from ..world.settings import InfraredSettings, Task, reward
-from .push import PushBelief, PushModel, outcomes, push, pushed
+from .push import PushBelief, PushModel, outcomes, push
 from .responses import Outlook, respond
 from .wheel_commands import (
     WheelCommands,
@@ -41,7 +41,7 @@ CONTACT_GAP = 0.002
 
 @dataclass(frozen=True)
 class PresentState:
-    """The present, as far as prediction needs it."""
+    """Current state of robots and box, from which predictions start."""
 
     robots: FloatArray
     """Poses ``(M, 3)``."""
@@ -59,28 +59,28 @@ class PresentState:
 
 @dataclass(frozen=True)
 class Premises:
-    """What all predictions of a scenario rest on."""
+    """Settings that all predictions of a scenario share."""
 
     belief: PushBelief
     """Push models by constants, for `outcomes`."""
     space: BoxStateSpace
-    """State variables."""
+    """State space of the agents."""
     action_set: ActionSet
-    """What actions tell the wheels."""
+    """Actions of a wheel."""
     increment: float
-    """By how much, as a fraction of `limits`."""
+    """Change of wheel speed by an action, as a fraction of `limits`."""
     limits: FloatArray
-    """``(n,)`` greatest wheel speeds [m/s]."""
+    """``(n,)`` maximum wheel speeds [m/s]."""
     task: Task
-    """What is rewarded."""
+    """Task, which defines the reward."""
     infrared: InfraredSettings
-    """What the sensors read."""
+    """Response of the sensors."""
     shape: BoxShape
     """Outline of the box."""
     hold: float
-    """How long a decision stands [s]."""
+    """Decision period [s]."""
     seconds: float
-    """How far predictions look ahead [s]."""
+    """Prediction horizon [s]."""
 
 
 class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
@@ -89,11 +89,11 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
     Parameters
     ----------
     situation
-        The present.
+        Current state.
     model
-        What is believed of robots and box.
+        Model of robots and box.
     premises
-        What all predictions of the scenario rest on.
+        Settings that all predictions of the scenario share.
     """
 
     merges: ClassVar[bool] = True
@@ -104,11 +104,11 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         self.model = model
         self.premises = premises
         self.groups = situation.groups
-        self._last: tuple[bytes, SituationBatch] | None = None  # what was asked for last
+        self._last: tuple[bytes, SituationBatch] | None = None  # the last request
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:
-        """What the wheels may be commanded."""
+        """All commands that the wheels may receive."""
         speeds = self.situation.speeds
         actions = self.premises.action_set
         limits = self.premises.limits[:, None]
@@ -121,7 +121,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         now = self.situation
         twists = self.wheel_commands.twists
         by_robot = np.ascontiguousarray(choices.T)
-        robots, box, gaps = pushed(now.robots, now.box, twists, by_robot, seconds, self.model)
+        robots, box, gaps = push(now.robots, now.box, twists, by_robot, seconds, self.model)
         return self._batch(robots, box, gaps, seconds)
 
     def _batch(
@@ -194,29 +194,31 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         n_actions = len(premises.action_set)
         joint = respond(search.starts, order, n_actions, outlook, search.exploring, search.rng)
         if not len(joint):
-            raise ArithmeticError("no joint action is worth most: not all values are numbers")
+            raise ArithmeticError(
+                "no joint action has the greatest value: not all values are numbers"
+            )
         return joint
 
     @cached_property
     def _table(self) -> tuple[SituationBatch, IntArray]:
-        """Where all combinations of twists lead, and the row of every joint-action index."""
+        """Situations after all combinations of twists; the row of every joint-action index."""
         choices, row = twist_table(self.wheel_commands)
         return self._after(choices, self.premises.seconds), row
 
     @cached_property
     def _alone(self) -> list[FloatArray]:
-        """Per robot ``(K, 3)``: its pose after every wheel command if it pushed alone."""
+        """Poses of each robot ``(K, 3)`` after every wheel command, if it pushed alone."""
         now = self.situation
         model = self.model
         commands = self.wheel_commands
         poses = []
         for r, count in enumerate(commands.counts):
             only = slice(r, r + 1)
-            every = np.arange(count)[:, None]
+            every = np.arange(count)[None]
             alone = model._replace(radii=model.radii[only], compliance=model.compliance[only])
             twists = commands.twists[only]
             seconds = self.premises.seconds
-            poses.append(push(now.robots[only], now.box, twists, every, seconds, alone)[0][:, 0])
+            poses.append(push(now.robots[only], now.box, twists, every, seconds, alone)[0][0].T)
         return poses
 
     @cached_property
@@ -292,9 +294,9 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         return self.wheel_commands.speeds[np.arange(len(choices)), choices].ravel()
 
     def slips(self, joint_action: IntArray) -> FloatArray:
-        """Return by how much contact is predicted to change the robots' twists, ``(M, 3)``.
+        """Return the predicted change of the robots' twists by contact, ``(M, 3)``.
 
-        Over the decision period, to be held against what is measured in it.
+        They are means over the decision period, to be compared with measurements.
         """
         choices = self._choices(joint_action[None])
         after = self._after(choices, self.premises.hold).robots[:, :, 0]
@@ -304,7 +306,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return mean twists ``(k, M + 1, 3)``, the box's first, under constants ``(k, 3)``.
 
-        Over the decision period, to be held against what is measured in it.
+        They are means over the decision period, to be compared with measurements.
         """
         choices = self._choices(joint_action[None])[0]
         twists = self.wheel_commands.twists[np.arange(len(choices)), choices]

@@ -41,11 +41,10 @@ def push_model(
     box: BoxSpec,
     belief: BeliefSettings = BeliefSettings(),  # noqa: B008 - frozen
 ) -> PushModel:
-    """Return what a predictor believes of robots and box, with the given errors of constants."""
+    """Return the model of a predictor, with the given errors of constants."""
     model = PushModel(
         edges=box.outline.edges,
         rounding=box.outline.rounding,
-        reach=box.reach,
         radii=np.array([robot.radius for robot in robots]),
         compliance=np.stack([compliance(robot) for robot in robots]) / belief.stiffness,
         friction_force=box.friction_force * belief.load,
@@ -59,14 +58,14 @@ def push_model(
 
 @dataclass(frozen=True)
 class Future:
-    """Where a world goes from a saved state."""
+    """Simulation that continues from a saved state."""
 
     world: World
-    """A world built alike, to play in; modified."""
+    """World with the same robots and box, for playing; modified."""
     state: WorldState
-    """The present."""
+    """State to start from."""
     failures: WheelFailures
-    """Those of the scenario; left as they are."""
+    """Failures of the scenario; not modified."""
     step: int
     """Number of the step to come."""
     hold: int
@@ -93,14 +92,14 @@ class Future:
 
 
 class ExactPrediction(BoxPrediction):
-    """Predicts by playing; but for own blocks in tables, which are those of a robot alone.
+    """Prediction by simulation; own blocks in tables are those of a robot alone.
 
     Parameters
     ----------
     situation, model, premises
-        As of `BoxPrediction`.
+        See `BoxPrediction`.
     future
-        What is played.
+        The simulation.
     """
 
     merges: ClassVar[bool] = False  # wheels that command one twist may yet slip differently
@@ -112,7 +111,7 @@ class ExactPrediction(BoxPrediction):
         self.future = future
 
     def best_responses(self, rules: RuleBase) -> None:
-        """Return that every joint action is to be played."""
+        """Return None, because every joint action must be simulated."""
 
     def _after(self, choices: IntArray, seconds: float) -> SituationBatch:
         periods = round(seconds / CONTROL_PERIOD)

@@ -1,4 +1,4 @@
-"""State spaces of box pushing: what a wheel agent perceives.
+"""State spaces of box pushing.
 
 The own variables of an agent are functions of its robot's pose and of its wheel speed. The shared
 variables are those of `variables`. A spec chooses a state space of `STATE_SPACES` by name, or lists
@@ -137,7 +137,7 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
 
 
 def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxStateSpace:
-    """Return a state space whose range of wheel speeds is that of a robot.
+    """Return a state space, with the range of wheel speeds adapted to a robot.
 
     Parameters
     ----------

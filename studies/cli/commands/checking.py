@@ -1,4 +1,4 @@
-"""The command ``check``: whether scenarios keep what they promise."""
+"""Command ``check``: contract test of scenarios."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ class ScenarioCase(NamedTuple):
 @options.trust
 @options.changes
 def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int:
-    """Check what every scenario must promise, such as equal bits for equal seeds.
+    """Check the contract of scenarios, such as equal results for equal seeds.
 
-    A table shows the values met of every variable beside its range, and the root mean square error
-    of its prediction beside that of persistence, as if all stayed as it is. Where agents learn to
-    predict, a second table shows the errors of that after a few episodes.
+    A table shows the range and the observed values of every variable, and the root mean square
+    errors of its prediction and of persistence. If agents learn a model, a second table shows
+    its errors after a few episodes.
 
     SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
     file that makes a scenario of one's own. A class with a nested class Settings is given these
@@ -67,17 +67,17 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
     faults = 0
     for case in cases:
         try:
-            findings = check_scenario(case.build, steps=steps, episodes=case.episodes)
+            report = check_scenario(case.build, steps=steps, episodes=case.episodes)
         except ScenarioError as error:
             faults += 1
             print_text(f"FAULT   {case.label}: {error}")
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            for kind, text in findings.remarks():
+            for kind, text in report.remarks():
                 label = f"{case.label}: " if kind == "passed" else ""
                 print_wrapped(f"{label}{text}", f"{kind}  ", 8)
-            frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
+            frame = DataFrame(report.variables)
             _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
     if is_spec and not faults:
         faults += _report_order(source, changes, steps)

@@ -239,29 +239,6 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
     return list(dict.fromkeys(chosen))
 
 
-@click.command()
-@click.argument("spec", type=options.PATH, metavar="SPEC.toml")
-@options.number("--seconds", "S", 1.0, "How long each condition is timed [s].")
-@options.formats("table", "csv", text="How to print it; CSV has times of parts in seconds.")
-@options.changes
-def profile(spec: Path, seconds: float, form: str, changes: tuple[str, ...]) -> int:
-    """Tell what the time of a decision goes to, condition by condition, and what it tries.
-
-    Every condition of SPEC.toml acts and learns for a while; nothing is kept. Its processor time is
-    told by part, and the joint actions that its evaluator tries beside those that formulas count.
-    """
-    from ...cost.profile import profile as profile_of
-    from ...presentation.progress import say
-    from ...presentation.tables import in_csv
-    from ...spec.spec import Spec
-
-    say("timing decisions of every condition, first compiling what is not")
-    with refused():
-        timed = profile_of(Spec.load(spec, changes), seconds)
-    print_data(in_csv(timed.frame) if form == "csv" else f"{timed}\n")
-    return 0
-
-
 TOPOLOGY = {"kind", "members", "edges"}
 """Keys of a file that holds a topology and no more."""
 

@@ -326,13 +326,16 @@ def report(directory: Path, out: Path | None, trust: bool) -> int:
     "--condition", metavar="LABEL", help="Label of the condition; by default the first one."
 )
 @click.option("--seed", type=int, metavar="SEED", help="The seed; by default the first one.")
+@click.option("--full", is_flag=True, help="Print all rules and tables, not only the summary.")
 @options.trust
-def explain(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
+def explain(
+    directory: Path, condition: str | None, seed: int | None, full: bool, trust: bool
+) -> int:
     """Explain a trained team: its rules in words, its policy, its self-model.
 
-    DIR is where the study is kept. Text and figures go into its folder explain. Unless the study
-    keeps its teams (keep_teams = true in its spec), training is run again, which takes seconds, and
-    must give the episodes that are kept.
+    DIR is the folder of the study. The text with all rules and the figures are written to its
+    folder explain. Unless the study keeps its teams (keep_teams = true in its spec), the training
+    is repeated, which takes seconds, and must give the same episodes.
     """
     from ...api.explaining import explain_team
     from ...presentation.figures import save
@@ -345,6 +348,6 @@ def explain(directory: Path, condition: str | None, seed: int | None, trust: boo
     written = explained.folder / "explanation.txt"
     durable.write(written, explained.text.encode())
     figures = save(explained.figures, explained.folder)
-    print_text(str(explained))
+    print_text(explained.text if full else str(explained))
     print_text(written, *figures)
     return 0

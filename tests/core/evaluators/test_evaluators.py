@@ -10,7 +10,7 @@ import pytest
 
 from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.evaluators.enumeration import (
-    MOST_JOINT_ACTIONS,
+    MAX_JOINT_ACTIONS,
     ExactEnumeration,
     Sampling,
     SamplingSettings,
@@ -304,7 +304,7 @@ def test_too_many_joint_actions_are_refused() -> None:
     names = [f"agent{i}" for i in range(13)]
     edges = [("agent0", name) for name in names[1:]]
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
-    assert MOST_JOINT_ACTIONS == A**11
+    assert MAX_JOINT_ACTIONS == A**11
     with pytest.raises(
         ValueError,
         match=r"^learner\.decision\.evaluator: 4 \*\* 12 joint actions of 12 agents would be",

@@ -203,7 +203,7 @@ def test_scripted_controllers_move_nothing_else() -> None:
             "scenario": {"kind": "line-up"}, "learner": {"decision": {"evaluator": place}},
         }
     )  # fmt: skip
-    with pytest.raises(ValueError, match="moves a kinematic-chain only"):
+    with pytest.raises(ValueError, match="needs a kinematic-chain"):
         na.run_trial(trials_of(spec)[0])
 
 

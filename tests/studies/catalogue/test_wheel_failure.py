@@ -100,7 +100,7 @@ def test_the_end_of_a_transient_failure_is_marked(tmp_path: Path) -> None:
     for line in analysis.table:
         assert float(line.estimates["failure ends [episode]"].value) == 30.0
         assert "after its end" in line.estimates
-    assert any("no adaptation" in note for note in analysis.notes)
+    assert any("not adaptation" in note for note in analysis.notes)
     figure = draw(analysis)["wheel-failure"]
     (area,) = [p for p in figure.axes[0].patches if isinstance(p, Rectangle)]
     assert (area.get_x(), area.get_x() + area.get_width()) == (19.5, 29.5)
@@ -139,9 +139,7 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
     analysis = analyse(results.frames())
     for line in analysis.table:
         assert list(line.estimates) == ["before", "just after", "end"]
-    assert (
-        "No recovery is measured where no episode before the failure succeeded." in analysis.notes
-    )
+    assert "Recovery is not measured without successes before the failure." in analysis.notes
 
 
 @pytest.mark.parametrize(

@@ -40,9 +40,7 @@ def test_a_finished_study_has_everything(html):
     assert html.count('aria-label="hierarchy: default') == 1
     assert 'aria-label="hierarchy: frozen' not in html, "it is the same"
     assert "All 6 trials are done." in html
-    rates = html[html.index('<dl class="rates" aria-label="evaluation success">') :]
-    rates = rates[: rates.index("</dl>")]
-    found = dict(re.findall("<dt>(.*?)</dt><dd>(.*?) <small>", rates))
+    found = dict(re.findall(r"<li>(.*?): evaluation success is (\S+)\s", html))
     assert list(found) == ["default", "frozen"]
     assert all(f"<td>{value}<small>" in html for value in found.values())
     assert "evaluation success, less that of default:" in html

@@ -46,10 +46,9 @@ def calibrating(world, agents="actuator"):
 
 
 def pushed(model, twists=TWISTS):
-    after, box, _ = push(
-        ROBOTS, np.zeros(3), twists[:, None], np.zeros((1, 2), np.int64), 0.512, model
-    )
-    return np.vstack([box, after[0]])
+    choices = np.zeros((2, 1), np.int64)
+    after, box, _ = push(ROBOTS, np.zeros(3), twists[:, None], choices, 0.512, model)
+    return np.vstack([box.T, after[:, :, 0]])
 
 
 def test_believed_are_the_worlds_own_constants_times_the_factors():
