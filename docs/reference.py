@@ -88,7 +88,8 @@ MODULES = {
         "errors", "spec.spec", "spec.keys", "spec.presets", "spec.schema", "trials.trial",
         "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.power", "results.contrasts", "results.aggregates", "results.published",
+        "results.power", "results.differences", "results.comparison",
+        "results.permutation_tests", "results.aggregates", "results.published",
         "catalogue.study", "cost.cost", "cost.profile", "cost.table",
     )),
 }  # fmt: skip

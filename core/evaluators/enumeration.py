@@ -1,8 +1,7 @@
 """Evaluators that try every joint action of the agents below, or a random sample of them.
 
-Few agents are enumerated, some sampled, and many planned for. Of many agents best responses around
-a plan reach greater values than a sample, in half of its time. They are also taken for some, if the
-values of others decide too, and wherever there must be a plan.
+``auto`` enumerates the joint actions of few agents, samples those of some, and plans for many. For
+many agents, best responses around a plan reach greater values than a sample in half of its time.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -22,7 +21,7 @@ from .evaluator import (
 )
 
 MAX_JOINT_ACTIONS = 4**11
-"""The most of some agents that are tried with each action of another: more fill the memory."""
+"""Maximum number of joint actions per own action; more would fill the memory."""
 
 
 def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
@@ -31,7 +30,7 @@ def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
     Raises
     ------
     ValueError
-        If they are too many; before anything is allocated.
+        If there are too many; raised before memory is allocated.
     """
     if n_actions ** len(agents) > MAX_JOINT_ACTIONS:
         raise ValueError(
@@ -57,9 +56,8 @@ def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatAr
 class ExactEnumeration(Aggregation):
     """Tries every joint action of the agents below, as the paper: ``A ** (1 + len(below))`` each.
 
-    If all agents together try at least as many joint actions as there are, and the prediction has
-    tables of all, next states are taken from there; else they are predicted for the joint actions
-    that are tried.
+    Next states come from tables of all joint actions, if the prediction has such tables and all
+    agents together evaluate at least that many joint actions.
 
     Raises
     ------
@@ -134,20 +132,20 @@ class ExactEnumeration(Aggregation):
 
 
 class SamplingSettings(EvaluatorSettings):
-    """Try a random sample of the joint actions of the agents below."""
+    """Evaluate a random sample of the joint actions of the agents below."""
 
     kind: Literal["sampling"] = "sampling"
     factory: ClassVar[str] = f"{__name__}:Sampling"
     samples: Samples = 64
-    """Joint actions of the agents below that are tried with each own action."""
+    """Sample size: joint actions of the agents below, evaluated with each own action."""
 
 
 class Sampling(Aggregation):
-    """Tries a random sample of the joint actions below, the same ones for every own action.
+    """Evaluates a random sample of the joint actions below, the same for every own action.
 
-    Drawn with equal probability, or from the empirical frequencies if these are the teammate model
-    (then the plain mean estimates the weighted one). With no more joint actions than samples, all
-    are tried.
+    The sample is uniform, or drawn by the empirical frequencies if these are the teammate model;
+    the plain mean then estimates the weighted one. If there are no more joint actions than samples,
+    all are evaluated.
 
     Raises
     ------
@@ -175,30 +173,30 @@ class Sampling(Aggregation):
             if empirical:
                 probabilities = probabilities_of(frequencies, below)
         elif empirical:
-            tried = self.drawn(frequencies[list(below)], self.samples, rng)
+            tried = self.sample(frequencies[list(below)], self.samples, rng)
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
         return self.aggregate(deliberation, tried, probabilities)
 
 
 class AutoSettings(EvaluatorSettings):
-    """Exact enumeration as long as it is quick, then sampling, then best responses."""
+    """Exact enumeration for small teams, then sampling, then best responses."""
 
     kind: Literal["auto"] = "auto"
     exact_up_to: Annotated[int, Field(ge=1, le=10)] = 5
-    """Agents that may still be free for exact enumeration."""
+    """Maximum number of agents whose joint actions are enumerated."""
     sampling_up_to: Annotated[int, Field(ge=1)] = 12
-    """Agents that may still be free for sampling, if agents decide by their own value and expect
-    best responses."""
+    """Maximum number of agents whose joint actions are sampled, if agents decide by their own value
+    and assume best responses."""
     samples: Samples = 64
-    """Joint actions that are tried by sampling, as of the evaluator ``sampling``."""
+    """Sample size, see the evaluator ``sampling``."""
 
     def build(self, problem: DecisionProblem) -> Evaluator:
         """Return the evaluator of a team."""
         return self.chosen(problem).build(problem)
 
     def chosen(self, problem: DecisionProblem) -> EvaluatorSettings:
-        """Return the settings of the evaluator that a team gets."""
+        """Return the settings of the chosen evaluator."""
         hierarchy = problem.hierarchy
         if problem.unseen == "plan" or problem.plan == "common":
             return EVALUATORS.parsed("best-response")

@@ -251,6 +251,15 @@ class BoxPushing(Scenario, Embodiment):
 
         animate(recording, path)
 
+    def draw(self, path: Path) -> None:
+        """Draw the current state, after `reset` the start of an episode, to a picture file."""
+        from .pictures.rendering import snapshot
+
+        state = dict(self.measure())
+        recording = {name: np.asarray(state[name])[None] for name in self.recorded}
+        constants = {name: np.asarray(it) for name, it in self.constants_of_episode().items()}
+        snapshot(recording | constants, 0, path)
+
     def show_policy(
         self,
         choose: Callable[[Prediction], IntArray],

@@ -358,7 +358,7 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         return partial(self._respond, rules) if simple and alone else None
 
     def _respond(self, rules: RuleBase, search: Search) -> IntArray:
-        plan = search.begun()
+        plan = search.initial_joint_action()
         speed, *others = rules.partitions
         cuts = np.cumsum(rules.sizes)[:-1]
         of_speed, of_bearing, *common = np.split(search.pooled.weights[0], cuts, axis=1)

@@ -14,7 +14,7 @@ from ...core.plugins.words import expect, expect_each
 from ..cost.profile import search_method
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import scaling_law as laws_of_results
-from ..results.parts import join_sizes
+from ..results.joining import join_sizes
 from ..results.results import Results
 from ..spec.tables import label_but
 from ..trials.arrangement import arrange

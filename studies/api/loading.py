@@ -13,9 +13,8 @@ from ...core.plugins.words import closest, expect, expect_each
 from ..errors import SpecError, refused
 from ..results import exported, foreign, marl_eval, published
 from ..results.foreign import Better, ScoreColumns
+from ..results.joining import combine, join_parts
 from ..results.json_values import JsonValue, parse
-from ..results.parts import join_parts
-from ..results.results import combine
 from ..results.score_files import SUFFIXES, ScoreTable, read_table, table_of
 from ..spec.outline import StudyOutline
 from ..spec.tables import SpecTable, TomlTable

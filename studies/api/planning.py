@@ -26,7 +26,8 @@ from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
 from ..results.laws import FEWEST
 from ..results.notation import format_number
-from ..results.power import SMALLEST, USUAL_DEVIATION, exponent_text, planned_text
+from ..results.power import SMALLEST, USUAL_DEVIATION
+from ..results.power_text import exponent_text, planned_text
 from ..results.scaling_law import size_key
 from ..spec.controls import LEARN_NOTHING
 from ..spec.outline import StudyOutline

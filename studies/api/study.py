@@ -34,9 +34,9 @@ from ..errors import SpecError
 from ..presentation.headlines import below_random, headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.choices import choose_trials
-from ..results.contrasts import contrasts, missing_reference, power_with_first
+from ..results.comparison import compare_conditions, missing_reference, power_with_first
+from ..results.joining import join_sizes
 from ..results.notation import wrapped
-from ..results.parts import join_sizes
 from ..results.results import Results, read
 from ..spec.conditions import ConditionSettings
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
@@ -215,7 +215,7 @@ class StudyResults:
         by = by or self._defaults.by
         key = None if by == "condition" else by
         name = measure or self._defaults.measure or self.results.main.name
-        compared = contrasts(self.results, name, phase, key, reference)
+        compared = compare_conditions(self.results, name, phase, key, reference)
         missing = missing_reference(self.results) if reference is None and key is None else []
         return Comparison(compared, (*missing, *self._of_controls, *self.remarks))
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..api.study import StudyResults
     from ..presentation.tables import SummaryTable
 
-Form: TypeAlias = Literal["table", "markdown", "latex", "csv"]
+Form: TypeAlias = Literal["table", "markdown", "latex", "csv", "json"]
 """Format of a table of estimates."""
 
 
@@ -76,6 +76,8 @@ def in_form(table: SummaryTable, form: Form) -> str:
             return table.latex
         case "csv":
             return table.csv
+        case "json":
+            return table.json
         case "table":
             return f"{table}\n"
 

@@ -221,6 +221,7 @@ form = formats(
     "markdown",
     "latex",
     "csv",
-    text="How to print the table; CSV holds every digit, LaTeX needs the package booktabs.",
+    "json",
+    text="How to print the table; CSV and JSON hold every digit, LaTeX needs the package booktabs.",
 )
 """Format of a table of estimates."""

@@ -19,7 +19,7 @@ from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import identity_lines
-from ..results.contrasts import contrasts, missing_reference
+from ..results.comparison import compare_conditions, missing_reference
 from ..results.notation import whole
 from ..results.results import read
 from ..spec.controls import control_lines
@@ -71,7 +71,7 @@ def page(directory: Path) -> str:
         figures |= growth_figures(results)
     notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
-        notes = contrasts(results, results.main.name).notes  # these include the identity lines
+        notes = compare_conditions(results, results.main.name).notes  # with the identity lines
     notes = (*missing_reference(results), *notes)
     there = {label: own for label, own in settings.items() if label in results.conditions}
     table = tabulate(analysis.table)

@@ -8,7 +8,7 @@ from ..presentation.progress import count
 from ..presentation.tables import SummaryTable
 from ..results.analysis import Analysis
 from ..results.notation import format_estimate
-from ..results.statistics import LEVEL
+from ..results.permutation_tests import LEVEL
 from ..spec.outline import StudyOutline
 
 SIZES = {"robots": "robot", "carts": "cart", "joints": "joint"}

@@ -11,7 +11,7 @@ from ...core.interface.measures import Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
-from ..results.contrasts import title_of, values_of
+from ..results.comparison import title_of, values_of
 from ..results.results import Results
 from ..results.scaling_law import columns_of, decisions_to_criterion, size_key
 from ..results.statistics import Array

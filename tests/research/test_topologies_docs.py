@@ -9,10 +9,11 @@ import pytest
 from published_tables import print_table
 
 import nested_agents as na
-from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.notation import format_estimate, format_number, format_p
+from nested_agents.studies.results.permutation_tests import paired_permutation
 from nested_agents.studies.results.results import Results
-from nested_agents.studies.results.statistics import Estimate, bootstrap, paired_permutation
+from nested_agents.studies.results.statistics import Estimate, bootstrap
 from nested_agents.studies.store.database import EVALUATION
 from research import RESULTS, equal_treatment
 from research.studies.chain_order import equivalence
@@ -152,7 +153,8 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
 )
 def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
     for name in names:
-        for group in contrasts(na.load(RESULTS / f"{name}.json").results, by="topology").groups:
+        results = na.load(RESULTS / f"{name}.json").results
+        for group in compare_conditions(results, by="topology").groups:
             rates = [line.estimates["evaluation success"].value for line in group.table]
             learner, orders, verdict, ends = re.findall(
                 r"(.+), (\d+) orders, within 0.1: (.+) (\[.+\])", equivalence(group)
@@ -165,7 +167,7 @@ def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
 
 def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
     fitted, ppo = (
-        contrasts(na.load(RESULTS / f"orders-line{own}.json").results, by="topology").table
+        compare_conditions(na.load(RESULTS / f"orders-line{own}.json").results, by="topology").table
         for own in ("", "-ppo")
     )
     for own, other in zip(fitted, ppo, strict=True):

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.evaluators.best_response import MOST_AHEAD
 from ....core.evaluators.drawing import draw, explored
 from ....core.interface.prediction import Exploring
 from ....core.numerics import FloatArray, IntArray, njit
@@ -22,6 +21,9 @@ from ..states.variables import evaluate
 from ..world.geometry import BoxShape
 from .push import PushModel, push
 from .wheel_commands import choices_of, speeds_of
+
+MAX_BODIES_AHEAD = 4
+"""Maximum number of robots evaluated in one batch while most of them keep to the plan."""
 
 
 class Outlook(NamedTuple):
@@ -225,7 +227,7 @@ def respond(
                 return joint[:0]
             r = order[k]
             if not _holds(plan, r):
-                depth = min(2 * depth, MOST_AHEAD) if k == reach else 1
+                depth = min(2 * depth, MAX_BODIES_AHEAD) if k == reach else 1
                 reach = min(k + depth, n)
                 ahead = order[k:reach]
                 # A kernel more between this and `_values_of` would take three seconds to compile.

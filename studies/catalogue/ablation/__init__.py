@@ -8,7 +8,8 @@ are adjusted by Holm's method over all conditions and both measures.
 
 from collections.abc import Sequence
 
-from ...results.analysis import Analysis, Figures, Pair, Summary, estimate_of, judged, phases_of
+from ...results.analysis import Analysis, Figures, Summary, estimate_of, judged, phases_of
+from ...results.differences import Pair
 from ...results.results import Results
 from ...results.statistics import exactly
 from ..study import measure as measure

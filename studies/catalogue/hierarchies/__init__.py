@@ -22,13 +22,14 @@ from ...results.analysis import (
     NOTHING,
     Analysis,
     Figures,
-    Pair,
     Summary,
     estimate_of,
     judged,
     steps_estimate,
 )
-from ...results.results import Results, Sizes
+from ...results.differences import Pair
+from ...results.results import Results
+from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exactly
 from ...spec.spec import Spec
 from ...spec.tables import label_but

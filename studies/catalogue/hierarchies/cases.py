@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ...results.results import Sizes
+from ...results.sizes import Sizes
 from ...results.statistics import Estimate
 
 

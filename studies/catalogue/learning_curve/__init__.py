@@ -14,7 +14,7 @@ import numpy as np
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
-from ...results.contrasts import mean_estimate, values_by_seed
+from ...results.comparison import mean_estimate, values_by_seed
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rates
 from ..study import measure as measure

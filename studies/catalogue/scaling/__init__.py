@@ -17,17 +17,11 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.numerics import FloatArray, pd
-from ...results.analysis import (
-    EVALUATED,
-    Analysis,
-    Figures,
-    Summary,
-    estimate_of,
-    evaluated,
-    select_shared,
-)
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
+from ...results.differences import select_shared
 from ...results.notation import format_estimate
-from ...results.results import Results, Sizes
+from ...results.results import Results
+from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly
 from ...spec.tables import label_but
 from ...trials.session import Session

@@ -27,14 +27,8 @@ from ....core.learners.td import FrozenSettings
 from ....core.numerics import pd
 from ....core.plugins.settings import FailureSpan
 from ...errors import SpecError
-from ...results.analysis import (
-    Analysis,
-    Figures,
-    Pair,
-    Summary,
-    estimate_over_seeds,
-    judged,
-)
+from ...results.analysis import Analysis, Figures, Summary, estimate_over_seeds, judged
+from ...results.differences import Pair
 from ...results.notation import wrapped
 from ...results.recovery import BLOCK, FailureCourse, bounded, failure_course
 from ...results.results import KEPT, Results

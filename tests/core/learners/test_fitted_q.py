@@ -287,7 +287,7 @@ def test_experience_of_others_who_tell_is_that_of_nobody() -> None:
 def test_products_that_are_none_without_those_who_tell_are_refused() -> None:
     products = RuleBaseSettings(products=(("gap", "told1", "told2"),))
     before = made(2, rule_base=products)[0]
-    with pytest.raises(ValueError, match="is told by fewer others than when it learned"):
+    with pytest.raises(ValueError, match="receives fewer messages than when it learned"):
         made(1)[0].continue_from(before, np.arange(2))
 
 

@@ -46,5 +46,5 @@ def test_it_finds_the_action_values_whatever_is_done() -> None:
 
 def test_a_state_space_without_actions_is_refused() -> None:
     bare = StateSpace("walk", (MOVE, PLACE), 1)
-    with pytest.raises(ValueError, match="holds no actions to maximise over, use td-lambda"):
+    with pytest.raises(ValueError, match="includes no actions to maximize over, use td-lambda"):
         QLearningSettings().build(RuleBase.build(bare, FULL), np.array([0]))

@@ -88,7 +88,7 @@ def test_studies_are_loaded_together(places) -> None:
     both = na.load(*places)
     assert both.conditions == ("default (one)", "frozen (one)", "default (two)", "frozen (two)")
     found = both.compare(by="directory")
-    assert [group.setting for group in found.contrasts.groups] == ["default", "frozen"]
+    assert [group.setting for group in found.analysis.groups] == ["default", "frozen"]
     # Equal trials, equal results: the made-up numbers are functions of the trial.
     assert all(d.estimate.value == 0.0 for d in found.differences)
     with pytest.raises(na.SpecError, match="named more than once"):

@@ -43,7 +43,7 @@ def test_a_finished_study_has_everything(html):
     found = dict(re.findall(r"<li>(.*?): evaluation success is (\S+)\s", html))
     assert list(found) == ["default", "frozen"]
     assert all(f"<td>{value}<small>" in html for value in found.values())
-    assert "evaluation success, less that of default:" in html
+    assert "evaluation success, minus that of default:" in html
     assert "preset = [\n    &#34;default&#34;,\n    &#34;frozen&#34;,\n]" in html
     assert len(html) < 500_000
 

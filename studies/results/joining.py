@@ -4,7 +4,8 @@ Parts belong to one study if their specs differ in their seeds alone, and no tri
 them. Sizes belong to one study if their specs differ in one number alone.
 """
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -12,12 +13,13 @@ from ...core.numerics import pd
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
-from ..spec.tables import SpecTable, flat
+from ..spec.tables import SpecTable, flat, label
+from ..trials.episodes import join_measures
 from .long_form import name_key
-from .results import DIRECTORY, Results, assemble
+from .results import Results, StepLimits, assemble
 
 Part = tuple[StudyOutline, Results]
-"""What a part consists of, and what it measured."""
+"""Outline and results of a part."""
 
 
 def join_parts(parts: Sequence[Part]) -> Part | None:
@@ -72,7 +74,7 @@ def join_sizes(
     Parameters
     ----------
     results
-        Combined results, whose conditions name their study as `DIRECTORY`.
+        Combined results with a column `DIRECTORY`.
     tables
         Specs by study.
     settings
@@ -134,3 +136,77 @@ def _values(table: SpecTable) -> dict[str, tuple[object, ...]]:
     fixed = flat({key: value for key, value in table.items() if key != "sweep"})
     swept = table.get("sweep", {})
     return {k: (v,) for k, v in fixed} | {k: tuple(values) for k, values in swept.items()}
+
+
+DIRECTORY = "directory"
+"""Column that tells from which study a condition came, where there are several."""
+
+
+def _distinguish(name: str, tables: Sequence[SpecTable]) -> list[str]:
+    """Return labels of conditions of one name, by one or two settings that tell all apart; or none.
+
+    Examples
+    --------
+    >>> _distinguish("default", [{"scenario": {"robots": n, "box": "disc"}} for n in (2, 4)])
+    ['default, robots=2', 'default, robots=4']
+    """
+    own = [dict(flat(table)) for table in tables]
+    keys = dict.fromkeys(key for table in own for key in table)
+    other = [key for key in keys if len({repr(table.get(key)) for table in own}) > 1]
+    labels = [label({key: table.get(key, "") for key in other}, name) for table in own]
+    return labels if len(other) <= 2 and len(set(labels)) == len(labels) else []
+
+
+def combine(
+    studies: Sequence[tuple[str, Results]], settings: Sequence[SpecTable] = ()
+) -> tuple[Results, list[dict[str, str]]]:
+    """Return the results of several studies as those of one, and the new labels of each.
+
+    Conditions whose label occurs more than once are distinguished by their `settings`, where one or
+    two of these differ, else by the name of their study. Their columns tell it, too, as
+    `DIRECTORY`.
+
+    Raises
+    ------
+    SpecError
+        If two studies mean different things by the name of a measure.
+    """
+    names, parts = zip(*studies, strict=True)
+    times = Counter(condition for part in parts for condition in part.columns)
+    several = [condition for condition, count in times.items() if count > 1]
+    labels = [
+        {c: f"{c} ({name})" if c in several else c for c in part.columns} for name, part in studies
+    ]
+    for condition in several if settings else ():
+        at = [i for i, part in enumerate(parts) if condition in part.columns]
+        apart = _distinguish(condition, [settings[i].get(condition, {}) for i in at])
+        if not times.keys() & set(apart):
+            for i, text in zip(at, apart, strict=False):
+                labels[i][condition] = text
+    keys = dict.fromkeys(k for part in parts for row in part.columns.values() for k in row)
+    columns = {
+        new[condition]: {**{key: row.get(key, "") for key in keys}, DIRECTORY: name}
+        for name, part, new in zip(names, parts, labels, strict=True)
+        for condition, row in part.columns.items()
+    }
+
+    def rename(frame: pd.DataFrame, new: Mapping[str, str]) -> pd.DataFrame:
+        label = frame["condition"].map(new)
+        swept = {k: label.map(lambda c, k=k: columns[c][k]) for k in (*keys, DIRECTORY)}
+        return frame.assign(condition=label, **swept)
+
+    episodes = [rename(part.episodes, new) for part, new in zip(parts, labels, strict=True)]
+    trials = [rename(part.trials, new) for part, new in zip(parts, labels, strict=True)]
+    phases = dict.fromkeys(phase for part in parts for phase in part.phases)
+    usage = (name for part in parts for name in part.usage)
+    measures = join_measures(part.measures for part in parts)
+    results = assemble(episodes, trials, phases, columns, measures, usage)
+    limits = _loosest(part.step_limits for part in parts)
+    pairs_episodes = any(part.pairs_episodes for part in parts)
+    return replace(results, step_limits=limits, pairs_episodes=pairs_episodes), labels
+
+
+def _loosest(limits: Iterable[StepLimits]) -> StepLimits:
+    """Return the limits of all studies together, which are known if each study's are."""
+    training, evaluation = zip(*limits, strict=True)
+    return StepLimits(*(None if None in own else max(own) for own in (training, evaluation)))

@@ -1,63 +1,59 @@
-"""Conditions compared by any measure: all with one, or level by level within equal others."""
+"""Comparisons of conditions: all with one reference, or level by level of a swept key.
+
+An `Estimate` is the mean of one condition, a `Difference` compares a condition with its reference,
+a `ComparisonGroup` holds the differences from one reference, and a `ComparisonTable` holds all
+groups, over which p-values are adjusted.
+"""
 
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from ...core.interface.measures import RETURN, Measure
+from ...core.interface.measures import RETURN, SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
-from .analysis import (
-    MIN_RUNS,
-    NOTHING,
-    BySeed,
-    Difference,
-    Summary,
-    differences,
-    identity_lines,
-    select_shared,
-    steps_estimate,
-    verdicts,
-)
+from .analysis import NOTHING, Summary, identity_lines, steps_estimate, verdicts
+from .differences import MIN_RUNS, BySeed, Difference, Pair, differences, select_shared
 from .notation import wrapped
-from .power import power_lines
+from .power_text import power_lines
 from .recovery import RECOVERY, recovery_by_seed
 from .results import SECONDS, STEPS, Results, describe_number, row_means
 from .series import LAST_STEP
-from .statistics import Array, Estimate, bootstrap, rate
+from .statistics import Array, Estimate, bootstrap, exactly, rate
+
+DIFFERENCE_TITLES = {True: "difference", False: "difference (independent samples)"}
+"""Headings of the column of differences, of paired and of independent runs."""
+Member = tuple[str, str]
+"""Name of a condition within its group, and its label."""
 
 
-class Group(NamedTuple):
-    """Conditions that are compared with each other."""
+class ComparisonGroup(NamedTuple):
+    """Conditions that are compared with one reference."""
 
     setting: str
-    """What they have in common, as a label; empty if there is nothing in common."""
+    """Label of what the conditions have in common; empty if that is nothing."""
     reference: str
-    """The label of the one that the others are compared with."""
     differences: tuple[Difference, ...]
-    """Of the others from it."""
     table: tuple[Summary, ...]
-    """A line for each, the reference first."""
+    """A line for each condition, the reference first."""
     values: Mapping[str, Array]
-    """By the name of each, the means of its seeds ``(n_seeds,)``."""
+    """Means of the seeds ``(n_seeds,)`` by condition."""
     training: Mapping[str, Array]
-    """Values of each episode of training ``(n_seeds, n_episodes)``, if it is measured there."""
+    """Values of the training episodes ``(n_seeds, n_episodes)`` by condition, where measured."""
     left_out: tuple[str, ...] = ()
-    """By condition, how many runs or scores have no partner in the reference, or it in them."""
+    """For each condition, the number of runs or scores without a partner."""
 
 
-class Contrasts(NamedTuple):
-    """Conditions against references by one measure; p is adjusted over all of them."""
+class ComparisonTable(NamedTuple):
+    """Conditions compared by one measure; p is adjusted over all groups."""
 
     measure: Measure
-    """By what they are compared."""
     phase: str
-    """In which episodes; empty if it is a number of whole trials."""
-    groups: tuple[Group, ...]
-    """The comparisons."""
+    """Phase of the episodes; empty for a number of whole trials."""
+    groups: tuple[ComparisonGroup, ...]
     identical: tuple[tuple[str, ...], ...] = ()
-    """Conditions of which there is nothing to tell apart, see `Results.identical`."""
+    """Conditions without any difference, see `Results.identical`."""
 
     @property
     def differences(self) -> tuple[Difference, ...]:
@@ -66,110 +62,137 @@ class Contrasts(NamedTuple):
 
     @property
     def title(self) -> str:
-        """What is compared, as columns of tables are called."""
+        """Title of the measure, as tables have it."""
         return title_of(self.measure, self.phase)
 
     @property
     def table(self) -> tuple[Summary, ...]:
-        """A line for every condition: estimate, and difference from its reference."""
+        """A line for each condition: estimate, difference, effect sizes."""
         return tuple(line for group in self.groups for line in group.table)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The verdicts, and what the comparisons could have detected."""
+        """Verdicts, and the differences that the comparisons detect, in lines."""
         groups = {}
         for group in self.groups:
             head = ": ".join(filter(None, (group.setting, self.title)))
-            groups[f"{head}, less that of {group.reference}"] = group.differences
+            groups[f"{head}, minus that of {group.reference}"] = group.differences
         lines = verdicts(groups, self.measure, self.title)
         left_out = "; ".join(text for group in self.groups for text in group.left_out)
         if left_out:
             lines += wrapped(f"Without a partner and left out of the difference: {left_out}.")
+        values = [own for group in self.groups for own in group.values.values()]
+        if self.measure.name == SUCCESS.name and not any(own.any() for own in values):
+            lines += wrapped(f"No run has any {self.title}.")
         return (*(lines or [NOTHING]), *identity_lines(self.identical))
 
 
 def title_of(measure: Measure, phase: str) -> str:
-    """Return what a measure of a phase is called, ``evaluation success``, ``success, eight``."""
+    """Return the title of a measure in a phase, ``evaluation success`` or ``success, eight``."""
     kind, _, name = phase.partition(":")
     return f"{measure.heading}, {name}" if name else f"{kind} {measure.heading}".lstrip()
 
 
-def contrasts(
+def compare_conditions(
     results: Results,
     measure: str = "success",
     phase: str | None = None,
     by: str | None = None,
     reference: str | None = None,
-) -> Contrasts:
+) -> ComparisonTable:
     """Compare conditions by the means of their seeds.
 
     Parameters
     ----------
     results
-        Of any studies.
+        Results of any studies.
     measure
-        A measure of episodes, ``steps``, ``return``, or a number of whole trials, by name.
+        Name of a measure of episodes, ``steps``, ``return``, or a number of whole trials.
     phase
-        Which episodes: by default ``evaluation``, or where there is none, ``training``.
+        Phase of the episodes; by default ``evaluation``, or ``training`` if there is none.
     by
-        A swept key, or the last part of it: conditions that agree in all others are compared, each
-        with that of the first value. None: all conditions with the first one.
+        A swept key, or its last part. Conditions that agree in all other keys are compared with
+        the one of the first value. By default all conditions are compared with the first one.
     reference
-        Another one to compare with, or with `by` another value; by any of its `aliases`.
+        Another condition, or with `by` another value, to compare with.
 
     Raises
     ------
     SpecError
-        If the results have no such measure, phase, key or reference.
+        If the results have no such measure, phase, key or reference, or nothing can be a success.
     """
-    shown_as, values, phase = values_by_seed(results, measure, phase)
+    shown, values, phase = values_by_seed(results, measure, phase)
+    if shown.is_rate and shown.greatest == 0.0:
+        others = [m.name for m in results.measures if m != shown]
+        raise SpecError(
+            f"measure = {measure!r}: nothing is a success in these results; known: "
+            f"{', '.join([*others, STEPS.name, RETURN.name])}"
+        )
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
-    pairs = {
+    pairs: dict[str, list[Pair]] = {
         setting: [
             (name, measure, *_pair(values[c], values[members[0][1]], results.pairs_episodes))
             for name, c in members[1:]
         ]
         for setting, members in groups
     }
-    compared = differences(pairs, shown_as)
-    compared_groups = []
-    for setting, members in groups:
-        less = {d.condition: {DIFFERENCE[d.paired]: d.estimate} for d in compared[setting]}
-        paired = {d.condition for d in compared[setting] if d.paired}
-        left_out = [
-            (", ".join(filter(None, (setting, name))), _left_out(results, values[c], base))
-            for base in [values[members[0][1]]]
-            for name, c in members[1:]
-            if name in paired
-        ]
-        lines = []
-        for name, c in members:
-            own = {title_of(shown_as, phase): mean_estimate(shown_as, values[c])}
-            whose = ", ".join(filter(None, (setting, name)))
-            lines.append(Summary(whose, len(values[c]), own | less.get(name, {})))
-        compared_groups.append(
-            Group(
-                setting=setting,
-                reference=members[0][0],
-                differences=compared[setting],
-                table=tuple(lines),
-                values={name: row_means(values[c]).to_numpy() for name, c in members},
-                training={
-                    name: results.by_seed(c, "training", shown_as.name).dropna(axis=1).to_numpy()
-                    for name, c in members
-                    if phase and results.has(c, "training", shown_as.name)
-                },
-                left_out=tuple(f"{name}, {text}" for name, text in left_out if text),
-            )
-        )
-    return Contrasts(shown_as, phase, tuple(compared_groups), results.identical)
+    compared = differences(pairs, shown)
+    compared_groups = [
+        _group(results, setting, members, values, compared[setting], (shown, phase))
+        for setting, members in groups
+    ]
+    return ComparisonTable(shown, phase, tuple(compared_groups), results.identical)
+
+
+def _group(
+    results: Results,
+    setting: str,
+    members: list[Member],
+    values: Mapping[str, pd.DataFrame],
+    compared: tuple[Difference, ...],
+    measured: tuple[Measure, str],
+) -> ComparisonGroup:
+    """Return the group of some conditions, the reference first."""
+    measure, phase = measured
+    by_name = {d.condition: d for d in compared}
+    base = values[members[0][1]]
+    lines = []
+    left_out = []
+    for name, condition in members:
+        title = ", ".join(filter(None, (setting, name)))
+        estimates = {title_of(measure, phase): mean_estimate(measure, values[condition])}
+        if name in by_name:
+            estimates |= _difference_columns(by_name[name], measure)
+            count = _left_out(results, values[condition], base) if by_name[name].paired else ""
+            left_out += [f"{title}, {count}"] if count else []
+        lines.append(Summary(title, len(values[condition]), estimates))
+    return ComparisonGroup(
+        setting=setting,
+        reference=members[0][0],
+        differences=compared,
+        table=tuple(lines),
+        values={name: row_means(values[c]).to_numpy() for name, c in members},
+        training={
+            name: results.by_seed(c, "training", measure.name).dropna(axis=1).to_numpy()
+            for name, c in members
+            if phase and results.has(c, "training", measure.name)
+        },
+        left_out=tuple(left_out),
+    )
+
+
+def _difference_columns(difference: Difference, measure: Measure) -> dict[str, Estimate]:
+    """Return the columns of a difference: the difference and two effect sizes."""
+    title = "P(improvement)" if measure.better else "P(higher)"
+    return {
+        DIFFERENCE_TITLES[difference.paired]: difference.estimate,
+        title: difference.improvement(measure.better),
+        "Cliff's delta": exactly(difference.cliffs_delta),
+    }
 
 
 def missing_reference(results: Results) -> list[str]:
-    """Return lines that say so if no trial of the first condition has finished.
-
-    Another condition is the reference then.
-    """
+    """Return lines that say which condition is the reference if the first one has no trial."""
     present = [condition for condition in results.columns if condition in results.conditions]
     first = next(iter(results.columns), None)
     if len(present) < 2 or first is None or present[0] == first:
@@ -181,19 +204,19 @@ def missing_reference(results: Results) -> list[str]:
 
 
 def power_with_first(results: Results) -> tuple[str, ...]:
-    """Return what comparisons with the first condition by `Results.main` can find, in lines.
+    """Return lines on which differences from the first condition the seeds detect.
 
-    As `contrasts` of the same say it, whose tests take seconds where seeds are thousands.
+    They agree with those of `compare_conditions`, whose tests take seconds for thousands of seeds.
     """
     measure, values, phase = values_of(results, results.main.name)
     base, *others = (values[c] for c in results.columns if c in values)
     pairs = [select_shared([own, base]) for own in others]
-    samples = [own - reference for own, reference in pairs if len(own) >= 2]
+    samples = [own - reference for own, reference in pairs if len(own) >= MIN_RUNS]
     return tuple(power_lines(samples, title_of(measure, phase), of_rates=measure.is_rate))
 
 
 def usual_phase(results: Results, measure: str) -> str:
-    """Return the phase of evaluation, if all trained conditions have it, else that of training.
+    """Return the phase of evaluation if all trained conditions have it, else that of training.
 
     Series of other tools that were not evaluated are compared at their last step.
 
@@ -212,10 +235,6 @@ def usual_phase(results: Results, measure: str) -> str:
     raise SpecError(f"phase: name one, known: {', '.join(results.phases)}")
 
 
-DIFFERENCE = {True: "difference", False: "difference (independent samples)"}
-"""Headings of the column of differences, of paired and of independent runs."""
-
-
 def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[BySeed, BySeed]:
     """Return the means of two conditions by seed, over common episodes if these are paired."""
     if pairs_episodes:
@@ -230,7 +249,7 @@ def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[
 
 
 def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
-    """Return how many runs, or scores if these are paired, only one of two conditions has."""
+    """Return the number of runs, or of paired scores, that only one of two conditions has."""
     index, other = own.index, base.index
     unit = "runs"
     if results.pairs_episodes:
@@ -242,7 +261,7 @@ def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
 
 
 def mean_estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
-    """Return the mean over seeds of a measure's values, a row for each seed, with its interval."""
+    """Return the mean over seeds of values with a row for each seed."""
     means = row_means(values).to_numpy()
     if measure.name == STEPS.name:
         return steps_estimate(means, measure)
@@ -251,14 +270,10 @@ def mean_estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
     return bootstrap(means, bounds=measure.bounds)
 
 
-_Pairs = list[tuple[str, str]]
-"""Names of the conditions of a group, and their labels; the reference first."""
-
-
 def values_of(
     results: Results, name: str, phase: str | None = None
 ) -> tuple[Measure, dict[str, BySeed], str]:
-    """Return a measure, its means of seeds by condition, and the phase that they are of."""
+    """Return a measure, its means by condition and seed, and their phase."""
     measure, values, phase = values_by_seed(results, name, phase)
     return measure, {condition: row_means(own) for condition, own in values.items()}, phase
 
@@ -266,21 +281,26 @@ def values_of(
 def values_by_seed(
     results: Results, name: str, phase: str | None = None
 ) -> tuple[Measure, dict[str, pd.DataFrame], str]:
-    """Return a measure, its values by condition, and the phase that they are of.
+    """Return a measure, its values by condition, and their phase.
 
-    Values have a row for each seed and a column for each episode, or one for a number of trials.
-    The phase is by default the usual one; it is empty for a number of trials, and for a measure of
-    recovery from a failure.
+    Values have a row for each seed and a column for each episode, or one column for a number of
+    trials or a measure of recovery, which have an empty phase.
+
+    Raises
+    ------
+    SpecError
+        If no trial has finished, or the results have no such measure or phase.
     """
-    has_failed = any("onset" in results.numbers(condition) for condition in results.conditions)
-    recovery = RECOVERY if has_failed else {}
-    name = next((m.name for m in recovery.values() if name in (m.heading, m.title)), name)
-    measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
-    name = next((m.name for m in measures.values() if m.heading == name), name)
     if not results.conditions:
         raise SpecError("no trial has finished")
     if phase is not None and phase not in results.phases:
         raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
+    has_failed = any("onset" in results.numbers(condition) for condition in results.conditions)
+    recovery = RECOVERY if has_failed else {}
+    measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
+    titled = [(title, m.name) for m in recovery.values() for title in (m.heading, m.title)]
+    titled += [(m.heading, m.name) for m in measures.values()]
+    name = dict(reversed(titled)).get(name, name)
     if name in recovery:
         measure, values = recovery_by_seed(results, name, phase or "training")
         return measure, {c: own.to_frame() for c, own in values.items()}, ""
@@ -292,12 +312,19 @@ def values_by_seed(
         if not known:
             raise SpecError(f"measure = {name!r}: no condition has it in the phase {phase!r}")
         return measure, known, phase
+    return _trial_numbers(results, name, {*measures, *recovery})
+
+
+def _trial_numbers(
+    results: Results, name: str, others: Collection[str]
+) -> tuple[Measure, dict[str, pd.DataFrame], str]:
+    """Return a number of whole trials as `values_by_seed` does; `others` are further measures."""
     numbers = {c: results.numbers(c) for c in results.conditions}
     columns = dict.fromkeys(n for own in numbers.values() for n in own)
     names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
     column = next((c for c in columns if name in names[c]), None)
     if column is None:
-        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *recovery, *columns})}")
+        raise SpecError(f"measure = {name!r}: {closest(name, {*others, *columns})}")
     measure, factor = describe_number(column)
     of_trials = {
         c: pd.DataFrame(factor * own[column], results.seeds(c))
@@ -312,7 +339,8 @@ def _groups(
     columns: Mapping[str, Mapping[str, object]],
     by: str | None,
     reference: str | None,
-) -> list[tuple[str, _Pairs]]:
+) -> list[tuple[str, list[Member]]]:
+    """Return the setting and the members of each group, the reference first."""
     if by is None:
         members = [(c, c) for c in conditions]
         known = {c: aliases(c, columns[c]) for c in conditions}
@@ -321,7 +349,7 @@ def _groups(
     key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
     if key is None:
         raise SpecError(f"by = {by!r}: {closest(by, keys)}")
-    groups: dict[str, _Pairs] = {}
+    groups: dict[str, list[Member]] = {}
     for c in conditions:
         level = _level(key, columns[c][key])
         rest = ", ".join(_level(k, v) for k, v in columns[c].items() if k != key and v != "")
@@ -331,7 +359,7 @@ def _groups(
 
 
 def _level(key: str, value: object) -> str:
-    """Return a value of a column as a label: a name stands for itself.
+    """Return a value of a column as a label; text is its own label.
 
     >>> _level("scenario.robots", 8), _level("topology", "chain")
     ('robots=8', 'chain')
@@ -340,9 +368,9 @@ def _level(key: str, value: object) -> str:
 
 
 def _put_first(
-    members: _Pairs, reference: str | None, known: Mapping[str, Collection[str]]
-) -> _Pairs:
-    """Return the members of a group, the reference first, by a name or another `known` one."""
+    members: list[Member], reference: str | None, known: Mapping[str, Collection[str]]
+) -> list[Member]:
+    """Return the members of a group, the reference first; `known` has the aliases of labels."""
     if reference is None:
         return members
     first = named(reference, {name: known[c] for name, c in members})
