@@ -87,7 +87,7 @@ def page(directory: Path) -> str:
         significant=significant(analysis),
         leads=(*verdict(table, rate, analysis), *headlines(results, there)),
         sentences=condition_sentences(table, rate, analysis),
-        methods=methods(outline, settings, extent(outline)),
+        methods=methods(outline, settings, extent(outline), is_compared=bool(analysis.differences)),
         notes=unfolded((*notes, *control_lines(there), *below_random(results, there))),
         table=table,
         pictures=pictures(dict(sorted(figures.items(), key=is_secondary))),

@@ -70,7 +70,11 @@ def condition_sentences(table: SummaryTable, title: str, analysis: Analysis) -> 
 
 
 def methods(
-    outline: StudyOutline, settings: Mapping[str, Mapping[str, Any]], extent: str
+    outline: StudyOutline,
+    settings: Mapping[str, Mapping[str, Any]],
+    extent: str,
+    *,
+    is_compared: bool,
 ) -> list[str]:
     """Return the methods paragraph of a study, a sentence each.
 
@@ -82,6 +86,8 @@ def methods(
         Settings of its conditions, by label.
     extent
         Conditions, seeds and episodes in words.
+    is_compared
+        Whether the study compares conditions.
     """
     own = list(settings.values())
     scenarios = [condition["scenario"] for condition in own]
@@ -95,11 +101,12 @@ def methods(
     sentences.append(f"Learner: {_kinds([condition['learner'] for condition in own])}.")
     sentences.append(f"Extent: {extent}.")
     if len(outline.seeds) > 1:
-        sentences.append(
-            "Statistics: means over seeds with 95% confidence intervals. Conditions are paired by "
-            "seed, which determines the initial states of every episode; p-values are adjusted by "
-            "Holm's method, intervals are not."
-        )
+        sentences.append("Statistics: means over seeds with 95% confidence intervals.")
+        if is_compared:
+            sentences.append(
+                "Conditions are paired by seed, which determines the initial states of every "
+                "episode. p-values are adjusted by Holm's method, intervals are not."
+            )
     return sentences
 
 

@@ -89,7 +89,7 @@ def test_rows_reports_and_tuning_leave_success_out(tmp_path, capsys) -> None:
     assert "success" not in capsys.readouterr().out
     assert main(["report", str(tmp_path / "kept")]) == 0
     page = (tmp_path / "kept" / "report.html").read_text(encoding="utf-8")
-    assert "Evaluation return: from " in page
+    assert "Evaluation return is highest with " in page
     alone = {**SPREAD, **FITTED, "tune": {"learner.ridge": [0.01, 1.0]}}
     tuned = na.tune(alone, tmp_path / "tuned", trials=3, seeds=2, jobs=1)
     assert "Nothing is a success: they are ranked by evaluation return." in tuned.lines
