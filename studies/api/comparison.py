@@ -26,7 +26,7 @@ class Comparison:
     analysis: ComparisonTable
     """The analysis."""
     remarks: tuple[str, ...] = ()
-    """What must be said of the conditions, in lines."""
+    """Remarks on the conditions, line by line."""
 
     @cached_property
     def table(self) -> SummaryTable:
@@ -40,7 +40,7 @@ class Comparison:
 
     @property
     def verdicts(self) -> tuple[str, ...]:
-        """What was found, and what could have been detected, line by line."""
+        """Results and their power, line by line."""
         return (*self.analysis.notes, *self.remarks)
 
     @cached_property

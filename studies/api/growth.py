@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Growth:
-    """How a measure grows with size; printed or shown by a notebook, table and sentences."""
+    """Growth of a measure with size; printed, it is a table with sentences."""
 
     analysis: laws_of_results.ScalingLaw
     """The laws, group by group."""
@@ -38,7 +38,7 @@ class Growth:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Which laws were chosen, how they predicted what was left out, how exponents differ."""
+        """Chosen laws, their predictions of sizes that were left out, differences of exponents."""
         return self.analysis.notes
 
     def figure(self) -> Figure:
@@ -71,7 +71,7 @@ def scaling_law(
     Parameters
     ----------
     study
-        Loaded results, whose sizes are a swept key of numbers.
+        Loaded results with a swept key of numbers as the size.
     measure
         Of episodes, ``steps``, ``return`` or a number of whole trials, by name; by default the
         first, which is success, or the return where nothing is one.
@@ -82,8 +82,7 @@ def scaling_law(
     criterion
         Fit the decisions of training until this share of five episodes in a row succeeds.
     predict
-        Sizes to predict, beside those that were run: the mean of as many seeds, with its 90%
-        interval.
+        Further sizes to predict: the mean of as many seeds, with its 90% interval.
 
     Raises
     ------
@@ -103,10 +102,10 @@ def scaling_law(
 
 
 def _method_remarks(study: StudyResults, results: Results, size: str | None) -> tuple[str, ...]:
-    """Return a sentence for each group of conditions whose search method changes with the size.
+    """Return a sentence for each group of conditions in which the search method changes with size.
 
-    Methods are those of teams that are built for this; a study whose files are not trusted, or
-    that is known by its table alone, has none.
+    A team of each condition is built to find its method. A study with untrusted files, or one that
+    is known by its table alone, has no methods.
     """
     columns = laws_of_results.columns_of(results)
     key = laws_of_results.size_key(columns, size)

@@ -88,9 +88,9 @@ class Plan:
     processes: int
     """Number of trials that run at a time."""
     seconds: float | None
-    """Time of the whole study if it goes on as the pilot episodes did [s]; None: no pilot."""
+    """Time of the whole study, extrapolated from pilot episodes [s]; None without a pilot."""
     range: tuple[float, float] | None
-    """Lower and upper bound of this time [s]; None: no pilot."""
+    """Lower and upper bound of this time [s]; None without a pilot."""
     memory: float | None
     """Approximate memory of all processes [bytes]; None: no pilot, or unknown on this system."""
     comparisons: int

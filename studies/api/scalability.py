@@ -33,13 +33,13 @@ class ScalabilityTable(SummaryTable):
 
     @property
     def remark(self) -> str:
-        """How the intervals are computed."""
+        """Description of the intervals."""
         return "Intervals: Student's over seeds; of ratios to the smallest size, Fieller's."
 
 
 @dataclass(frozen=True)
 class ScalabilityReport:
-    """Which hierarchy, how many agents, at which cost; printed or shown by a notebook."""
+    """Scalability of hierarchies and their costs; printed or shown by a notebook."""
 
     analysis: Scalability
     remarks: tuple[str, ...] = ()

@@ -58,11 +58,11 @@ if TYPE_CHECKING:
     from .scalability import ScalabilityReport
 
 Place = str | PathLike[str]
-"""Of a directory or a file."""
+"""Path of a directory or a file."""
 
 
 class Defaults(NamedTuple):
-    """What `StudyResults.compare` compares unless it is told otherwise."""
+    """Default arguments of `StudyResults.compare`."""
 
     measure: str | None = None
     by: str | None = None
@@ -70,19 +70,19 @@ class Defaults(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyResults:
-    """What the finished trials of a study measured, or those of several studies together.
+    """Results of the finished trials of one or several studies.
 
     Made by `run` and `load`. Printed, or shown by a notebook, it is its table.
     """
 
     outline: StudyOutline
-    """What the study consists of."""
+    """Outline of the study."""
     results: Results
-    """Its frames, and arrays of what they hold."""
+    """Data frames and arrays of the results."""
     failed: tuple[tuple[str, int, str], ...] = ()
     """Condition, seed and traceback of every failed trial."""
     remarks: tuple[str, ...] = ()
-    """What must be said of the results, in lines."""
+    """Remarks on the results, line by line."""
     _sources: Sources = field(default_factory=Sources, repr=False)
     _settings: Mapping[str, TomlTable] = field(default_factory=dict, repr=False)
     _directories: tuple[Path, ...] = ()
@@ -138,7 +138,7 @@ class StudyResults:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the study says of its results, verdicts and their power, line by line."""
+        """Verdicts and their power, line by line."""
         sentences = map(wrapped, headlines(self.results, self._settings))
         return (
             *missing_reference(self.results),
@@ -174,13 +174,13 @@ class StudyResults:
 
     @property
     def power(self) -> tuple[str, ...]:
-        """What comparisons with the first condition can find, as `compare` says it."""
+        """Power of comparisons with the first condition, as in `compare`."""
         is_own = self.results.measures and self.results.main.name in (SUCCESS.name, RETURN.name)
         return power_with_first(self.results) if is_own and self.results.phases else ()
 
     @cached_property
     def analysis(self) -> Any:
-        """What the study makes of its results, see `nested_agents.studies.catalogue.study`."""
+        """Analysis of the results by the study, see `nested_agents.studies.catalogue.study`."""
         with self._sources.active():
             return analyse_as(self.outline.study, self.results)
 
@@ -384,7 +384,7 @@ class StudyResults:
 
     @property
     def status(self) -> Status:
-        """How far the study is now: what is done, running, failed and left, and for how long."""
+        """Progress of the study: finished, running, failed and remaining trials, and time left."""
         return Status.of(self.directory)
 
     def report(self, path: Place | None = None) -> Path:
@@ -411,7 +411,7 @@ class StudyResults:
 
     @property
     def directory(self) -> Path:
-        """Where the study is kept.
+        """Directory of the study.
 
         Raises
         ------

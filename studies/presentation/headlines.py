@@ -51,9 +51,9 @@ def headlines(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tu
 
 
 def below_random(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return a remark on the learners whose evaluation ends below that of random actions, in lines.
+    """Return a remark, in lines, on learners that end below the random control of their scenario.
 
-    Learners are judged by the means of `Results.main`, by the random control of their scenario.
+    The comparison uses the means of `Results.main`.
     """
     main = results.main
     there = {c: settings[c] for c in results.of_phase("evaluation") if c in settings}

@@ -226,7 +226,7 @@ def _mismatch_of_study(
     if mismatch is not None and is_copy(copy, spec, notes):
         raise SpecError(
             f"{copy}: is not the spec of the study beside it: {mismatch}; if you did not edit it, "
-            f"it is damaged: {command_line('retry', store.directory)} goes on by the database"
+            f"it is damaged: {command_line('retry', store.directory)} continues from the database"
         )
     return mismatch
 

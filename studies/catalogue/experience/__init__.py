@@ -26,7 +26,7 @@ from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated
 
 AFTER = "after "
-"""With what the phase of such an evaluation begins; how much came before follows."""
+"""Prefix of the phases of evaluations during training; the number of decisions follows."""
 FIRST = 1000
 """Decisions before the first evaluation."""
 DECISIONS = "decisions"
