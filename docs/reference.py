@@ -73,6 +73,7 @@ MODULES = {
         "box_pushing.prediction.settings", "box_pushing.scenario",
         "environments", "box_pushing.environments", "adapters.turns", "adapters.scenario",
         "adapters.settings", "box_pushing.states.variables",
+        "box_pushing.states.situations",
         "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
         "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.starts",
         "box_pushing.world.world",
