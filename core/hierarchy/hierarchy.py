@@ -115,7 +115,7 @@ class Hierarchy:
                 f"hierarchy: lookahead = {lookahead!r}: neighbors search over each other's "
                 "actions; without neighbors use independent"
             )
-        self._graph = self._directed(pairs)
+        self._graph = self._directed([(superior, other) for superior, other in pairs])
         self._undirected = self._joined(undirected)
         self.edges: tuple[tuple[int, int], ...] = tuple(sorted(self._graph.edges))
         """Pairs (superior, subordinate) of agent indices."""

@@ -154,3 +154,9 @@ def test_neighbors_need_lookahead() -> None:
         Hierarchy("ab", [], [("a", "b")], lookahead="none")
     assert Hierarchy("ab", [], [("a", "b")]).n_messages == 2
     assert Hierarchy("ab", [], [("a", "b")], communication="none").n_messages == 0
+
+
+def test_edges_may_be_lists_as_json_has_them() -> None:
+    assert Hierarchy(["a", "b"], [["a", "b"]]).edges == ((0, 1),)
+    with pytest.raises(ValueError, match="more than once"):
+        Hierarchy(["a", "b"], [["a", "b"], ("a", "b")])
