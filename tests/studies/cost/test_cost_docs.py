@@ -32,6 +32,8 @@ def test_a_documented_command_works(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    (spec,) = re.findall(r"```toml\n(# arms.toml.*?)```", PAGES["cost"], re.DOTALL)
+    (tmp_path / "arms.toml").write_text(spec)
     assert main(shlex.split(command)[3:]) == 0
     assert capsys.readouterr().out
 
