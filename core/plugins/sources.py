@@ -250,8 +250,8 @@ class Sources:
         except UnicodeDecodeError:
             raise ValueError(f"{name}: is not UTF-8 text") from None
         for other in imported(text) - {"nested_agents"} if name.endswith(".py") else ():
-            beside = [path.parent / f"{other}.py", path.parent / other / "__init__.py"]
-            if any(map(Path.exists, beside)) and place_of(other) in (None, *map(str, beside)):
+            local = [path.parent / f"{other}.py", path.parent / other / "__init__.py"]
+            if any(map(Path.exists, local)) and place_of(other) in (None, *map(str, local)):
                 raise ValueError(
                     f"{name}: imports {other} from its folder, but a study keeps single files: put "
                     "both in one file, or install the shared part as a package"

@@ -12,7 +12,8 @@ from ...core.plugins.words import show
 from ..errors import SpecError
 from ..presentation.progress import Terminal
 from ..results.results import DONE, read
-from ..spec.spec import Spec, plain
+from ..spec.objects import plain
+from ..spec.spec import Spec
 from ..spec.tables import TomlTable, label
 from ..store.database import EVALUATION
 from ..store.durable import TEAM

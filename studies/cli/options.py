@@ -140,17 +140,17 @@ checkpoint = number(
 
 trust = flag(
     "--trust",
-    "Run, from now on, the Python files that came with the study, and import the modules that it "
-    "names, though no spec of yours has done so yet. They can do whatever you can.",
+    "Trust the code of the study, now and later: run the Python files that came with it and import "
+    "the modules that it names. This code can do whatever you can.",
 )
-"""Whether code that a study brings along or names may be run, see `core.plugins.trust`."""
+"""Whether a study may run the code that it contains or names, see `core.plugins.trust`."""
 
 changes = click.option(
     "--set",
     "changes",
     multiple=True,
     metavar="KEY=VALUE...",
-    help='Lay values over the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
+    help='Change values of the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
 )
 """Changes of a spec, see `nested_agents.studies.spec.tables.assignment`."""
 

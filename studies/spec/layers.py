@@ -355,10 +355,10 @@ def _left_out(
 
 def _cause(key: str, kinds: Iterable[str]) -> str | None:
     """Return the kind that makes a key ignored: that of its table, or of its section."""
-    around = [kind for kind in kinds if key.startswith(kind.removesuffix("kind"))]
+    enclosing = [kind for kind in kinds if key.startswith(kind.removesuffix("kind"))]
     section_of_key = key.partition(".")[0]
-    beside = [kind for kind in kinds if kind.partition(".")[0] == section_of_key]
-    return max(around or beside, key=len, default=None)
+    same_section = [kind for kind in kinds if kind.partition(".")[0] == section_of_key]
+    return max(enclosing or same_section, key=len, default=None)
 
 
 def _expand(layer: Layer) -> TomlTable:

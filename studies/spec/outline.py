@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 
 
 def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
-    """Return in words the episodes of training, stage by stage, that there are.
+    """Return the numbers of training episodes in words, stage by stage.
 
     Parameters
     ----------
     curricula
-        Of every condition, the episodes of its stages.
+        Episodes of each stage, for every condition.
     episodes
-        Those after them.
+        Episodes of training after the stages.
 
     Examples
     --------
@@ -53,13 +53,13 @@ class StudyOutline(NamedTuple):
     study: str
     """Name of the study."""
     seeds: tuple[int, ...]
-    """As in `Spec`."""
+    """Seeds of the trials of each condition."""
     episodes: int
-    """As in `Spec`."""
+    """Number of training episodes of a trial."""
     steps: int
-    """As in `Spec`."""
+    """Maximum number of decisions in an episode."""
     evaluation: int
-    """As in `Spec`."""
+    """Number of evaluation episodes after training."""
     columns: Mapping[str, SpecTable]
     """Columns that distinguish each condition from the others."""
     table: SpecTable
@@ -248,6 +248,6 @@ def outdated(store: Store) -> str | None:
         return None
     more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"
     return (
-        f"{store.directory}: its results are of other code: {modules[0]}{more} changed "
-        "since; --accept-code goes on with it"
+        f"{store.directory}: {modules[0]}{more} changed since its trials were run; continue with "
+        "--accept-code"
     )

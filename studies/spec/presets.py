@@ -1,7 +1,8 @@
 """Named starting points of a spec: a scenario, a topology and a learner, see ``presets.toml``.
 
-A preset states where it departs from the defaults of the settings models; a spec's own tables are
-laid over it. `frozen`, `random` and `planner` are the controls of a learning curve.
+A preset lists the settings that differ from the defaults of the settings models. The tables of a
+spec override those of its preset. `frozen`, `random` and `planner` are the controls of a learning
+curve.
 """
 
 from __future__ import annotations

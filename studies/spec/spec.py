@@ -4,8 +4,7 @@ The tables ``[scenario]``, ``[topology]`` and ``[learner]`` override those of th
 are the combinations of ``[[overrides]]``, which are further tables by name, and ``[sweep]``, which
 has lists of values by dotted key. ``[[curriculum]]`` has stages of training before that of the
 conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams, and
-``[tune]`` the values that `nested_agents.studies.api.tuning` tries. Python objects are converted to
-the tables that a TOML file would hold.
+``[tune]`` the values that `nested_agents.studies.api.tuning` tries.
 """
 
 from __future__ import annotations
@@ -17,118 +16,26 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
 from ...core.agents.joint import Granularity
-from ...core.decision.exploration import EXPLORATIONS
-from ...core.evaluators import EVALUATORS
-from ...core.hierarchy.hierarchy import Hierarchy
-from ...core.learners import LEARNERS
-from ...core.numerics import nx
 from ...core.plugins.problems import explain
-from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, mentions
 from ...core.plugins.trust import modules_in
 from ...core.plugins.words import closest, expect
-from ...scenarios import SCENARIOS
-from ...topologies import TOPOLOGIES
 from ...topologies.builders import join_names
 from ..errors import SpecError, refused
 from ..store.database import DATABASE, SPEC_FILE
 from .conditions import Condition, Curriculum, Length, Name, Override
 from .controls import LEARN_NOTHING, planning_remark
 from .layers import below, expand, grid, section, tuning_keys
+from .objects import plain
 from .presets import PRESETS
 from .studies import STUDIES
 from .tables import SWEEP, SpecTable, TomlTable, assignment, overlay, spec_text
-
-REGISTRIES: dict[str, Registry] = {
-    "study": STUDIES,
-    "scenario": SCENARIOS,
-    "topology": TOPOLOGIES,
-    "learner": LEARNERS,
-    "exploration": EXPLORATIONS,
-    "evaluator": EVALUATORS,
-}
-"""Registry of the things that a key names."""
-
-
-def plain(value: Any, key: str = "") -> Any:
-    """Return a table with names instead of classes and functions, and tables instead of settings.
-
-    Parameters
-    ----------
-    value
-        A spec's table, or a part of it.
-    key
-        Last part of its dotted key.
-
-    Raises
-    ------
-    SpecError
-        If an object is not defined in a file, so that workers cannot import it.
-    """
-    if isinstance(value, Mapping):
-        table = {k: plain(v, key if k == "kind" else str(k)) for k, v in value.items()}
-        kind = table.get("kind")
-        return table | kind if isinstance(kind, dict) else table
-    if isinstance(value, list | tuple):
-        return type(value)(plain(v, key) for v in value)
-    registry = REGISTRIES.get(key.rpartition(".")[2])
-    if isinstance(value, Hierarchy | nx.Graph):
-        return _edges(value)
-    settings = getattr(value, "settings", value)  # of something that was built
-    if isinstance(settings, Settings):
-        return _of_settings(settings, registry)
-    if isinstance(value, type) or callable(value) or hasattr(value, "function"):
-        name = _name(value, registry or Registry("state variable", {}))
-        return {"kind": name} if key in ("scenario", "learner", "topology") else name
-    return value
-
-
-def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
-    """Return the table of a topology with these agents and edges, or neighbors."""
-    relations = {}
-    if isinstance(graph, Hierarchy):
-        if graph.edges and graph.neighbors:
-            raise SpecError(
-                "topology: a hierarchy with both edges and neighbors cannot be written in a spec"
-            )
-        agents: list[str] = list(graph.agents)
-        pairs = [(agents[a], agents[b]) for a, b in graph.edges or graph.neighbors]
-        has_neighbors = bool(graph.neighbors)
-        relations = {"communication": graph.communication, "lookahead": graph.lookahead}
-    else:
-        agents = list(map(str, graph))
-        pairs = [(str(a), str(b)) for a, b in graph.edges]
-        has_neighbors = bool(pairs) and not graph.is_directed()
-    if has_neighbors:
-        return {"kind": "coordination-graph", "edges": tuple(pairs), **relations}
-    joined = {name for pair in pairs for name in pair}
-    alone = tuple(name for name in agents if name not in joined)
-    return {"kind": "edges", "edges": tuple(pairs), "alone": alone, **relations}
-
-
-def _of_settings(settings: Settings, registry: Registry | None) -> TomlTable:
-    """Return the table of settings without values that are None."""
-    table = settings.model_dump(exclude_none=True)
-    if registry is not None and not table.get("kind"):
-        owner = type(settings)
-        outer = owner.__qualname__.rpartition(".")[0]
-        # A class's nested Settings stand for the class.
-        thing = resolve_name(f"{owner.__module__}:{outer}") if outer else owner
-        table["kind"] = _name(thing, registry)
-    return table
-
-
-def _name(thing: object, registry: Registry) -> str:
-    with refused(f"{registry.kind}: "):
-        return registry.reference_to(thing)
-
 
 MOST_TRIALS = 100_000
 """Maximum number of trials of a study."""
@@ -284,7 +191,7 @@ class Spec(Settings):
             spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations, spec.curriculum
         )
         if spec.decisions is not None and [c.label for c in spec._conditions] == ["default"]:
-            (only,) = spec._conditions  # its learner says more, and no kept study has this yet
+            (only,) = spec._conditions
             spec._conditions = (only._replace(label=only.settings.learner.kind),)
         tables = [table for condition in spec._conditions for table in condition.tables]
         names = dict(mentions([{"study": spec.study}, *tables]))
@@ -435,7 +342,7 @@ class Spec(Settings):
         table["overrides"] = [_filled(override) for override in table.get("overrides", ())]
         if self.seeds == tuple(range(len(self.seeds))):
             table["seeds"] = len(self.seeds)
-        if not self.keep_teams:  # studies of before there was a choice say no more
+        if not self.keep_teams:
             del table["keep_teams"]
         return {key: value for key, value in table.items() if value not in ([], ())}
 

@@ -339,8 +339,8 @@ def show(
         if views is None:
             views = [view(topology, **team)]
         elif team["agents"] or team["robots"] or team["per"] != "actuator":
-            whose = "is the spec of a study" if scenario is None else f"over {scenario}"
-            raise SpecError(f"{topology}: {whose}, which has its own agents")
+            source = "the study" if scenario is None else f"the scenario {scenario}"
+            raise SpecError(f"{topology}: {source} defines the agents; omit the options for agents")
         for number, hierarchy in enumerate(views, 1):
             if plot is not None:
                 several = f"-{number}" if len(views) > 1 else ""

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.scenarios.line_up import LineUp
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec.objects import plain
 from nested_agents.studies.spec.presets import PRESETS
-from nested_agents.studies.spec.spec import Spec, plain
+from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.tables import dumps
 from nested_agents.topologies import build
 
