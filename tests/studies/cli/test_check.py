@@ -150,7 +150,7 @@ def test_a_scenario_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[st
         assert (out, err.count("\n")) == ("", 1)
         assert complaint in err
     assert main(["check", f"{path}:sound", "--set", "seeds=2"]) == 2
-    assert "not over a Python file" in capsys.readouterr().err
+    assert "--set: changes a spec, and a Python file is none" in capsys.readouterr().err
 
 
 SETTLED = """

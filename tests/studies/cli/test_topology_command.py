@@ -135,7 +135,7 @@ def test_it_is_shown_over_the_agents_of_a_scenario(said) -> None:
     assert out.startswith("tree:2: 3 agents, depth 2, 135 joint actions a step\n")  # 5^3 + 2 x 5
     status, _, errors = said("show", "chain", "--scenario", "spread", "--agents", "3")
     assert (status, errors.count("\n")) == (2, 1)
-    assert "chain: over spread, which has its own agents" in errors
+    assert "chain: the scenario spread defines the agents" in errors
 
 
 def test_a_plot_is_written(said, tmp_path: Path) -> None:
