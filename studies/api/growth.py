@@ -14,7 +14,6 @@ from ...core.plugins.words import expect, expect_each
 from ..cost.profile import search_method
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import scaling_law as laws_of_results
-from ..results.joining import join_sizes
 from ..results.results import Results
 from ..spec.tables import label_but
 from ..trials.arrangement import arrange
@@ -91,9 +90,7 @@ def scaling_law(
     """
     expect("what load or run returned", StudyResults, study=study)
     expect_each("whole numbers", Integral, predict=predict)
-    results = study.results
-    if study._tables:
-        results = join_sizes(results, study._tables, study._settings, size)
+    results = study.results_by_size(size)
     name = results.main.name if measure is None else measure
     law = laws_of_results.scaling_law(
         results, name, phase=phase, size=size, criterion=criterion, predict=predict

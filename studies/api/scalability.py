@@ -29,12 +29,12 @@ ASSUMED = (
 
 
 class ScalabilityTable(SummaryTable):
-    """A table with Student's intervals."""
+    """A table with ratios to the smallest size."""
 
     @property
     def remark(self) -> str:
         """Description of the intervals."""
-        return "Intervals: Student's over seeds; of ratios to the smallest size, Fieller's."
+        return "Intervals: of speed-up, efficiency and fraction Fieller's, else as in the table."
 
 
 @dataclass(frozen=True)

@@ -274,6 +274,12 @@ class StudyResults:
                 settings[condition] = ConditionSettings.model_validate(table)
         return settings
 
+    def results_by_size(self, size: str | None) -> Results:
+        """Return the results with several studies joined along a swept key, see `join_sizes`."""
+        if not self._tables:
+            return self.results
+        return join_sizes(self.results, self._tables, self._settings, size)
+
     def scalability(
         self,
         measure: str | None = None,
@@ -309,9 +315,7 @@ class StudyResults:
         """
         from .scalability import analyze
 
-        results = self.results
-        if self._tables:
-            results = join_sizes(results, self._tables, self._settings, size)
+        results = self.results_by_size(size)
         settings = self.condition_settings()
         return analyze(results, settings, measure, size, scaling, criterion, budget)
 

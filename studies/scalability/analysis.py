@@ -1,4 +1,4 @@
-"""The answer to "which hierarchy, how many agents, at which cost" for the results of a study."""
+"""Analysis of scalability: which hierarchy, how many agents, at which cost."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from ..results.analysis import Summary
 from ..results.notation import format_estimate, format_number
-from ..results.statistics import NOT_NEGATIVE, Estimate
-from .data import ScalabilityData, paired
+from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
+from .data import COSTS, Place, ScalabilityData, paired
 from .fronts import (
     BudgetChoice,
     FrontPoint,
@@ -21,19 +21,11 @@ from .fronts import (
     parse_budget,
     probability_of_best,
 )
-from .inference import bounded_mean, sign_change
+from .inference import sign_change
 from .laws import MIN_SIZES, Speedup, UniversalLaw, fit_universal_law, speedups
 
-HEADINGS = {
-    "decision_ms": "decision time [ms]",
-    "messages": "messages",
-    "joint_actions": "joint actions",
-    "compute_s": "computing time [s]",
-    "decisions": "decisions to criterion",
-}
-"""Headings of costs in the table."""
 LIKELY = 0.5
-"""Probability above which a hierarchy is called a member of the front."""
+"""Probability above which a sentence names a best size or a member of a front."""
 
 
 class Crossover(NamedTuple):
@@ -83,13 +75,12 @@ class Scalability:
     def best_sizes(self) -> Mapping[str, BestSize]:
         """Best measured size by hierarchy."""
         best = {}
-        sign = -1.0 if self.data.performance.better == "lower" else 1.0
         for name in self.data.hierarchies:
             sizes = self.data.sizes(name)
             values = paired([self.data.performances[name, n] for n in sizes])
             if len(values) > 1:
-                shares = probability_of_best(list(sign * values.T))
-                k = int((sign * values.mean(axis=0)).argmax())
+                shares = probability_of_best(list(self.data.sign * values.T))
+                k = int((self.data.sign * values.mean(axis=0)).argmax())
                 best[name] = BestSize(sizes[k], float(shares[k]))
         return best
 
@@ -97,14 +88,13 @@ class Scalability:
     def crossovers(self) -> tuple[Crossover, ...]:
         """Sizes from which on one hierarchy beats another, of all pairs."""
         changes = []
-        sign = -1.0 if self.data.performance.better == "lower" else 1.0
         for better, worse in permutations(self.data.hierarchies, 2):
             sizes = [n for n in self.data.sizes(better) if n in self.data.sizes(worse)]
             columns = [self.data.performances[name, n] for name in (better, worse) for n in sizes]
             values = paired(columns)
             if len(sizes) < 2 or len(values) < 2:
                 continue
-            differences = sign * (values[:, : len(sizes)] - values[:, len(sizes) :])
+            differences = self.data.sign * (values[:, : len(sizes)] - values[:, len(sizes) :])
             size = sign_change(sizes, differences)
             if size is not None:
                 changes.append(Crossover(better, worse, size))
@@ -121,27 +111,35 @@ class Scalability:
         return tuple(best_within(self.data, parse_budget(self.budget))) if self.budget else ()
 
     @cached_property
+    def cost_estimates(self) -> Mapping[str, Mapping[Place, Estimate]]:
+        """Mean of every cost with its interval by hierarchy and size."""
+        return {
+            cost: {
+                place: bootstrap(values.dropna(), bounds=NOT_NEGATIVE)
+                for place, values in cells.items()
+            }
+            for cost, cells in self.data.costs.items()
+        }
+
+    @cached_property
     def summaries(self) -> tuple[Summary, ...]:
         """A line of the table for every hierarchy at every size."""
         lines = []
         for name in self.data.hierarchies:
             for size in self.data.sizes(name):
-                values = self.data.performances[name, size]
-                estimates = {
-                    self.data.performance_title: bounded_mean(values, self.data.performance.bounds)
-                }
+                place = name, size
+                estimates = {self.data.performance_title: self.data.performance_estimates[place]}
                 own = self.speedups.get(name, {}).get(size)
                 if own is not None:
                     estimates["speed-up"] = own.speedup
                     estimates["efficiency"] = own.efficiency
                     if own.serial_fraction is not None:
                         estimates["serial fraction"] = own.serial_fraction
-                for cost, cells in self.data.costs.items():
-                    if (name, size) in cells:
-                        heading = HEADINGS.get(cost, cost)
-                        estimates[heading] = bounded_mean(cells[name, size], NOT_NEGATIVE)
-                label = f"{name}, {size:g} {self.data.size}"
-                lines.append(Summary(label, len(values), estimates))
+                for cost, known in self.cost_estimates.items():
+                    if place in known:
+                        estimates[COSTS[cost].heading] = known[place]
+                seeds = len(self.data.performances[place])
+                lines.append(Summary(f"{name}, {size:g} {self.data.size}", seeds, estimates))
         return tuple(lines)
 
     @property
@@ -197,6 +195,7 @@ class Scalability:
         likely = [
             f"{best.size:g} for {name} (probability {format_number(best.probability)})"
             for name, best in self.best_sizes.items()
+            if best.probability > LIKELY
         ]
         if likely:
             yield f"Performance is best with this number of {size}: {_join(likely)}."
@@ -220,7 +219,7 @@ class Scalability:
                 for p in self.fronts
                 if p.cost == cost and p.size == largest and p.probability > LIKELY
             ]
-            heading = HEADINGS.get(cost, cost).partition(" [")[0]
+            heading = COSTS[cost].heading.partition(" [")[0]
             fronts.setdefault(_join(members), []).append(heading)
         for members_text, costs in fronts.items():
             if members_text:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -11,26 +12,39 @@ from ...core.interface.measures import Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
+from ..results.analysis import estimate_of, estimate_over_seeds
 from ..results.comparison import title_of, values_of
 from ..results.results import Results
 from ..results.scaling_law import columns_of, decisions_to_criterion, size_key
-from ..results.statistics import Array
+from ..results.statistics import Array, Estimate
 from ..spec.tables import label_but
 from .laws import Scaling, Times
 
-COSTS = {
-    "decision_ms": "decision_median",
-    "messages": "messages",
-    "joint_actions": "joint_actions",
-    "compute_s": "total",
-}
-"""Names of costs, and the number of a trial that each is: time of a decision [ms], messages and
-joint actions tried per decision, computing time of a trial [s]."""
+
+class Cost(NamedTuple):
+    """A cost of a hierarchy."""
+
+    number: str
+    """Name of the number of a trial; empty for decisions to a criterion."""
+    heading: str
+    """Heading in tables and figures."""
+
+
 DECISIONS = "decisions"
-"""Cost: decisions of training until the criterion is reached."""
+"""Name of the cost of training: decisions until the criterion is reached."""
+COSTS = {
+    "decision_ms": Cost("decision_median", "decision time [ms]"),
+    "messages": Cost("messages", "messages"),
+    "joint_actions": Cost("joint_actions", "joint actions"),
+    "compute_s": Cost("total", "computing time [s]"),
+    DECISIONS: Cost("", "decisions to criterion"),
+}
+"""Costs by name; messages and joint actions tried are those of one decision."""
 TIME = "steps"
 """Measure of the time of a task: decisions of an episode."""
-Cells = Mapping[tuple[str, float], pd.Series]
+Place: TypeAlias = tuple[str, float]
+"""A hierarchy and a size."""
+Cells: TypeAlias = Mapping[Place, pd.Series]
 """Values by seed, by hierarchy and size."""
 
 
@@ -45,10 +59,18 @@ class ScalabilityData:
     performance: Measure
     performance_title: str
     performances: Cells
+    performance_estimates: Mapping[Place, Estimate]
+    """Means with the intervals of the study's table."""
     times: Cells
-    """Decisions of an episode; failed episodes count with the longest that is allowed."""
+    """Decisions of an episode; failed episodes count with the longest that is allowed. Missing
+    where all episodes failed."""
     costs: Mapping[str, Cells]
     """By the name of the cost, see `COSTS`."""
+
+    @property
+    def sign(self) -> float:
+        """Factor that makes higher values of the performance better."""
+        return -1.0 if self.performance.better == "lower" else 1.0
 
     @property
     def hierarchies(self) -> tuple[str, ...]:
@@ -123,7 +145,11 @@ def collect(
     performances = _cells(values, places)
     if len({n for _, n in performances}) < 2:
         raise SpecError(f"size = {key!r}: one size; scalability needs two or more")
-    costs = {name: _measured(results, number, None, places) for name, number in COSTS.items()}
+    costs = {
+        name: _measured(results, cost.number, None, places)
+        for name, cost in COSTS.items()
+        if cost.number
+    }
     if criterion is not None:
         reached = decisions_to_criterion(results, measure, criterion)
         counts = {c: own for c, (own, censored) in reached.items() if not censored.any()}
@@ -134,14 +160,20 @@ def collect(
         performance=shown_as,
         performance_title=title_of(shown_as, phase),
         performances=performances,
-        times=_measured(results, TIME, phase or None, places),
+        performance_estimates={
+            places[condition]: estimate_of(results, condition, phase, shown_as)
+            if phase
+            else estimate_over_seeds(pd.Series(own).to_numpy(float), shown_as)
+            for condition, own in values.items()
+        },
+        times=_times(results, phase or None, places),
         costs={name: cells for name, cells in costs.items() if cells},
     )
 
 
-def _cells(values: Mapping[str, object], places: Mapping[str, tuple[str, float]]) -> Cells:
+def _cells(values: Mapping[str, object], places: Mapping[str, Place]) -> Cells:
     """Return values by hierarchy and size; refuse two conditions in one place."""
-    cells: dict[tuple[str, float], pd.Series] = {}
+    cells: dict[Place, pd.Series] = {}
     for condition, own in values.items():
         if places[condition] in cells:
             name, n = places[condition]
@@ -152,15 +184,23 @@ def _cells(values: Mapping[str, object], places: Mapping[str, tuple[str, float]]
     return cells
 
 
-def _measured(
-    results: Results, name: str, phase: str | None, places: Mapping[str, tuple[str, float]]
-) -> Cells:
+def _measured(results: Results, name: str, phase: str | None, places: Mapping[str, Place]) -> Cells:
     """Return a measure or number by hierarchy and size; nothing if it was not measured."""
     try:
         values = values_of(results, name, phase)[1]
     except SpecError:
         return {}
     return _cells(values, places)
+
+
+def _times(results: Results, phase: str | None, places: Mapping[str, Place]) -> Cells:
+    """Return the times of the task, except where every episode reached the longest allowed."""
+    try:
+        steps, values, _ = values_of(results, TIME, phase)
+    except SpecError:
+        return {}
+    limit = steps.bounds[1]
+    return {place: own for place, own in _cells(values, places).items() if own.min() < limit}
 
 
 def cost_of(data: ScalabilityData, name: str) -> Cells:
@@ -172,5 +212,5 @@ def cost_of(data: ScalabilityData, name: str) -> Cells:
         If it was not measured; one line.
     """
     if name not in data.costs:
-        raise SpecError(f"cost = {name!r}: {closest(name, data.costs)}; not measured otherwise")
+        raise SpecError(f"cost = {name!r}: was not measured; {closest(name, data.costs)}")
     return data.costs[name]

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..presentation import figures
-from ..results.statistics import NOT_NEGATIVE, Estimate
-from .analysis import HEADINGS, Scalability
-from .data import Cells
-from .inference import bounded_mean
+from ..results.statistics import Estimate
+from .analysis import Scalability
+from .data import COSTS, Place
+
+LAW_POINTS = 60
+"""Points of the line of a law."""
 
 
 def draw(analysis: Scalability) -> Figure:
     """Return the figure of four panels; bars are 95% intervals over seeds.
 
+    Thin lines of the efficiency show the universal scalability law where it describes the times.
     The cost is the first that was measured. In the last panel a filled point is on the Pareto front
     of the largest size.
     """
@@ -22,15 +28,15 @@ def draw(analysis: Scalability) -> Figure:
     with figures.apply_style():
         figure, panels = figures.panels(2, 2, (7.2, 5.6))
         performance, efficiency, cost, front = panels.flat
-        _draw_cells(performance, analysis, data.performances, data.performance.bounds)
+        _draw_cells(performance, analysis, data.performance_estimates)
         performance.set_ylabel(data.performance_title)
         if data.performance.is_rate:
             figures.as_rates(performance)
         _draw_efficiency(efficiency, analysis)
         if data.costs:
             name = next(iter(data.costs))
-            _draw_cells(cost, analysis, data.costs[name], NOT_NEGATIVE)
-            cost.set_ylabel(HEADINGS.get(name, name))
+            _draw_cells(cost, analysis, analysis.cost_estimates[name])
+            cost.set_ylabel(COSTS[name].heading)
             figures.log_axis(cost)
             _draw_front(front, analysis, name)
         for axes in (performance, efficiency, cost):
@@ -42,23 +48,33 @@ def draw(analysis: Scalability) -> Figure:
     return figure
 
 
-def _draw_cells(
-    axes: Axes, analysis: Scalability, cells: Cells, bounds: tuple[float, float]
-) -> None:
+def _draw_cells(axes: Axes, analysis: Scalability, estimates: Mapping[Place, Estimate]) -> None:
     data = analysis.data
     for index, name in enumerate(data.hierarchies):
-        sizes = [n for n in data.sizes(name) if (name, n) in cells]
-        estimates = [bounded_mean(cells[name, n], bounds) for n in sizes]
-        _draw_line(axes, analysis, index, sizes, estimates)
+        sizes = [n for n in data.sizes(name) if (name, n) in estimates]
+        _draw_line(axes, analysis, index, sizes, [estimates[name, n] for n in sizes])
 
 
 def _draw_efficiency(axes: Axes, analysis: Scalability) -> None:
     for index, name in enumerate(analysis.data.hierarchies):
         own = analysis.speedups.get(name, {})
         _draw_line(axes, analysis, index, list(own), [s.efficiency for s in own.values()])
+        _draw_law(axes, analysis, index, name)
     axes.axhline(1.0, color="#888888", linewidth=0.8, ls=":")
     axes.set_ylabel(f"efficiency ({analysis.data.scaling} scaling)")
     axes.set_ylim(bottom=0.0)
+
+
+def _draw_law(axes: Axes, analysis: Scalability, index: int, name: str) -> None:
+    """Draw the efficiency by the universal scalability law, if it describes the times."""
+    law, times = analysis.laws.get(name), analysis.data.times_of(name)
+    if law is None or times is None or not law.is_plausible:
+        return
+    factors = np.geomspace(1.0, times.factors[-1], LAW_POINTS)
+    measured = float(times.values[:, 0].mean())
+    efficiency = law.throughput(factors) / factors * measured / law.time_at_smallest
+    color = figures.look(index)["color"]
+    axes.plot(times.sizes[0] * factors, efficiency, color=color, lw=0.8, alpha=0.6)
 
 
 def _draw_line(
@@ -77,14 +93,19 @@ def _draw_front(axes: Axes, analysis: Scalability, cost: str) -> None:
     """Draw performance against cost at the largest size."""
     data = analysis.data
     largest = data.all_sizes[-1]
-    for point in analysis.fronts:
-        if point.cost == cost and point.size == largest:
-            color = figures.look(data.hierarchies.index(point.hierarchy))["color"]
-            face = color if point.on_front else "white"
-            axes.plot(
-                point.cost_value, point.performance, "o", color=color, markerfacecolor=face, ms=7
-            )
-    axes.set_xlabel(f"{HEADINGS.get(cost, cost)}, {largest:g} {data.size}")
+    beaten = {
+        point.hierarchy
+        for point in analysis.fronts
+        if (point.cost, point.size) == (cost, largest) and not point.on_front
+    }
+    for name in data.at_size(largest):
+        if (name, largest) in analysis.cost_estimates[cost]:
+            color = figures.look(data.hierarchies.index(name))["color"]
+            x = analysis.cost_estimates[cost][name, largest].value
+            y = data.performance_estimates[name, largest].value
+            face = "white" if name in beaten else color
+            axes.plot(x, y, "o", color=color, markerfacecolor=face, ms=7)
+    axes.set_xlabel(f"{COSTS[cost].heading}, {largest:g} {data.size}")
     axes.set_ylabel(data.performance_title)
     figures.log_axis(axes, "x")
     if data.performance.is_rate:

@@ -15,7 +15,7 @@ import numpy as np
 from ...core.numerics import BoolArray, IntArray
 from ..errors import SpecError
 from ..results.statistics import Array
-from .data import ScalabilityData, cost_of, paired
+from .data import Cells, ScalabilityData, cost_of, paired
 
 RESAMPLES = 2000
 """Bootstrap resamples of seeds; probabilities are then known to 0.02."""
@@ -70,18 +70,16 @@ def non_dominated(performance: Array, cost: Array) -> BoolArray:
 def fronts(data: ScalabilityData) -> list[FrontPoint]:
     """Return all hierarchies at every size with every cost, those on the front marked."""
     points = []
-    sign = -1.0 if data.performance.better == "lower" else 1.0
     for name, cells in data.costs.items():
         for size in data.all_sizes:
             hierarchies = [h for h in data.at_size(size) if (h, size) in cells]
-            values = paired([data.performances[h, size] for h in hierarchies])
-            costs = paired([cells[h, size] for h in hierarchies])
-            if len(hierarchies) < 2 or not len(values) or len(costs) != len(values):
+            values, costs = paired_groups([data.performances, cells], hierarchies, size)
+            if len(hierarchies) < 2 or not len(values):
                 continue
             drawn = _resample(len(values))
-            on_front = non_dominated(sign * values.mean(axis=0), costs.mean(axis=0))
+            on_front = non_dominated(data.sign * values.mean(axis=0), costs.mean(axis=0))
             resampled = non_dominated(
-                sign * values[drawn].mean(axis=1), costs[drawn].mean(axis=1)
+                data.sign * values[drawn].mean(axis=1), costs[drawn].mean(axis=1)
             ).mean(axis=0)
             for k, hierarchy in enumerate(hierarchies):
                 points.append(
@@ -96,6 +94,12 @@ def fronts(data: ScalabilityData) -> list[FrontPoint]:
                     )
                 )
     return points
+
+
+def paired_groups(groups: Sequence[Cells], hierarchies: Sequence[str], size: float) -> list[Array]:
+    """Return ``(n_seeds, n_hierarchies)`` values of each group, of the seeds that all share."""
+    columns = [cells[name, size] for cells in groups for name in hierarchies]
+    return np.split(paired(columns), len(groups), axis=1) if columns else [np.empty((0, 0))] * 2
 
 
 def parse_budget(text: str) -> dict[str, float]:
@@ -134,30 +138,29 @@ def best_within(data: ScalabilityData, limits: Mapping[str, float]) -> list[Budg
     cells = {name: cost_of(data, name) for name in limits}
     choices = [_choose(data, size, limits) for size in data.all_sizes]
     if all(choice.hierarchy is None for choice in choices):
-        least = ", ".join(
+        lowest = ", ".join(
             f"{name} >= {min(float(own.mean()) for own in cells[name].values()):g}"
             for name in limits
         )
-        raise SpecError(f"budget: no hierarchy of any size is within it; least measured: {least}")
+        raise SpecError(f"budget: no hierarchy of any size is within it; least measured: {lowest}")
     return choices
 
 
 def _choose(data: ScalabilityData, size: float, limits: Mapping[str, float]) -> BudgetChoice:
     hierarchies = data.at_size(size)
-    values = paired([data.performances[name, size] for name in hierarchies])
-    costs = {
-        cost: paired([data.costs[cost][name, size] for name in hierarchies])
-        for cost in limits
-        if all((name, size) in data.costs[cost] for name in hierarchies)
-    }
-    if len(costs) < len(limits) or not len(values):
+    measured = [data.costs[cost] for cost in limits]
+    if not all((name, size) in cells for cells in measured for name in hierarchies):
         return BudgetChoice(size, None, 0.0, ())
-    sign = -1.0 if data.performance.better == "lower" else 1.0
+    values, *each = paired_groups([data.performances, *measured], hierarchies, size)
+    if not len(values):
+        return BudgetChoice(size, None, 0.0, ())
+    values = data.sign * values
+    costs = dict(zip(limits, each, strict=True))
     everyone = np.arange(len(values))[None]
-    best, allowed = _best(sign * values, costs, limits, everyone)
+    best, allowed = _best(values, costs, limits, everyone)
     if best[0] < 0:
         return BudgetChoice(size, None, 0.0, ())
-    resampled, _ = _best(sign * values, costs, limits, _resample(len(values)))
+    resampled, _ = _best(values, costs, limits, _resample(len(values)))
     names = tuple(name for name, ok in zip(hierarchies, allowed[0], strict=True) if ok)
     share = float((resampled == best[0]).mean())
     return BudgetChoice(size, hierarchies[int(best[0])], share, names)

@@ -12,11 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.numerics import pd, special
+from ...core.numerics import special
 from ..results.statistics import Array, Estimate
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
+GRID_POINTS = 2001
+"""Points at which an interpolated difference is tested."""
 
 
 class Quadratic(NamedTuple):
@@ -49,12 +51,6 @@ def mean_interval(values: Array, level: float = LEVEL) -> Estimate:
         return _estimate(value, math.nan, math.nan)
     half = student_quantile(n_seeds, level) * float(np.std(values, ddof=1)) / math.sqrt(n_seeds)
     return _estimate(value, value - half, value + half)
-
-
-def bounded_mean(values: pd.Series, bounds: tuple[float, float]) -> Estimate:
-    """Return the mean of known values by seed with its interval, within the bounds of a measure."""
-    estimate = mean_interval(values.dropna().to_numpy(dtype=float))
-    return Estimate(*(np.clip(end, *bounds) for end in estimate))
 
 
 def ratio_interval(numerator: Array, denominator: Array, level: float = LEVEL) -> Estimate:
@@ -105,8 +101,8 @@ def _positive_solutions(accepted: Quadratic) -> tuple[float, float]:
         return max(0.0, (linear - root) / square), max(0.0, (linear + root) / square)
     if constant <= 0.0 or discriminant < 0.0:
         return 0.0, math.inf
-    roots = [constant / (linear + sign * math.sqrt(discriminant)) for sign in (1.0, -1.0)]
-    return min((r for r in roots if r > 0.0), default=0.0), math.inf
+    divisors = [linear + sign * math.sqrt(discriminant) for sign in (1.0, -1.0)]
+    return min((constant / d for d in divisors if d > 0.0), default=math.inf), math.inf
 
 
 def sign_change(
@@ -151,10 +147,6 @@ def sign_change(
     low = grid[decided_below[-1] + 1] if len(decided_below) else grid[0]
     high = grid[place + decided_above[0] - 1]
     return _estimate(*np.exp([crossing, low, high]).tolist())
-
-
-GRID_POINTS = 2001
-"""Points at which an interpolated difference is tested."""
 
 
 def _estimate(value: float, low: float, high: float) -> Estimate:

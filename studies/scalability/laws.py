@@ -23,6 +23,8 @@ from .inference import ratio_interval
 Scaling = Literal["strong", "weak"]
 MIN_SIZES = 3
 """Fewest sizes to which the universal scalability law is fitted."""
+ROUNDING = 1e-9
+"""Coherency that counts as rounding."""
 
 
 class Times(NamedTuple):
@@ -137,6 +139,7 @@ def fit_universal_law(times: Times) -> UniversalLaw:
     constant, linear, quadratic = solution @ work.T
     limits = {"contention": linear, "coherency": quadratic}
     ratios = {name: _signed_ratio(own, constant) for name, own in limits.items()}
+    quadratic = np.where(np.abs(quadratic) < ROUNDING * constant, 0.0, quadratic)
     squared = ratio_interval(constant - linear, quadratic)
     best = Estimate(*(times.sizes[0] * np.sqrt(end) for end in squared))
     return UniversalLaw(best_size=best, time_at_smallest=float(constant.mean()), **ratios)

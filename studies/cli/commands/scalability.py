@@ -1,7 +1,6 @@
 """The command that answers which hierarchy scales, how far, and at which cost."""
 
 from pathlib import Path
-from typing import cast
 
 import click
 
@@ -41,7 +40,7 @@ from ..loading import read_results, say_remarks
 @options.columns
 @options.plot
 @options.where
-@options.formats("table", "json", "markdown", "latex", "csv", text="How to print it.")
+@options.form
 @options.trust
 def scalability(
     sources: tuple[Path, ...],
@@ -49,7 +48,7 @@ def scalability(
     columns: tuple[str, ...],
     plot: Path | None,
     where: str | None,
-    form: str,
+    form: Form,
     trust: bool,
     **choices: str | float | None,
 ) -> int:
@@ -71,7 +70,7 @@ def scalability(
     if form == "json":
         print_data(report.json)
     elif form != "table":
-        print_data(in_form(report.table, cast(Form, form)))
+        print_data(in_form(report.table, form))
     else:
         print_table(report.table, report.table.legend)
         if report.analysis.laws:

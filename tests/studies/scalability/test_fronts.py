@@ -35,6 +35,7 @@ def data():
         performance=SUCCESS,
         performance_title="evaluation success",
         performances=cells,
+        performance_estimates={},
         times=cells,
         costs={"messages": {place: constant(value) for place, value in messages.items()}},
     )
@@ -68,6 +69,16 @@ def test_the_best_hierarchy_within_a_budget(data):
 def test_no_hierarchy_of_a_size_may_be_within_the_budget(data):
     del data.performances["none", 4.0]
     assert [choice.hierarchy for choice in best_within(data, {"messages": 5.0})] == ["tree", None]
+
+
+def test_seeds_are_paired_by_name_between_performance_and_cost(data):
+    performance = pd.Series([1.0, *[0.0] * 7], range(8))
+    cost = pd.Series([*[9.0] * 7, 1.0], range(1, 9))  # without seed 0, which alone succeeds
+    for name in ("chain", "tree", "none"):
+        data.performances[name, 4.0] = performance
+        data.costs["messages"][name, 4.0] = cost
+    assert {p.performance for p in fronts(data) if p.size == 4.0} == {0.0}
+    assert {p.cost_value for p in fronts(data) if p.size == 4.0} == {9.0}
 
 
 def test_a_budget_below_everything_says_what_was_measured(data):

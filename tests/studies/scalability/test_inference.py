@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from nested_agents.core.numerics import pd
 from nested_agents.studies.scalability.inference import (
-    bounded_mean,
     mean_interval,
     ratio_interval,
     sign_change,
@@ -23,10 +21,6 @@ def test_one_seed_has_no_interval():
     value, low, high = mean_interval(np.array([2.0]))
     assert value == 2.0
     assert np.isnan([low, high]).all()
-
-
-def test_an_interval_of_a_rate_stays_within_its_range():
-    assert bounded_mean(pd.Series([1.0, 1.0, 0.8, np.nan]), (0.0, 1.0)).high == 1.0
 
 
 def test_a_ratio_to_a_constant_is_that_of_the_mean():

@@ -67,6 +67,12 @@ def test_the_parameters_of_an_exact_law_are_found(scaling):
     assert law.throughput(SIZES) == pytest.approx(times_of(0.0, 0.0)[0] / times_of(0.05, 0.01))
 
 
+def test_constant_times_have_no_best_size_instead_of_one_made_of_rounding():
+    law = fit_universal_law(Times(SIZES, np.full((5, 5), 449.9), "weak"))
+    assert law.coherency.value == pytest.approx(0.0, abs=1e-9)
+    assert law.best_size.value == np.inf
+
+
 def test_two_sizes_have_no_law():
     with pytest.raises(ValueError, match="2 sizes"):
         fit_universal_law(Times(SIZES[:2], np.ones((3, 2)), "strong"))

@@ -44,6 +44,21 @@ def test_speed_up_and_law_of_published_results():
     assert set(analysis.data.costs) == {"decision_ms", "messages", "joint_actions", "compute_s"}
 
 
+def test_the_performance_is_that_of_the_table():
+    study = na.load(RESULTS / "arms.json")  # many seeds without a failure: Wilson's intervals
+    shown = study.table().lines[0]
+    line = study.scalability().analysis.summaries[0]
+    own = line.estimates["evaluation success"]
+    assert tuple(own) == tuple(shown.estimates["evaluation success"])
+    assert own.high == 1.0
+    assert own.low < 1.0
+
+
+def test_controls_that_never_succeed_have_no_speed_up():
+    analysis = na.load(RESULTS / "controls.json").scalability().analysis
+    assert set(analysis.speedups) == {"planner"}
+
+
 def test_arms_have_the_same_task_for_all_sizes():
     assert na.load(RESULTS / "arms.json").scalability().analysis.data.scaling == "strong"
 
