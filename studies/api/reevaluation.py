@@ -5,16 +5,17 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import NamedTuple, Self
 
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..presentation.progress import Terminal
-from ..results.results import DONE, read
+from ..results.results import DONE, Results, read
 from ..spec.objects import plain
 from ..spec.spec import Spec
-from ..spec.tables import TomlTable, label
+from ..spec.tables import SpecTable, TomlTable, label
 from ..store.database import EVALUATION
 from ..store.durable import TEAM
 from ..store.store import Store
@@ -68,32 +69,82 @@ def reevaluate(
     SpecError
         If there are no such teams, or they cannot act so; one line.
     """
-    study = study if isinstance(study, StudyResults) else load(study)
-    done = study.trials[study.trials["state"] == DONE]
-    identities = {(row.condition, row.seed): str(row.identity) for row in done.itertuples()}
-    directory = study.directory.resolve()
-    with Store.open(directory) as store:
-        check_teams(store, {*identities.values()})
-        table = {**store.spec(), "evaluations": _entries(topology, decision), "keep_teams": False}
-        sources = Sources(Path(), store.sources(), brought_by=str(directory))
-    spec = Spec.of(table, sources)
-    if spec.evaluation < 1:
-        raise SpecError("evaluation = 0: reevaluate needs a study of 1 or more")
-    measures = check_conditions(spec, {condition for condition, _ in identities})
-    trials = [t for t in trials_of(spec) if (t.condition, t.seed) in identities]
-    with (
-        TemporaryDirectory() as folder,
-        start_workers("loky", jobs, None, len(trials)) as workers,
-        open_to_run(Path(folder), spec, trials, measures) as store,
-    ):
-        evaluate = partial(_evaluate, directory, identities)
-        outcomes = _succeeding(run_trials(trials, store, evaluate, workers))
-        (observer or Terminal()).follow(outcomes, len(trials), 0)
-        frame = read(store).episodes
+    kept = KeptTeams.of(study, {"evaluations": _entries(topology, decision)})
+    frame = kept.evaluate(kept.trials, jobs, observer).episodes
     frame.insert(0, "entry", frame["phase"].str.removeprefix(EVALUATION))
     meaning = "topology and decision by which the trained team acts"
     frame.attrs["columns"]["entry"] = {"unit": "", "meaning": meaning}
     return frame
+
+
+class KeptTeams(NamedTuple):
+    """Trained teams of the finished trials of a study that keeps its teams."""
+
+    directory: Path
+    identities: Mapping[tuple[str, int], str]
+    """Identities of the trials by condition and seed."""
+    spec: Spec
+    """Spec of the study with its changes."""
+
+    @classmethod
+    def of(cls, study: StudyResults | Place, changes: SpecTable) -> Self:
+        """Return the teams of a study, or of a part of it.
+
+        Parameters
+        ----------
+        study
+            Loaded results, or the directory of a study.
+        changes
+            Changes of the spec, such as its further evaluations.
+
+        Raises
+        ------
+        SpecError
+            If the study keeps no teams, or has no evaluation; one line.
+        """
+        study = study if isinstance(study, StudyResults) else load(study)
+        done = study.trials[study.trials["state"] == DONE]
+        identities = {(row.condition, row.seed): str(row.identity) for row in done.itertuples()}
+        directory = study.directory.resolve()
+        with Store.open(directory) as store:
+            check_teams(store, {*identities.values()})
+            table = {**store.spec(), **changes, "keep_teams": False}
+            sources = Sources(Path(), store.sources(), brought_by=str(directory))
+        spec = Spec.of(table, sources)
+        if spec.evaluation < 1:
+            raise SpecError("evaluation = 0: kept teams are evaluated in a study of 1 or more")
+        return cls(directory, identities, spec)
+
+    @property
+    def conditions(self) -> set[str]:
+        """Labels of the conditions of the teams."""
+        return {condition for condition, _ in self.identities}
+
+    @property
+    def trials(self) -> list[Trial]:
+        """The trials of the teams, with the further evaluations of the spec."""
+        return [t for t in trials_of(self.spec) if (t.condition, t.seed) in self.identities]
+
+    def evaluate(
+        self, trials: Sequence[Trial], jobs: int | None, observer: Observer | None
+    ) -> Results:
+        """Evaluate the teams of trials in the further evaluations of the trials.
+
+        Raises
+        ------
+        SpecError
+            If a team cannot act in an evaluation; one line.
+        """
+        measures = check_conditions(self.spec, self.conditions)
+        with (
+            TemporaryDirectory() as folder,
+            start_workers("loky", jobs, None, len(trials)) as workers,
+            open_to_run(Path(folder), self.spec, trials, measures) as store,
+        ):
+            evaluate = partial(_evaluate, self.directory, self.identities)
+            outcomes = _succeeding(run_trials(trials, store, evaluate, workers))
+            (observer or Terminal()).follow(outcomes, len(trials), 0)
+            return read(store)
 
 
 def _succeeding(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
