@@ -88,11 +88,17 @@ def python_files(package: str) -> Iterator[tuple[str, Path]]:
 @cache
 def _released() -> dict[str, list[str]]:
     """Return the distributions of each installed package or module that came from no folder."""
+    installed = packages_distributions()
     return {
         package: sorted(set(names))
-        for package, names in packages_distributions().items()
-        if not any("dir_info" in (distribution(n).read_text("direct_url.json") or "") for n in names)
+        for package, names in installed.items()
+        if not any(map(_is_from_folder, names))
     }
+
+
+def _is_from_folder(name: str) -> bool:
+    """Tell whether a distribution was installed from a folder, as PEP 610 records it."""
+    return "dir_info" in (distribution(name).read_text("direct_url.json") or "")
 
 
 def _version(name: str) -> str:
