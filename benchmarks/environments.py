@@ -27,7 +27,7 @@ from gymnasium.spaces import (
 )  # fmt: skip
 from pettingzoo import ParallelEnv
 
-from nested_agents.scenarios.adapters.adapted import AdaptedWorld, from_pettingzoo
+from nested_agents.scenarios.adapters.scenario import EnvironmentScenario, from_pettingzoo
 
 LENGTH = 9
 """Steps of an episode; one more than are rehearsed when a scenario is built."""
@@ -288,7 +288,7 @@ def _refused(refusal: ValueError) -> str:
     return "refused in one line" if text.isprintable() else f"refused at length: {text!r}"
 
 
-def _wrong_states(world: AdaptedWorld, environment: Drawn, states: np.ndarray) -> str:
+def _wrong_states(world: EnvironmentScenario, environment: Drawn, states: np.ndarray) -> str:
     """Return how states differ from what players see; nothing if they do not."""
     names = [variable.name for variable in world.state_space.variables]
     # The actuators of a single player are bodies of their own.

@@ -1,7 +1,7 @@
 """Draws the diagrams of the guide, in the one style of all figures of the toolkit.
 
 ``conf.py`` calls `draw` before the pages are read. Each diagram is a function that returns a
-figure. ``python docs/diagrams.py`` draws the one of the README, which is committed.
+figure. ``python -m docs.diagrams`` draws those of the README, which are committed.
 """
 
 from collections.abc import Sequence
@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 
 from nested_agents.core.agents.cost import Problem
-from nested_agents.core.rules.kernels.fuzzy import Partition
+from nested_agents.core.values.partitions import Partition
 from nested_agents.studies.presentation import figures
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
 from nested_agents.studies.results import published
+from nested_agents.studies.results.notation import format_number
 from nested_agents.studies.results.statistics import Estimate, rate
 from research import RESULTS
 
@@ -68,27 +69,57 @@ def arrow(
 
 
 def idea() -> Figure:
-    """Draw who decides after whom: four wheels as a hierarchy, and on the robots of the film."""
-    figure, axes = canvas(4.4, 3.1)
-    places = {1: (1.75, 2.5), 2: (1.05, 1.4), 3: (2.45, 1.4), 4: (2.45, 0.5)}
+    """Draw a hierarchy of four wheels: messages are solid arrows, lookahead dashed arcs."""
+    figure, axes = canvas(5.0, 3.2)
+    places = {1: (1.6, 2.65), 2: (0.8, 1.55), 3: (2.4, 1.55), 4: (2.4, 0.5)}
     for above, below in ((1, 2), (1, 3), (3, 4)):
         start, end = np.array(places[above]), np.array(places[below])
         along = (end - start) / np.linalg.norm(end - start)
-        beside = 0.07 * np.array([-along[1], along[0]])
         start, end = start + 0.27 * along, end - 0.27 * along
-        arrow(axes, start + beside, end + beside, colour="black")
-        arrow(axes, end - beside, start - beside, colour=GREEN)
-    axes.text(1.2, 2.12, "considers\nwhat 2\nmay do", color=GREEN, ha="right", va="center",
-              linespacing=1.1)  # fmt: skip
-    axes.text(2.3, 2.12, "tells 3 what\nit decided", va="center", linespacing=1.1)
+        arrow(axes, start, end, colour="black")
+        bend = 0.45 if (above, below) == (1, 2) else -0.45
+        style = {"arrowstyle": "-|>", "color": GREEN, "lw": 1.4, "ls": (0, (4, 2))}
+        style |= {"connectionstyle": f"arc3,rad={bend}", "shrinkA": 2, "shrinkB": 2}
+        axes.annotate("", xy=end, xytext=start, arrowprops=style)
     for name, place in places.items():
         agent(axes, place, name)
-    for robot, (left, right) in zip(((3.75, 1.4), (3.75, 0.5)), ((1, 2), (3, 4)), strict=True):
+    for robot, (left, right) in zip(((4.3, 1.55), (4.3, 0.5)), ((1, 2), (3, 4)), strict=True):
         axes.add_patch(Circle(robot, 0.26, facecolor="white", edgecolor="black", linewidth=1.5))
         axes.plot(*zip(robot, np.add(robot, (0.26, 0)), strict=True), color="black")
         for name, side in ((left, 0.24), (right, -0.24)):
             agent(axes, np.add(robot, (0, side)), name, 0.14)
-    axes.text(3.75, 1.85, "two robots", ha="center", color=GREY)
+    axes.text(4.3, 2.02, "two robots", ha="center", color=GREY)
+    axes.plot([2.65, 3.05], [2.95, 2.95], color="black", lw=1.4)
+    axes.text(3.15, 2.95, "communication:\ndecided actions", va="center", linespacing=1.1)
+    axes.plot([2.65, 3.05], [2.45, 2.45], color=GREEN, lw=1.4, ls=(0, (4, 2)))
+    axes.text(3.15, 2.45, "lookahead: actions\nsearched over", va="center", linespacing=1.1)
+    return figure
+
+
+def communication_lookahead() -> Figure:
+    """Draw the success of the same teams with and without communication and lookahead."""
+    results = published.load(RESULTS / "edges.json").results
+    cases = {
+        "both": "evaluation",
+        "lookahead only": "evaluation:considered only",
+        "communication only": "evaluation:told only",
+        "neither": "evaluation:neither",
+    }
+    figure, panels = figures.panels(1, 3, (7.2, 2.5), sharey=True)
+    for axes, robots in zip(panels[0], (2, 4, 8), strict=True):
+        condition = f"value_of=own, robots={robots}"
+        for row, phase in enumerate(cases.values()):
+            value, low, high = map(float, rate(results.success(condition, phase)))
+            colour = BLUE if row < 2 else ORANGE
+            axes.barh(row, value, 0.62, color=colour, alpha=0.85)
+            axes.plot([low, high], [row, row], color="black", lw=1.2)
+            axes.text(high + 0.03, row, format_number(value), va="center")
+        axes.set(xlim=(0, 1.2), xlabel="success", title=f"{robots} robots, {2 * robots} agents")
+        axes.set_xticks((0.0, 0.5, 1.0))
+        axes.set_yticks(range(len(cases)), list(cases))
+        axes.grid(axis="x", alpha=0.25)
+    panels[0, 0].invert_yaxis()
+    figure.suptitle("Teams need lookahead; communication adds less", x=0.02, ha="left")
     return figure
 
 
@@ -256,6 +287,7 @@ def program() -> Figure:
 
 
 if __name__ == "__main__":
-    with mpl.rc_context(SETTINGS | {"font.size": 12}):
-        readme = idea()
-    write(readme, Path(__file__).with_name("idea.png"))
+    for make in (idea, communication_lookahead):
+        with mpl.rc_context(SETTINGS | {"font.size": 11}):
+            committed = make()
+        write(committed, Path(__file__).with_name(f"{make.__name__}.png"))

@@ -12,8 +12,8 @@ import click
 import nested_agents
 from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
-from nested_agents.scenarios.adapters.adapted import AdaptedWorld
-from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
+from nested_agents.scenarios.adapters.scenario import EnvironmentScenario
+from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
@@ -60,7 +60,7 @@ MODULES = {
         "functions.settings", "functions.agents", "agents.mixed",
         "agents.team", "agents.fuzzy", "agents.peer",
         "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
-        "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
+        "values.partitions", "values.rule_base", "learners.learner", "learners.td",
         "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",
         "evaluators.best_response", "evaluators.coordination", "coordination.graphs",
         "adaptation.predictors", "adaptation.self_model", "adaptation.foresight",
@@ -71,8 +71,9 @@ MODULES = {
     "scenarios": ("Where agents act.", (
         "box_pushing.config", "box_pushing.world.settings",
         "box_pushing.prediction.settings", "box_pushing.scenario",
-        "environments", "box_pushing.environments", "adapters.passing_down", "adapters.adapted",
-        "adapters.settings", "box_pushing.states.relational",
+        "environments", "box_pushing.environments", "adapters.turns", "adapters.scenario",
+        "adapters.settings", "box_pushing.states.variables",
+        "box_pushing.states.situations",
         "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
         "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.starts",
         "box_pushing.world.world",
@@ -88,7 +89,8 @@ MODULES = {
         "errors", "spec.spec", "spec.keys", "spec.presets", "spec.schema", "trials.trial",
         "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.power", "results.contrasts", "results.aggregates", "results.published",
+        "results.power", "results.differences", "results.comparison",
+        "results.permutation_tests", "results.aggregates", "results.published",
         "catalogue.study", "cost.cost", "cost.profile", "cost.table",
     )),
 }  # fmt: skip
@@ -201,7 +203,7 @@ def columns() -> Iterator[str]:
     yield "A scenario declares its own measures ([](../extending.md#a-scenario)). These are those"
     yield "of the built-in scenarios.\n"
     # Built only of an environment, or a task.
-    adapted = {"gymnasium": AdaptedWorld, "pettingzoo": AdaptedWorld}
+    adapted = {"gymnasium": EnvironmentScenario, "pettingzoo": EnvironmentScenario}
     for kind in SCENARIOS.built_in:
         yield f"### `{kind}`\n"
         declared = adapted.get(kind) or SCENARIOS.parsed(kind).build()

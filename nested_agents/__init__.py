@@ -21,7 +21,7 @@ from typing import Any
 
 __version__: str
 
-if not Path(__file__).with_name("core").exists():  # a checkout: the four folders stand beside
+if not Path(__file__).with_name("core").exists():  # a checkout: the four folders are at the top
     __path__.append(str(Path(__file__).parents[1]))
 
 from .core.isolation import ignore_settings_files
@@ -53,8 +53,8 @@ _PLACES = {
     "LineUpSettings": ("scenarios.line_up", "LineUpSettings"),
     "Measure": ("core.interface.measures", "Measure"),
     "Observation": ("core.interface.experience", "Observation"),
-    "Partition": ("core.rules.kernels.fuzzy", "Partition"),
-    "RuleBase": ("core.rules.rule_base", "RuleBase"),
+    "Partition": ("core.values.partitions", "Partition"),
+    "RuleBase": ("core.values.rule_base", "RuleBase"),
     "NO_SUCCESS": ("core.interface.measures", "NO_SUCCESS"),
     "SUCCESS": ("core.interface.measures", "SUCCESS"),
     "Prediction": ("core.interface.prediction", "Prediction"),
@@ -68,6 +68,7 @@ _PLACES = {
     "Spec": ("studies.spec.spec", "Spec"),
     "StackedEnvironments": ("core.interface.stacked", "StackedEnvironments"),
     "StateSpace": ("core.interface.spaces", "StateSpace"),
+    "Situation": ("scenarios.box_pushing.states.situations", "Situation"),
     "SpecError": ("studies.errors", "SpecError"),
     "Study": ("studies.catalogue.study", "Study"),
     "StudyResults": ("studies.api.study", "StudyResults"),
@@ -80,7 +81,6 @@ _PLACES = {
     "Turn": ("core.hierarchy.turns", "Turn"),
     "Transition": ("core.interface.scenario", "Transition"),
     "Variable": ("core.interface.spaces", "Variable"),
-    "View": ("scenarios.box_pushing.states.relational", "View"),
     "bootstrap": ("studies.results.statistics", "bootstrap"),
     "build_hierarchy": ("topologies", "build"),
     "check_scenario": ("scenarios.checking.checker", "check_scenario"),
@@ -89,8 +89,8 @@ _PLACES = {
     "cost_table": ("studies.cost.table", "cost_table"),
     "control_loop": ("core.agents.loop", "control_loop"),
     "detectable": ("studies.results.power", "detectable"),
-    "from_gymnasium": ("scenarios.adapters.adapted", "from_gymnasium"),
-    "from_pettingzoo": ("scenarios.adapters.adapted", "from_pettingzoo"),
+    "from_gymnasium": ("scenarios.adapters.scenario", "from_gymnasium"),
+    "from_pettingzoo": ("scenarios.adapters.scenario", "from_pettingzoo"),
     "greatest": ("core.numerics", "greatest"),
     "keys": ("studies.spec.keys", "keys_below"),
     "load": ("studies.api.loading", "load"),

@@ -16,38 +16,44 @@ from .studies.results import laws, samples
 from .studies.results.analysis import (
     EVALUATED,
     Analysis,
-    BySeed,
     Case,
-    Difference,
     Figures,
     Summary,
-    adjust,
-    difference,
-    differences,
     estimate_of,
     evaluated,
     judged,
-    paired_difference,
     phases_of,
+)
+from .studies.results.comparison import ComparisonGroup, compare_conditions
+from .studies.results.differences import (
+    BySeed,
+    Difference,
+    adjust,
+    difference,
+    differences,
+    paired_difference,
     ratio,
     select_shared,
 )
-from .studies.results.contrasts import Group, contrasts
 from .studies.results.notation import format_estimate, format_number, format_p, wrapped
-from .studies.results.power import deviation_of, power_lines
-from .studies.results.results import CPU, NOTHING, Results, Sizes
-from .studies.results.statistics import (
+from .studies.results.permutation_tests import (
     LEVEL,
-    NOT_NEGATIVE,
-    Array,
-    Estimate,
     Friedman,
-    bootstrap,
-    exactly,
     friedman,
     holm,
     paired_permutation,
     paired_tests,
+)
+from .studies.results.power import deviation_of
+from .studies.results.power_text import power_lines
+from .studies.results.results import CPU, NOTHING, Results
+from .studies.results.sizes import Sizes
+from .studies.results.statistics import (
+    NOT_NEGATIVE,
+    Array,
+    Estimate,
+    bootstrap,
+    exactly,
     rate,
     stack_estimates,
 )
@@ -66,11 +72,11 @@ __all__ = [
     "Array",
     "BySeed",
     "Case",
+    "ComparisonGroup",
     "Difference",
     "Estimate",
     "Figures",
     "Friedman",
-    "Group",
     "HierarchyCase",
     "Results",
     "Sizes",
@@ -78,9 +84,9 @@ __all__ = [
     "adjust",
     "analyse_as",
     "bootstrap",
+    "compare_conditions",
     "compare_hierarchies",
     "compare_with_first",
-    "contrasts",
     "courses_of",
     "deviation_of",
     "difference",

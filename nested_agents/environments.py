@@ -11,8 +11,8 @@ Importing this module registers them::
     pettingzoo.make("aec", "NestedAgents/Arm-v0", topology={"kind": "tree", "failures": [...]})
 
 Keywords are those of the ``[scenario]`` table of a spec, what fails of wheels and joints included.
-An AEC environment takes a ``topology`` beside, which says who decides after whom, and what fails of
-the messages in which agents hear the actions decided above them.
+An AEC environment also takes a ``topology``, which gives the order of decisions and the failures of
+the messages with decided actions.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import pettingzoo
 
 if TYPE_CHECKING:
     from .core.interface.scenario import Scenario
-    from .scenarios.adapters.passing_down import PassingDownEnv
+    from .scenarios.adapters.turns import TurnBasedEnv
     from .scenarios.environments import AgentsEnv, JointEnv
 
 WORLDS = {
@@ -119,29 +119,29 @@ def _world(kind: str, table: Mapping[str, Any]) -> Scenario:
 
 def turns(
     kind: str, steps: int, topology: str | Mapping[str, Any] = "chain", **options: Any
-) -> PassingDownEnv:
-    """Return a PettingZoo AEC environment whose agents take turns from the top down.
+) -> TurnBasedEnv:
+    """Return a PettingZoo AEC environment in which agents act in the order of a hierarchy.
 
     Parameters
     ----------
     kind, steps, **options
         As those of `joint`.
     topology
-        Who decides after whom, and what fails of the messages down, as specs have it.
+        Order of decisions and failures of messages, as in a spec.
 
     Raises
     ------
     ValueError
         If there is no such key or topology, or a value is out of range; one line.
     """
-    from .scenarios.adapters.passing_down import PassingDownEnv
+    from .scenarios.adapters.turns import TurnBasedEnv
     from .topologies import build, parse
 
     env = parallel(kind, steps, **options)
     settings = parse(topology)
     world = env.scenario
     hierarchy = build(settings, world.agents, world.groups, world.interactions)
-    return PassingDownEnv(env, hierarchy, settings.failures)
+    return TurnBasedEnv(env, hierarchy, settings.failures)
 
 
 register()

@@ -64,7 +64,8 @@ def find_condition(name: str, max_minutes: float) -> PublishedCondition | None:
     n_seeds = fitting.get(condition, 0)
     if n_seeds < MIN_SEEDS:
         return None
-    seeds = tuple(published["seeds"][condition][:n_seeds])
+    seeds = published["seeds"][condition]  # a number, or a list
+    seeds = tuple(range(seeds) if isinstance(seeds, int) else seeds)[:n_seeds]
     return PublishedCondition(
         name,
         condition,

@@ -95,19 +95,19 @@ AXES: dict[str, dict[str, SpecTable]] = {
     "neighbours": {
         "simultaneous": _joined("simultaneous"),
         "coordination-graph": _joined("coordination-graph"),
-        "oriented": _joined("coordination-graph", oriented="listed"),
+        "oriented": _joined("coordination-graph", decision_order="listed"),
     },
-    "told": {
-        "parents": _chain(told="parents"),
-        "none": _chain(told="none"),
-        "own body": _chain(told=["body"]),
-        "next body": _chain(told=["next"]),
+    "communication": {
+        "parents": _chain(communication="parents"),
+        "none": _chain(communication="none"),
+        "own body": _chain(communication=["body"]),
+        "next body": _chain(communication=["next"]),
     },
-    "considers": {
-        "children": _chain(considers="children"),
-        "none": _chain(considers="none"),
-        "own body": _chain(considers=["body"]),
-        "next body": _chain(considers=["next"]),
+    "lookahead": {
+        "children": _chain(lookahead="children"),
+        "none": _chain(lookahead="none"),
+        "own body": _chain(lookahead=["body"]),
+        "next body": _chain(lookahead=["next"]),
     },
     "messages": {
         "lost": failing("lost", "*1"),

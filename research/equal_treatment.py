@@ -48,7 +48,10 @@ def lines() -> list[str]:
         f"| team | seeds | {TRAINED} | {' | '.join(HOW)} |",
         "|---|---|---|---|---|---|",
     ]
-    beside = ["| beside the chain | success | | decisions to the goal | |", "|---|---|---|---|---|"]
+    beside = [
+        "| compared with the chain | success | | decisions to the goal | |",
+        "|---|---|---|---|---|",
+    ]
     for setting, results, cases in settings():
         values = {case.hierarchy: format_estimate(case.values[EVALUATED]) for case in cases}
         n_seeds = len(results.seeds(cases[0].condition))

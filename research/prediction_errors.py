@@ -54,9 +54,9 @@ def errors(**scenario: Any) -> tuple[int, list[float]]:
             after: Mapping[str, Any] = transition.info
             if after["contact_time"].any():
                 row = [1000 * moved(before["box_pose"], after["box_pose"])]
-                row += [1000 * moved(view.box[0], after["box_pose"]) for view in views]
-                row += [1000 * turned(view.box[0, 2], after["box_pose"][2]) for view in views]
-                yaw = turned(views[0].robots[0, :, 2], after["robot_poses"][:, 2])
+                row += [1000 * moved(view.boxes[:, 0], after["box_pose"]) for view in views]
+                row += [1000 * turned(view.boxes[2, 0], after["box_pose"][2]) for view in views]
+                yaw = turned(views[0].robots[:, 2, 0], after["robot_poses"][:, 2])
                 rows.append([*row, 1000 * float(np.mean(yaw))])
             if transition.terminated or transition.truncated:
                 break

@@ -1,7 +1,7 @@
-"""Where agents act: scenarios, by name.
+"""Scenarios by name.
 
-A scenario is known by its settings, whose method ``build`` makes it. Settings can be read and
-checked without what a scenario needs to run: Box2D and numba take a second to import.
+The settings of a scenario have a method ``build`` that makes it. Settings are read and validated
+without importing Box2D and numba, which takes a second.
 
 Examples
 --------
@@ -15,7 +15,7 @@ from ..core.plugins.settings import ScenarioSettings
 __all__ = ["DEFAULT", "SCENARIOS"]
 
 PLUGINS = {"signals": "signals", "spread": "spread", "swimmer": "swimmers", "vmas": "vmas"}
-"""Scenarios in the folder plugins of the repository, and the folder of each."""
+"""Scenarios in the folder plugins of the repository, with their folders."""
 SCENARIOS = SettingsRegistry(
     "scenario",
     {
@@ -33,7 +33,7 @@ SCENARIOS = SettingsRegistry(
         for name, folder in PLUGINS.items()
     },
 )
-"""Scenarios by the name that specs use."""
+"""Scenarios by their name in specs."""
 
 DEFAULT = "box-pushing"
-"""That of specs that name none."""
+"""Scenario of specs that do not name one."""

@@ -1,12 +1,12 @@
-"""Our worlds for other people's learners: environments of Gymnasium and PettingZoo.
+"""Scenarios as Gymnasium and PettingZoo environments.
 
-Three views of one scenario: `AgentsEnv` (each of its agents an agent), `BodiesEnv` (each body an
-agent) and `JointEnv` (one player for all). Observations are the states of the agents, what agents
-of one body share being given once; only angles have bounds. A player gets the mean reward of its
-agents. Episodes end where the scenario says so (terminated or truncated), or after `steps` steps
-(truncated).
+A scenario has three views: `AgentsEnv` with each agent as a player, `BodiesEnv` with each body as a
+player, and `JointEnv` with one player for all agents. Observations are the states of the agents;
+variables that the agents of a body share occur once, and only angles have bounds. The reward of a
+player is the mean of its agents. Episodes end as in the scenario, and are truncated after `steps`
+steps.
 
-`nested_agents.environments` has their ids in the registries of both libraries.
+`nested_agents.environments` registers ids with both libraries.
 """
 
 from abc import ABC, abstractmethod
@@ -24,22 +24,22 @@ from ..core.interface.scenario import Scenario, Transition
 from ..core.numerics import FloatArray, IntArray
 
 Observations = dict[str, FloatArray]
-"""By agent."""
+"""Observations by agent."""
 Infos = dict[str, dict[str, object]]
-"""Measurements by name, by agent."""
+"""Measurements by agent and name."""
 
 
 class Player:
-    """The agents of a scenario that one outside agent plays, and what it observes.
+    """The agents that one player controls, and its observations.
 
     Parameters
     ----------
     scenario
-        What is played.
+        The scenario.
     members
         Indices of the agents.
     by_agent
-        Whether it observes the state of every agent in a row of its own.
+        Whether observations have a row for the state of each agent.
     """
 
     def __init__(
@@ -52,8 +52,8 @@ class Player:
         every = np.arange(len(scenario.agents) * d).reshape(-1, d)
         parts = []
         for group in scenario.groups:
-            mine = [agent for agent in group if agent in self.members]
-            parts += [every[mine, :own].ravel(), every[mine[:1], own:].ravel()]
+            controlled = [agent for agent in group if agent in self.members]
+            parts += [every[controlled, :own].ravel(), every[controlled[:1], own:].ravel()]
         self.places: IntArray = every[self.members] if by_agent else np.concatenate(parts)
         low, high = np.moveaxis(space.bounds[self.places % d].astype(np.float32), -1, 0)
         self.observation_space = Box(low, high, dtype=np.float32)
@@ -66,32 +66,32 @@ class Player:
         return states.ravel()[self.places].astype(np.float32)
 
     def mean_reward(self, reward: float | FloatArray) -> float:
-        """Return the mean reward of its agents; `reward` is one, or ``(n,)`` of all agents."""
+        """Return the mean reward of its agents from a joint reward, or ``(n,)`` of all agents."""
         return float(reward if np.ndim(reward) == 0 else np.mean(np.take(reward, self.members)))
 
 
 class Environment(ABC):
-    """A scenario with players, a clock, a stream of seeds and pictures; inherit it beside an API.
+    """Base class of the views: a scenario with players, a step limit, seeds and rendering.
 
     Parameters
     ----------
     scenario
-        What is played.
+        The scenario.
     steps
-        Most steps of an episode.
+        Maximum number of steps of an episode.
     render_mode
-        ``None`` or ``"rgb_array"``, of which `gymnasium.wrappers.HumanRendering` makes a window.
+        ``None`` or ``"rgb_array"``, which `gymnasium.wrappers.HumanRendering` shows in a window.
     by_agent
-        Whether a player observes the state of every agent of the scenario in a row of its own.
+        Whether observations have a row for the state of each agent.
 
     Raises
     ------
     ValueError
-        If one of them is out of range.
+        If `steps` or `render_mode` is not allowed.
     """
 
     modes: ClassVar[Sequence[str]] = ()
-    """Of rendering."""
+    """Supported render modes."""
 
     def __init__(
         self,
@@ -121,13 +121,13 @@ class Environment(ABC):
 
     @abstractmethod
     def _teams(self) -> Mapping[str, Sequence[int]]:
-        """Return the agents of the scenario that each player plays, by its name."""
+        """Return the indices of the agents of each player, by name."""
 
     def begin(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
-        """Start the next episode; a seed starts the stream of worlds and their count afresh.
+        """Start the next episode; a seed resets the stream of episode seeds and their count.
 
-        The option ``episode`` sets the number of the episode, by which failures are scheduled, and
-        ``world`` the seed of its world, in place of the next one of the stream.
+        The option ``episode`` sets the number of the episode, which schedules failures. The option
+        ``world`` sets the seed of the episode instead of the next one of the stream.
         """
         if seed is not None:
             self._seeds = np.random.default_rng(seed)
@@ -144,16 +144,16 @@ class Environment(ABC):
         return states
 
     def advance(self, joint_action: IntArray) -> tuple[Transition, bool]:
-        """Return what a joint action ``(n,)`` leads to, and whether the episode is truncated."""
+        """Return the transition of a joint action ``(n,)`` and whether it is truncated."""
         transition = self.scenario.step(joint_action)
         self._step += 1
         if self._recorder is not None:
             self._recorder.add(transition)
-        late = self._step >= self.steps and not transition.terminated
-        return transition, transition.truncated or late
+        is_last = self._step >= self.steps and not transition.terminated
+        return transition, transition.truncated or is_last
 
     def info(self, measured: Mapping[str, object]) -> dict[str, object]:
-        """Return a copy of measurements, without the times, which differ from run to run."""
+        """Return a copy of measurements without times, which differ between runs."""
         return {
             name: value.copy() if isinstance(value, np.ndarray) else value
             for name, value in measured.items()
@@ -161,26 +161,26 @@ class Environment(ABC):
         }
 
     def picture(self, recording: Mapping[str, Any]) -> NDArray[np.uint8]:
-        """Return a picture ``(height, width, 3)`` of where a recording ends; see `modes`."""
+        """Return a picture ``(height, width, 3)`` of the last step of a recording."""
         raise NotImplementedError
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture ``(height, width, 3)`` of the present; None without a render mode.
+        """Return a picture ``(height, width, 3)`` of the present state; None without a mode.
 
         Raises
         ------
         RuntimeError
-            If no episode has begun.
+            If `reset` was not called.
         """
         if self.render_mode is None:
             return None
         if self._recorder is None:
-            raise RuntimeError("render: no episode has begun, call reset first")
+            raise RuntimeError("render: call reset first")
         return self.picture(self._recorder.recording())
 
 
 class AgentsEnv(Environment, ParallelEnv):
-    """A scenario as a PettingZoo environment whose agents are its own; see `Environment`.
+    """A scenario as a PettingZoo environment with the same agents, see `Environment`.
 
     Examples
     --------
@@ -217,19 +217,19 @@ class AgentsEnv(Environment, ParallelEnv):
     def step(
         self, actions: Mapping[str, int | IntArray]
     ) -> tuple[Observations, dict[str, float], dict[str, bool], dict[str, bool], Infos]:
-        """Carry out one action of every agent.
+        """Execute one action of every agent.
 
         Returns
         -------
         tuple
-            Observations, rewards, terminations, truncations and infos by agent; all empty when the
-            episode is over, as PettingZoo has it.
+            Observations, rewards, terminations, truncations and infos by agent; all empty after the
+            end of an episode, as in PettingZoo.
         """
         if not self.agents:
             return {}, {}, {}, {}, {}
         if set(actions) != set(self.agents):
             missing = [name for name in self.agents if name not in actions]
-            problem = f"{missing[0]!r} is missing" if missing else "some of these do not act"
+            problem = f"{missing[0]!r} is missing" if missing else "some are unknown"
             raise ValueError(f"step: actions of {list(actions)}: {problem}; agents: {self.agents}")
         joint = np.empty(len(self.scenario.agents), dtype=np.int64)
         for name in self.agents:
@@ -246,14 +246,14 @@ class AgentsEnv(Environment, ParallelEnv):
     def _observe(
         self, states: FloatArray, measured: Mapping[str, object]
     ) -> tuple[Observations, Infos]:
-        """Return what those who are still there observe, and are informed of."""
+        """Return observations and infos of the present agents."""
         observations = {name: self.players[name].observe(states) for name in self.agents}
         infos = {name: self.info(measured) for name in self.agents}
         return observations, infos
 
 
 class BodiesEnv(AgentsEnv):
-    """A scenario as a PettingZoo environment whose agents are its bodies; see `Environment`."""
+    """A scenario as a PettingZoo environment with one agent per body, see `Environment`."""
 
     def _teams(self) -> Mapping[str, Sequence[int]]:
         names = self.scenario.agents
@@ -262,7 +262,7 @@ class BodiesEnv(AgentsEnv):
 
 
 class JointEnv(Environment, gymnasium.Env):
-    """A scenario as a Gymnasium environment: one player for all its agents; see `Environment`.
+    """A scenario as a Gymnasium environment for all agents together, see `Environment`.
 
     Examples
     --------

@@ -1,9 +1,9 @@
 """Line-up: carts on parallel rails meet side by side on a goal line.
 
-The smallest task with physics in which agents must coordinate: each agent drives one cart, and the
-team is rewarded for being near the line and for staying level, as if the carts carried a beam. Its
-two state variables keep even the joint state of three agents small enough for a single agent
-(Section VII), and its prediction is exact and cheap, so that it serves to measure costs.
+This is the smallest task with physics that requires coordination. Each agent drives one cart, and
+the team is rewarded for being near the line and for staying level, as if the carts carried a beam.
+With two state variables, the joint state of three agents is small enough for a single agent
+(Section VII). Predictions are exact and fast, which suits measurements of cost.
 
 Physics: a cart of mass m is pulled by a servo of stiffness k [N/(m/s)] towards its commanded speed
 u, ``m dv/dt = k (u - v)``. With ``tau = m / k`` and u held for a period T this is solved exactly::
@@ -31,15 +31,15 @@ from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 
 PERIOD = 0.25
-"""One decision [s]."""
+"""Decision period [s]."""
 TAU = 0.1
 """Mass over servo stiffness [s]: 1 kg and 10 N/(m/s)."""
 MAX_SPEED = 0.4
-"""Greatest commanded speed [m/s]."""
+"""Maximum commanded speed [m/s]."""
 INCREMENT = 0.2
-"""What increase and decrease change [m/s]."""
+"""Change of the commanded speed by one action [m/s]."""
 TOLERANCE = 0.08
-"""Distance from the line within which every cart must be [m]."""
+"""Maximum distance of all carts from the line at success [m]."""
 
 DISTANCE = Variable("distance", "m", -1.0, 1.0, centres=(-1.0, -0.3, 0.0, 0.3, 1.0))
 LEAD = Variable("lead", "m", -0.8, 0.8, centres=(-0.8, -0.2, 0.0, 0.2, 0.8))
@@ -89,7 +89,7 @@ class LineUp(Scenario):
         LineUp.reset(self, 0)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
-        """Put the carts at rest, each 0.2 to 1 m from the line on the same side."""
+        """Place the carts at rest on one side, each 0.2 to 1 m from the line."""
         rng = np.random.default_rng(seed)
         n = len(self.agents)
         self._places = rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0, size=n)
@@ -98,12 +98,13 @@ class LineUp(Scenario):
         return self._states()
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Carry out a joint action ``(n,)`` for one period."""
+        """Execute a joint action ``(n,)`` for one period."""
         self._commands = self._commanded(joint_action)
         self._places, self._speeds = advance(self._places, self._speeds, self._commands)
         arrived = bool((np.abs(self._places) < TOLERANCE).all())
-        received = float(reward(self._places))
-        return Transition(self._states(), received, arrived, False, self.measure())
+        return Transition(
+            self._states(), float(reward(self._places)), arrived, False, self.measure()
+        )
 
     def predict(self) -> LineUpPrediction:
         """Predict from the present state."""
@@ -112,7 +113,7 @@ class LineUp(Scenario):
         return LineUpPrediction(places.T.copy())
 
     def measure(self) -> Mapping[str, object]:
-        """Return the places of the carts, their mean distance from the line and spread [m]."""
+        """Return the places of the carts, their mean distance and their spread [m]."""
         return {
             "places": self._places.copy(),
             "distance_m": float(np.abs(self._places).mean()),
@@ -121,15 +122,15 @@ class LineUp(Scenario):
         }
 
     def constants_of_episode(self) -> Mapping[str, object]:
-        """Return the seconds between two recorded steps."""
+        """Return the period of recorded steps."""
         return {"dt": PERIOD}
 
     def with_exact_prediction(self) -> LineUp:
-        """Return this scenario: its predictions are exact."""
+        """Return this scenario, because its predictions are exact."""
         return self
 
     def environments(self, count: int) -> LineUpEnvironments:
-        """Return many environments, stepped in one call."""
+        """Return many environments that are stepped in one call."""
         return LineUpEnvironments(self, count)
 
     def _commanded(self, joint_actions: IntArray) -> FloatArray:
@@ -155,12 +156,14 @@ class LineUpEnvironments(StackedEnvironments[LineUp]):
         self._commands[index] = 0.0
 
     def step(self, joint_actions: IntArray) -> Transitions:
-        """Carry out joint actions ``(W, n)`` for one period."""
+        """Execute joint actions ``(W, n)`` for one period."""
         self._commands = commanded(self._commands, joint_actions, self.scenario.action_set)
         self._places, self._speeds = advance(self._places, self._speeds, self._commands)
         arrived = np.all(np.abs(self._places) < TOLERANCE, axis=1)
-        paid = np.broadcast_to(reward(self._places)[:, None], joint_actions.shape)
-        return Transitions(observe(self._places), paid, arrived, np.zeros(self.count, dtype=bool))
+        rewards = np.broadcast_to(reward(self._places)[:, None], joint_actions.shape)
+        return Transitions(
+            observe(self._places), rewards, arrived, np.zeros(self.count, dtype=bool)
+        )
 
 
 def commanded(commands: FloatArray, joint_actions: IntArray, actions: ActionSet) -> FloatArray:
@@ -174,12 +177,12 @@ def observe(places: FloatArray) -> FloatArray:
 
 
 class LineUpPrediction(Prediction, Tables):
-    """Where carts will be: exactly.
+    """Exact prediction of the carts.
 
     Parameters
     ----------
     places
-        ``(n, A)`` next place [m] of every cart by its own action.
+        ``(n, A)`` next place [m] of every cart for each of its actions.
     """
 
     def __init__(self, places: FloatArray) -> None:
@@ -187,7 +190,7 @@ class LineUpPrediction(Prediction, Tables):
 
     @cached_property
     def _sums(self) -> FloatArray:
-        """The sums ``(A ** n,)`` of the places after all joint actions."""
+        """Sum of the places after each joint action ``(A ** n,)``."""
         return reduce(lambda sums, places: np.add.outer(sums, places).ravel(), self._places)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -207,7 +210,7 @@ class LineUpPrediction(Prediction, Tables):
         return reward(self._after(joint_actions))
 
     def tables(self) -> Tables:
-        """Return itself: it has tables of all joint actions."""
+        """Return itself, because it has tables of all joint actions."""
         return self
 
     def blocks(self, agent: int) -> Blocks:
@@ -231,13 +234,13 @@ class LineUpPrediction(Prediction, Tables):
 def advance(
     places: FloatArray, speeds: FloatArray, commands: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return places [m] and speeds [m/s] one period on, commands [m/s] being held."""
+    """Return places [m] and speeds [m/s] after one period of constant commands [m/s]."""
     lag = speeds - commands
     decay = np.exp(-PERIOD / TAU)
     return places + commands * PERIOD + lag * TAU * (1.0 - decay), commands + lag * decay
 
 
 def reward(places: FloatArray) -> FloatArray:
-    """Return the reward ``(...,)`` of places ``(..., n)`` [m]: near the line, and level."""
+    """Return the reward ``(...,)`` of places ``(..., n)`` [m]."""
     near = np.exp(-2.0 * np.abs(places).mean(axis=-1))
     return 0.01 * near - 0.005 * np.ptp(places, axis=-1)

@@ -1,4 +1,4 @@
-"""Pictures of recorded episodes: the figure they are drawn on, and animations, GIF or MP4."""
+"""Animations of recorded episodes as GIF or MP4."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 Pixels = NDArray[np.uint8]
-"""A picture ``(height, width, 3)``; sides are multiples of 16, as video codecs want them."""
-MOST_FRAMES = 120
-"""Longer episodes are thinned out to this many frames."""
+"""A picture ``(height, width, 3)`` with sides that are multiples of 16, for video codecs."""
+MAX_FRAMES = 120
+"""Maximum number of frames of an animation."""
 DPI = 100
 
 
 class Scene:
-    """A figure in metres on which any moment of an episode can be drawn.
+    """A figure in meters that shows any step of an episode.
 
     Parameters
     ----------
@@ -37,18 +37,18 @@ class Scene:
         self._moving: list[Artist] = []
 
     def draw(self, step: int) -> None:
-        """Draw the moment after `step` steps in place of what moved in the last one."""
+        """Replace the drawn step by another."""
         for artist in self._moving:
             artist.remove()
         self._moving = []
         self._add(step)
 
     def _add(self, step: int) -> None:
-        """Add what moves to `_moving`, and the title."""
+        """Draw the moving parts, add them to `_moving`, and set the title."""
         raise NotImplementedError
 
     def pixels(self, step: int) -> Pixels:
-        """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
+        """Return a picture of a step."""
         self.draw(step)
         self.canvas.draw()
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
@@ -60,13 +60,13 @@ def film(draw: Callable[[int], Pixels], last: int, seconds: float, path: Path) -
     Parameters
     ----------
     draw
-        Draws the moment after so many steps.
+        Returns the picture of a step.
     last
         Number of the last step.
     seconds
-        For which a frame is shown; the last frame of a GIF is shown for longer.
+        Duration of a frame; the last frame of a GIF is shown for longer.
     path
-        Where to write; an unfinished animation never bears this name.
+        Path of the file, which exists only once the animation is complete.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def film(draw: Callable[[int], Pixels], last: int, seconds: float, path: Path) -
     """
     if path.suffix not in (".gif", ".mp4"):
         raise ValueError(f"animation: suffix {path.suffix!r} of {path.name}, allowed .gif or .mp4")
-    steps = np.unique(np.linspace(0, last, min(last + 1, MOST_FRAMES)).round().astype(int))
+    steps = np.unique(np.linspace(0, last, min(last + 1, MAX_FRAMES)).round().astype(int))
     frames = [draw(int(step)) for step in steps]
     partial = path.with_name(f".{path.stem}.partial{path.suffix}")
     if path.suffix == ".gif":
@@ -86,7 +86,7 @@ def film(draw: Callable[[int], Pixels], last: int, seconds: float, path: Path) -
 
 
 def _write_gif(path: Path, frames: list[Pixels], seconds: float) -> None:
-    # One palette for all frames: colours do not flicker, and it is found only once.
+    # A common palette avoids flicker and is computed once.
     palette = Image.fromarray(frames[-1]).quantize(128)
     images = [
         Image.fromarray(f).quantize(palette=palette, dither=Image.Dither.NONE) for f in frames

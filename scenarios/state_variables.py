@@ -1,10 +1,9 @@
-"""State variables by name: functions of what is seen, whatever the scenario.
+"""State variables by name, for any scenario.
 
-A state variable is a function of a view and of the number of a body (a robot, a joint), vectorised
-over the situations that the view holds; the same function serves sensing, where there is one
-situation, and prediction, where there are many. It must depend on nothing else: ``nested-agents
-check`` finds out where it means two things. What a view is, and which variables are built in, is
-the scenario's business: each has a registry and a view of its own.
+A state variable is a function of a view of the scenario and of the index of a body (a robot, a
+joint), vectorized over the situations in the view. The same function serves sensing, with one
+situation, and prediction, with many. It must not depend on anything else, which ``nested-agents
+check`` verifies. Each scenario defines its view and a registry of its built-in variables.
 """
 
 from abc import ABC, abstractmethod
@@ -19,18 +18,19 @@ from ..core.interface.spaces import StateSpace, Variable
 from ..core.numerics import FloatArray
 from ..core.plugins.registry import Registry
 
-StateFunction = Callable[[Any, Any], FloatArray]
-"""The values ``(m,)`` of a variable for one body in the ``m`` situations of a scenario's view."""
+StateFunction = Callable[[Any, Any], Any]
+"""A function of a scenario's situation and of a body; what it returns is the scenario's business:
+values ``(m,)`` in ``m`` situations, or one number if it is compiled."""
 
 
 @dataclass(frozen=True)
 class Situations(ABC):
-    """Situations to be described, ``m`` at once: what the view of a scenario inherits."""
+    """Base class of views: ``m`` situations of a scenario."""
 
     @property
     @abstractmethod
     def n_situations(self) -> int:
-        """How many situations there are."""
+        """Number of situations."""
 
 
 SituationsT = TypeVar("SituationsT", bound=Situations)
@@ -38,16 +38,16 @@ SituationsT = TypeVar("SituationsT", bound=Situations)
 
 @dataclass(frozen=True)
 class StateVariable:
-    """A state variable and how to compute it."""
+    """A state variable and the function that computes it."""
 
     variable: Variable
-    """Its name, unit, range and membership centres."""
+    """Name, unit, range and centers of membership functions."""
     function: StateFunction
     """``function(view, body) -> (m,)``."""
     common: bool = False
     """Whether it is the same for all bodies."""
     trusted: bool = False
-    """Whether it is a built-in one, whose values are not checked."""
+    """Whether it is built in, so that its values are not checked."""
 
     def __call__(self, view: Situations, body: int) -> FloatArray:
         """Return the values ``(m,)`` for a body.
@@ -57,12 +57,19 @@ class StateVariable:
         ValueError
             If a function that is not trusted returns anything but a finite number per situation.
         """
-        values = self.function(view, body)
-        if self.trusted:
-            return values
-        values = np.asarray(values)
+        values: FloatArray = self.function(view, body)
+        return values if self.trusted else self.checked(values, view.n_situations)
+
+    def checked(self, returned: object, m: int) -> FloatArray:
+        """Return the values that a user's function gave for ``m`` situations.
+
+        Raises
+        ------
+        ValueError
+            If they are anything but a finite number per situation.
+        """
+        values = np.asarray(returned)
         name = self.variable.name
-        m = view.n_situations
         if values.shape != (m,):
             raise ValueError(
                 f"state variable {name!r}: shape {values.shape}, must be {(m,)}: one value for "
@@ -74,12 +81,12 @@ class StateVariable:
 
 
 def space_of(name: str, own: Variable, things: Sequence[StateVariable]) -> StateSpace:
-    """Return the state space of an own variable and what is perceived beside it.
+    """Return the state space of the body's own variable followed by other variables.
 
     Raises
     ------
     ValueError
-        If that is nothing, or a variable occurs twice.
+        If there are no other variables, or a variable is repeated.
     """
     variables = (own, *(thing.variable for thing in things))
     names = [variable.name for variable in variables]
@@ -92,40 +99,16 @@ def space_of(name: str, own: Variable, things: Sequence[StateVariable]) -> State
 
 
 def freeze(array: FloatArray) -> FloatArray:
-    """Make an array read-only, and return it."""
+    """Make an array read-only and return it."""
     array.flags.writeable = False
     return array
 
 
 def guard(view: SituationsT) -> SituationsT:
-    """Return a view of the same situations whose arrays cannot be written to."""
+    """Return a copy of a view with read-only arrays."""
     held = {field.name: vars(view)[field.name] for field in fields(view)}
     arrays = {k: freeze(v.view()) for k, v in held.items() if isinstance(v, np.ndarray)}
     return replace(view, **arrays)
-
-
-def sense(
-    parts: Sequence[StateVariable],
-    view: Situations,
-    bodies: Sequence[int],
-    done: FloatArray | None = None,
-) -> FloatArray:
-    """Return state variables ``(len(bodies), m, variables)`` of bodies.
-
-    By the functions alone, and those that are the same for all bodies are computed once. Or, if
-    compiled ones are `done`, with those of users filled in: then every body is asked, so that a
-    check of the scenario finds what is wrongly called common.
-    """
-    once = done is None
-    shape = (len(bodies), view.n_situations, len(parts))
-    values = np.empty(shape) if done is None else done
-    wanted = [(c, thing) for c, thing in enumerate(parts) if once or not thing.trusted]
-    safe = view if all(thing.trusted for _, thing in wanted) else guard(view)
-    for column, thing in wanted:
-        for k, body in enumerate(bodies):
-            known = once and k > 0 and thing.common
-            values[k, :, column] = values[0, :, column] if known else thing(safe, body)
-    return values
 
 
 def state_variable(
@@ -139,20 +122,25 @@ def state_variable(
     common: bool = False,
     mirrored: Literal["same", "opposite"] | None = None,
 ) -> Callable[[StateFunction], StateVariable]:
-    """Make a function of a view and a body a state variable of the function's name.
+    """Decorate a function of a view and a body as a state variable with the function's name.
 
-    Parameters are those of `Variable`, and `common`: whether it is the
-    same for all bodies, which makes sensing and decisions by the values of many agents faster. What
-    the function is given is read-only. A variable that says what it is in the mirror image of the
-    world, the ``same`` or of ``opposite`` sign, can be used with ``learner.mirrored``.
+    Parameters
+    ----------
+    unit, low, high, periodic, centres, labels
+        See `Variable`.
+    common
+        Whether the variable is the same for all bodies, which makes decisions faster.
+    mirrored
+        Value in the mirror image of the scenario: the ``same``, or of ``opposite`` sign. Required
+        for ``learner.mirrored``.
 
     Examples
     --------
     >>> @state_variable("m", 0.0, 0.5)
-    ... def closest(view, robot):
-    ...     return view.gaps.min(axis=1)
-    >>> closest.variable.name
-    'closest'
+    ... def nearness(situation, robot):
+    ...     return situation.distance + robot.gap
+    >>> nearness.variable.name
+    'nearness'
     """
 
     def describe(function: StateFunction) -> StateVariable:
@@ -163,12 +151,12 @@ def state_variable(
 
 
 def find_variable(registry: Registry, name: str) -> StateVariable:
-    """Return a state variable of a registry by name, or by where it is.
+    """Return a state variable of a registry by its name or its place in a user's file.
 
     Raises
     ------
     ValueError
-        If there is none; one line.
+        If there is no such variable.
     """
     try:
         thing = registry.find(name)
@@ -180,7 +168,7 @@ def find_variable(registry: Registry, name: str) -> StateVariable:
 
 
 def names_of(registry: Registry) -> BeforeValidator:
-    """Return what replaces state variables of a registry by their names, in a list of both."""
+    """Return a pydantic validator that replaces state variables in a list by their names."""
 
     def named(given: object) -> object:
         if not isinstance(given, list | tuple):

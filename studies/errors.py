@@ -1,4 +1,4 @@
-"""What is wrong with something that the user can mend, in one line to act on."""
+"""Errors of the user, reported in one line."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,11 +8,11 @@ from ..core.plugins.printing import printable
 LONGEST = 1200
 """Characters of a message; of a longer one the middle is left out."""
 WIDTH = 80
-"""Of a line that is printed [characters]."""
+"""Maximum length of a printed line [characters]."""
 
 
 class SpecError(ValueError):
-    """Something the user can mend: its message is one line that names what, and what is allowed."""
+    """Mistake of the user: one line that names the key, its value and what is allowed."""
 
     def __init__(self, message: str) -> None:
         line = " ".join(message.split())

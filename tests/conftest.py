@@ -39,7 +39,7 @@ def permuted() -> Callable[[Hierarchy, Sequence[int]], Hierarchy]:
     def of(hierarchy: Hierarchy, permutation: Sequence[int]) -> Hierarchy:
         edges, neighbours = (
             [(hierarchy.agents[a], hierarchy.agents[b]) for a, b in pairs]
-            for pairs in (hierarchy.edges, hierarchy.neighbours)
+            for pairs in (hierarchy.edges, hierarchy.neighbors)
         )
         return Hierarchy([hierarchy.agents[i] for i in permutation], edges, neighbours)
 

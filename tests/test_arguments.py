@@ -116,7 +116,7 @@ SEQUENCES: dict[tuple[str, str], tuple[object, ...]] = {
     ("cost_table", "memberships"): (3,),
     ("Hierarchy", "agents"): ("a",),
     ("Hierarchy", "edges"): (("a", "b"),),
-    ("Hierarchy", "neighbours"): (("a", "b"),),
+    ("Hierarchy", "neighbors"): (("a", "b"),),
     ("state_variable", "centres"): (0.0,),
     ("state_variable", "labels"): ("near",),
 }

@@ -22,7 +22,7 @@ ALLOWED = {
 }
 STUDIES = (
     "errors", "store", "spec", "trials", "workers", "results", "presentation", "catalogue",
-    "cost", "explain", "report", "api", "cli",
+    "cost", "scalability", "explain", "report", "api", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000
@@ -186,16 +186,16 @@ def test_no_folders_import_each_other_in_a_circle(graph: nx.DiGraph) -> None:
 
 def test_a_circle_of_folders_is_named() -> None:
     roof_and_ground = {
-        "nested_agents.core": ("from .rules import base", True),
-        "nested_agents.core.rules": ("", True),
-        "nested_agents.core.rules.base": ("def f():\n    from ..spaces import S", False),
+        "nested_agents.core": ("from .values import base", True),
+        "nested_agents.core.values": ("", True),
+        "nested_agents.core.values.base": ("def f():\n    from ..spaces import S", False),
         "nested_agents.core.spaces": ("", False),
     }
     graph = imports_between(roof_and_ground)
     packages = {module for module, (_, is_package) in roof_and_ground.items() if is_package}
     assert circles(graph) == []
     assert circles(folders_of(graph, packages)) == [
-        "nested_agents.core <-> nested_agents.core.rules"
+        "nested_agents.core <-> nested_agents.core.values"
     ]
 
 
@@ -325,6 +325,16 @@ def test_host_naming_locks_are_not_tracked(tracked: list[Path]) -> None:
     assert [p.name for p in tracked if p.name == "uv.lock" or p.name.startswith("pylock")] == []
 
 
+CHEAP = "tests/test_house.py tests/test_hygiene.py"
+
+
+def function_of_dev(name: str) -> str:
+    """Return the text of a shell function in dev."""
+    text = (ROOT / "dev").read_text("utf-8")
+    (function,) = re.findall(rf"^{name}\(\) {{.*?^}}", text, re.DOTALL | re.MULTILINE)
+    return function
+
+
 def test_dev_says_in_one_line_what_the_machine_lacks(tmp_path: Path) -> None:
     for name in ("dev", "pyproject.toml", "requirements.lock", "box2d.lock"):
         shutil.copy(ROOT / name, tmp_path)
@@ -351,10 +361,7 @@ def test_dev_says_in_one_line_what_the_machine_lacks(tmp_path: Path) -> None:
     ],
 )
 def test_dev_knows_what_it_takes_to_build_box2d(compiler: str, python: str, missing: str) -> None:
-    (function,) = re.findall(
-        r"^lacking\(\) {.*?^}", (ROOT / "dev").read_text("utf-8"), re.DOTALL | re.MULTILINE
-    )
-    line = ["sh", "-c", f'{function}\nlacking "$1"', "sh", python]
+    line = ["sh", "-c", f'{function_of_dev("lacking")}\nlacking "$1"', "sh", python]
     environment = {**os.environ, "CXX": compiler}
     run = subprocess.run(line, env=environment, capture_output=True, text=True, check=True)
     assert run.stdout.strip() == missing
@@ -364,3 +371,33 @@ def test_dev_refuses_an_unknown_command() -> None:
     run = subprocess.run([ROOT / "dev", "tset"], capture_output=True, text=True, check=False)
     assert run.returncode == 2
     assert run.stderr.splitlines()[-1] == "dev: unknown command 'tset'"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "added"),
+    [
+        (["tests/core", "-x"], CHEAP),
+        (["dev::test_of_a_file"], CHEAP),
+        (["-k", "core_"], ""),
+        ([], ""),
+    ],
+)
+def test_dev_adds_the_cheap_tests_to_those_of_a_path(arguments: list[str], added: str) -> None:
+    line = f'{function_of_dev("whole_repository")}\nwhole_repository "$@"'
+    command = ["sh", "-c", line, "sh", *arguments]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == added
+
+
+def test_dev_generate_refuses_without_a_package_and_writes_nothing(tmp_path: Path) -> None:
+    line = f"fail() {{ echo dev: $* >&2; exit 2; }}\n{function_of_dev('generate')}\ngenerate"
+    python = tmp_path / "python"
+    python.write_text("#!/bin/sh\nexit 1\n")
+    python.chmod(0o755)
+    environment = {"PATH": f"{tmp_path}:/usr/bin:/bin", "venv": str(tmp_path / "venv")}
+    run = subprocess.run(
+        ["sh", "-c", line], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.startswith("dev: generate needs Box2D")
+    assert not (tmp_path / "venv").exists()

@@ -1,7 +1,7 @@
 """The built-in topologies, each a pure function from the names of agents to a networkx graph.
 
 An edge leads from a superior to its subordinate, and every agent is a node; an undirected graph
-joins neighbours. Agents are given in agent order; *bodies* are the agents of one body each, such as
+joins neighbors. Agents are given in agent order; *bodies* are the agents of one body each, such as
 the wheels of a robot. Keyword-only parameters are the settings of a topology, as they stand in the
 ``[topology]`` table of a spec. A graph becomes a `Hierarchy` in `nested_agents.topologies.build`.
 Checks name the culprit: which agent is unknown, missing or named twice.
@@ -261,18 +261,18 @@ def coordination_graph(
     edges: Pairs | None = None,
     others: Annotated[NonNegativeInt | None, unwritten(None)] = None,
 ) -> nx.Graph:
-    """Join neighbours in a shape, or as listed, who decide at once.
+    """Join neighbors in a shape, or as listed, who decide at once.
 
     Parameters
     ----------
     agents, bodies
         Names, also by body.
     shape
-        In agent order; on a ring the last is a neighbour of the first, in a tree everybody of two
+        In agent order; on a ring the last is a neighbor of the first, in a tree everybody of two
         later ones, in a grid of those in rows and columns. Or those whose actions matter to each
         other, as the scenario has it.
     edges
-        Pairs of neighbours in place of a shape.
+        Pairs of neighbors in place of a shape.
     others
         Seed of as many other pairs, drawn at random, in place of these.
 
@@ -366,7 +366,7 @@ def names_of(members: Iterable[str | Members]) -> list[str]:
     return [name for m in members for name in ([m] if isinstance(m, str) else names_of(m))]
 
 
-def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbours: bool = False) -> nx.Graph:
+def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbors: bool = False) -> nx.Graph:
     """Return a directed acyclic graph over `agents` with its nodes named by their ``str``.
 
     Parameters
@@ -375,8 +375,8 @@ def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbours: bool = 
         Its nodes are the agents, its edges lead from superior to subordinate; not modified.
     agents
         Names in agent order.
-    neighbours
-        Whether an undirected graph, which then joins neighbours, is allowed, too.
+    neighbors
+        Whether an undirected graph, which then joins neighbors, is allowed, too.
 
     Raises
     ------
@@ -389,7 +389,7 @@ def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbours: bool = 
     >>> from_networkx(nx.DiGraph([(0, 1)]), ["0", "1"]).edges
     OutEdgeView([('0', '1')])
     """
-    if not graph.is_directed() and not neighbours:
+    if not graph.is_directed() and not neighbors:
         raise ValueError("the graph is undirected: who is above whom?")
     if graph.is_multigraph():
         raise ValueError("the graph is a multigraph: edges could be given more than once")

@@ -19,7 +19,7 @@ from pydantic import model_validator
 
 from ..core.coordination.graphs import orient
 from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure, LeftAgents
-from ..core.hierarchy.hierarchy import Considers, Hierarchy, Told
+from ..core.hierarchy.hierarchy import Communication, Hierarchy, Lookahead
 from ..core.numerics import nx
 from ..core.plugins import sources
 from ..core.plugins.registry import Plugged, SettingsRegistry
@@ -43,41 +43,42 @@ BUILT = (
 """Topologies whose builder is called so."""
 
 
-Oriented = Literal["listed", "reversed"] | tuple[str, ...]
-"""In which order agents decide: that of the scenario, its reverse, or all names."""
+DecisionOrder = Literal["listed", "reversed"] | tuple[str, ...]
+"""Order of decision: agent order, its reverse, or all names in order."""
 
 
 class TopologySettings(Settings):
     """What the settings of all topologies share."""
 
     kind: str = ""
-    told: Annotated[Told, unwritten("ancestors")] = "ancestors"
-    """By whom an agent is told what was decided: all above it, its direct superiors, or nobody; or
-    a list of the bodies in which those above it tell it: its own ``body``, those ``next`` to it in
-    the order of bodies, those ``farther`` away."""
-    considers: Annotated[Considers, unwritten("descendants")] = "descendants"
-    """Whose actions an agent tries beside its own: those of all below it, of its direct
-    subordinates, or of nobody; or a list of bodies, as above, in which those below it are."""
-    oriented: Annotated[Oriented | None, unwritten(None)] = None
-    """In which order those decide who are joined by undirected edges: in the agents' own, in its
-    reverse, or as listed by name; each is above those of its neighbours that come later. None: they
-    decide at once."""
+    communication: Annotated[Communication, unwritten("ancestors")] = "ancestors"
+    """Agents whose decided actions an agent receives: all its ancestors, its parents only, or none.
+    A list restricts the ancestors to those in the agent's own ``body``, in the ``next`` bodies in
+    the order of bodies, or in bodies ``farther`` away."""
+    lookahead: Annotated[Lookahead, unwritten("descendants")] = "descendants"
+    """Agents whose actions an agent searches over beside its own: all its descendants, its children
+    only, or none. A list restricts the descendants by body, as in `communication`."""
+    decision_order: Annotated[DecisionOrder | None, unwritten(None)] = None
+    """Order of decision of agents that are joined by undirected edges: agent order (``listed``),
+    the reverse, or all names in order. Each edge then leads from the earlier agent to the later
+    one. By default neighbors decide at the same time."""
     fill_in: Annotated[bool, unwritten(False)] = False
-    """Whether those who are above one agent are joined, too, from the last one that decides to the
-    first: then the best that an agent can do depends on nobody else who has decided."""
+    """Whether the superiors of one agent are joined, too, from the last one in the decision order
+    to the first. The best action of an agent then depends on no other agent that has decided."""
     failures: Annotated[tuple[AnyMessageFailure, ...], unwritten(())] = ()
-    """What fails of the messages down the hierarchy, from when to when."""
+    """Failures of messages and absences of agents, with their times."""
 
     @model_validator(mode="after")
     def _check_relations(self) -> Self:
-        if self.told == "none" and not all(
+        if self.communication == "none" and not all(
             isinstance(f, AbsentAgents | LeftAgents) for f in self.failures
         ):
             raise ValueError(
-                "told = 'none': there are no messages to fail, failures must be absent or left"
+                "communication = 'none': there are no messages to fail, failures must be "
+                "of kind absent or left"
             )
-        if self.fill_in and self.oriented is None:
-            raise ValueError("fill_in = true: needs oriented, in which order agents decide")
+        if self.fill_in and self.decision_order is None:
+            raise ValueError("fill_in = true: set decision_order, too, in which the agents decide")
         return self
 
     def __repr_args__(self) -> Iterable[tuple[str | None, object]]:
@@ -225,10 +226,12 @@ def build(
             graph = settings.build(agents, named)
         else:
             graph = call_builder(settings.build, title.rpartition(":")[2], agents, named)
-            graph = from_networkx(graph, agents, neighbours=True)
+            graph = from_networkx(graph, agents, neighbors=True)
         graph = _directed(graph, settings, agents)
-        edges, neighbours = (graph.edges, ()) if graph.is_directed() else ((), graph.edges)
-        return Hierarchy(agents, edges, neighbours, settings.told, settings.considers, named)
+        edges, neighbors = (graph.edges, ()) if graph.is_directed() else ((), graph.edges)
+        return Hierarchy(
+            agents, edges, neighbors, settings.communication, settings.lookahead, named
+        )
     except ValueError as error:
         problem = str(error)
         for start in ("hierarchy: ", f"{title}: ", f"topology {title!r}: "):
@@ -251,24 +254,26 @@ def from_file(agents: Names, bodies: Bodies = (), *, path: str) -> nx.DiGraph:
     content = read(path)
     if isinstance(content, TopologySettings):
         return content.build(agents, bodies)
-    return from_networkx(content, agents, neighbours=True)
+    return from_networkx(content, agents, neighbors=True)
 
 
 def _directed(graph: nx.Graph, settings: TopologySettings, agents: Names) -> nx.Graph:
     """Return a graph with its undirected edges oriented, if the settings say how."""
-    order = settings.oriented
+    order = settings.decision_order
     if order is None:
         if settings.kind == "file" and not graph.is_directed():
             raise ValueError(
-                "the graph is undirected: who is above whom? set topology.oriented = 'listed', or "
-                "all names in the order of decision"
+                "the graph is undirected: set topology.decision_order to 'listed', or to all "
+                "names in the order of decision"
             )
         return graph
     if graph.is_directed():
-        raise ValueError(f"oriented = {quote(order)}: the edges are directed already, leave it out")
+        raise ValueError(
+            f"decision_order = {quote(order)}: the graph is directed; leave the key out"
+        )
     names = {"listed": tuple(agents), "reversed": tuple(reversed(agents))}
     listed = names[order] if isinstance(order, str) else order
-    check_names(listed, agents, "oriented")
+    check_names(listed, agents, "decision_order")
     return orient(graph, listed, fill_in=settings.fill_in)
 
 
@@ -289,7 +294,7 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
         raise ValueError(f"{path}: is nested too deeply") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    for key in ("told", "considers", "oriented", "fill_in", "failures"):
+    for key in ("communication", "lookahead", "decision_order", "fill_in", "failures"):
         if key in settings.model_fields_set:
             raise ValueError(f"{path}: {key} must stand in the [topology] table of the spec")
     return settings

@@ -96,7 +96,7 @@ def picture(
     fills = [COLOURS[body_of.get(i, 0) % len(COLOURS)] for i in range(len(hierarchy))]
     _agents(axes, hierarchy, places, fills, failing)
     notes = ["numbers: order of decision"]
-    if hierarchy.neighbours:
+    if hierarchy.neighbors:
         notes = ["lines: neighbours, who decide at the same time"]
     elif bodies and max(map(len, bodies)) > 1:
         notes.append("colours: bodies")
@@ -119,7 +119,7 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
     back below. Neighbours are on a circle, where all lines between them can be seen.
     """
     n = len(hierarchy)
-    if hierarchy.neighbours:
+    if hierarchy.neighbors:
         radius = max(0.9, 1.15 * WIDTH / (2.0 * np.sin(np.pi / max(n, 2))))
         turns = 2.0 * np.pi * np.arange(n) / n
         return radius * np.stack([np.sin(turns), -np.cos(turns)], axis=1)
@@ -129,7 +129,7 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
     bands = np.zeros(n, dtype=int)
     for number, level in enumerate(nx.topological_generations(graph)):
         beside = {i: np.mean(places[list(graph.pred[i]), 1]) if number else 0.0 for i in level}
-        ranked = sorted(level, key=lambda i: (beside[i], -len(hierarchy.below(i)), i))
+        ranked = sorted(level, key=lambda i: (beside[i], -len(hierarchy.searched(i)), i))
         band, column = divmod(number, COLUMNS)
         bands[ranked] = band
         places[ranked, 0] = ACROSS * (COLUMNS - 1 - column if band % 2 else column)
@@ -143,7 +143,7 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
 def _arrows(
     axes: Axes, hierarchy: Hierarchy, places: FloatArray, implied: set[tuple[int, int]]
 ) -> None:
-    for a, b in hierarchy.neighbours:
+    for a, b in hierarchy.neighbors:
         axes.plot(*places[[a, b]].T, color="#444444", linewidth=0.8, zorder=1)
     for edge in hierarchy.edges:
         colour, thickness, order = ("#c4c4c4", 0.6, 1) if edge in implied else ("#444444", 1.0, 2)
@@ -169,10 +169,10 @@ def _style(hierarchy: Hierarchy, edge: tuple[int, int]) -> tuple[str, str]:
     a, b = edge
     return {
         (True, True): ("-", ""),
-        (False, True): ("--", "dashed arrows: considered, not told"),
-        (True, False): (":", "dotted arrows: told, not considered"),
-        (False, False): ("", "heads alone: neither told nor considered"),
-    }[a in hierarchy.above(b), b in hierarchy.below(a)]
+        (False, True): ("--", "dashed arrows: lookahead only"),
+        (True, False): (":", "dotted arrows: communication only"),
+        (False, False): ("", "heads alone: neither communication nor lookahead"),
+    }[a in hierarchy.senders(b), b in hierarchy.searched(a)]
 
 
 def _route(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]:

@@ -54,11 +54,11 @@ class HierarchyView:
 
     @property
     def remarks(self) -> list[str]:
-        """How the two relations are parted, if they are, and what fails, a line each."""
-        both = self.hierarchy.told, self.hierarchy.considers
-        told, considers = (one if isinstance(one, str) else " and ".join(one) for one in both)
-        passed = f"{self.hierarchy.messages:,} messages a step"
-        lines = [f"told: {told}; considers: {considers}; {passed}"]
+        """Communication and lookahead unless they are the defaults, and failures, a line each."""
+        both = self.hierarchy.communication, self.hierarchy.lookahead
+        communication, lookahead = (r if isinstance(r, str) else " and ".join(r) for r in both)
+        passed = f"{self.hierarchy.n_messages:,} messages a step"
+        lines = [f"communication: {communication}; lookahead: {lookahead}; {passed}"]
         parted = both != ("ancestors", "descendants")
         return lines * parted + [f"fails: {failure.text}" for failure in self.failures]
 
@@ -165,32 +165,32 @@ def format_view(view: HierarchyView, form: Form) -> str:
     hierarchy = view.hierarchy
     names = hierarchy.agents
     n = len(hierarchy)
-    below = [[names[j] for j in hierarchy.below(i)] for i in range(n)]
+    below = [[names[j] for j in hierarchy.searched(i)] for i in range(n)]
     if form == "json":
         content = {
             "topology": view.text,
             "agents": names,
             "edges": [(names[a], names[b]) for a, b in hierarchy.edges],
-            "neighbours": [(names[a], names[b]) for a, b in hierarchy.neighbours],
+            "neighbors": [(names[a], names[b]) for a, b in hierarchy.neighbors],
             "order": [names[i] for i in hierarchy.order],
-            "below": dict(zip(names, below, strict=True)),
+            "lookahead": dict(zip(names, below, strict=True)),
             "remarks": view.remarks,
             "depth": hierarchy.depth,
             "joint_actions_per_step": sum(view.tries),
         }
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items())
         return "{" + ",\n ".join(lines) + "}"
-    beside = hierarchy.neighbours
+    beside = hierarchy.neighbors
     pairs = sorted([*hierarchy.edges, *beside, *((b, a) for a, b in beside)])
     under = {i: [names[b] for a, b in pairs if a == i] for i in range(n)}
-    rows = [("", "agent", "below", "tries", "neighbours" if beside else "subordinates")]
+    rows = [("", "agent", "lookahead", "tries", "neighbors" if beside else "subordinates")]
     for rank, i in enumerate(hierarchy.order):
         subordinates = ", ".join(under[i]) or "-"
         tried = format_count(view.tries[i])
         rows.append((str(rank + 1), names[i], str(len(below[i])), tried, subordinates))
     legend = [
-        "In order of decision. below: agents whose actions it tries; tries: joint actions",
-        "a step, if all are tried (exact evaluation; of large teams others try a few).",
+        "In order of decision. lookahead: number of agents that the agent searches over;",
+        "tries: joint actions a step with exhaustive search (large teams try fewer).",
     ]
     return "\n".join([view.title, *view.remarks, "", *align(rows, "><>><"), "", *legend])
 

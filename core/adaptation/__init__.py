@@ -1,1 +1,1 @@
-"""What a team revises beside its values: self-models, constants of predictors, experience."""
+"""Models that a team learns: predictors, self-models and calibrated constants."""

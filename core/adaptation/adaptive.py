@@ -1,4 +1,4 @@
-"""What predicts, and what revises it: the contracts of dynamics models and of what adapts them."""
+"""Interfaces of dynamics models and of models that adapt to experience."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ P = TypeVar("P", bound=Prediction)
 
 
 class DynamicsModel(ABC):
-    """Predicts in place of the scenario, from states alone."""
+    """Predicts from states alone, instead of the scenario."""
 
     @abstractmethod
     def predict(self, states: FloatArray) -> Prediction:
@@ -22,14 +22,14 @@ class DynamicsModel(ABC):
 
 
 class Adaptive(ABC, Generic[P]):
-    """Revises what predictions rest on, by what joint actions did."""
+    """A model that is updated by the outcomes of joint actions."""
 
     @abstractmethod
     def adapt(self, prediction: P, joint_action: IntArray, transition: Transition) -> None:
-        """Hold a prediction against what a joint action ``(n,)`` led to."""
+        """Update the model by a prediction and the outcome of a joint action ``(n,)``."""
 
     def end_episode(self) -> None:
-        """Revise what is revised after an episode."""
+        """Make the updates that follow an episode."""
 
     @abstractmethod
     def arrays(self) -> dict[str, FloatArray]:
@@ -41,4 +41,4 @@ class Adaptive(ABC, Generic[P]):
 
     @abstractmethod
     def continue_from(self, former: Self) -> None:
-        """Go on from what another one has learned, if it is of the same; else begin anew."""
+        """Start from another model's state if both describe the same bodies."""

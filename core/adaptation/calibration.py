@@ -1,19 +1,17 @@
-"""What a team learns of what it pushes, from how that was seen to move.
+"""Calibration: Kalman estimates of a predictor's constants while bodies push.
 
-*Calibration* estimates the constants of a team's predictor while bodies push.
-
-Positive constants are known up to factors, whose logarithms x are estimated by a Kalman filter;
-0 is what was believed at first. What a decision led to is a vector of speeds z = h(x) + noise, h
-being the prediction. It has kinks where contacts stick or slip, so it is linearised statistically,
-over the whole of what is thought possible (cubature rule: Arasaratnam & Haykin 2009). With
-x = m + L u, L L' = P, and z+, z- predicted at u = +-sqrt(n) e_j::
+Positive constants are known up to factors. A Kalman filter estimates the logarithms x of these
+factors; x = 0 is the prior. The outcome of a decision is a vector of speeds z = h(x) + noise, where
+h is the prediction. Since h has kinks where contacts stick or slip, it is linearized statistically
+over the whole distribution of x (cubature rule: Arasaratnam & Haykin 2009). With x = m + L u,
+L L' = P, and z+, z- predicted at u = +-sqrt(n) e_j::
 
     G_j = (z+_j - z-_j) / (2 sqrt(n)),   N = variance of (z+_j + z-_j) / 2 + noise^2
     P <- L (I + G' W / N G)^-1 L',       m <- m + L (I + G' W / N G)^-1 G' W / N (z - mean z)
 
-N holds what is not linear, too. The weight W of a body falls below 1 when it did what the filter
-does not believe possible: a jam, a wheel that fails, a body that gets in the way. Of such a
-decision little is learned. What drifts is added to P, so that it never falls to nothing.
+N includes the nonlinear part. The weight W of a body falls below 1 when its motion is improbable
+under the filter, as after a jam, a failed wheel or a collision; the filter then learns little. A
+drift is added to P, which therefore never vanishes.
 """
 
 from __future__ import annotations
@@ -30,23 +28,23 @@ from .adaptive import Adaptive
 
 
 class CalibrationSettings(Settings):
-    """Whether and how fast a team revises the constants of its predictor."""
+    """Whether and how fast a team adapts the constants of its predictor."""
 
     enabled: bool = False
-    """Whether constants are revised; otherwise they stay as the scenario believes them to be."""
+    """Whether constants adapt; otherwise the scenario's constants are used."""
     prior: Positive = 0.7
-    """Standard deviation of the logarithm of a constant at first: 0.7 is a factor of 2."""
+    """Prior standard deviation of the logarithm of a constant: 0.7 is a factor of 2."""
     noise: Positive = 0.008
     """Standard deviation of a measured speed around the predicted one [m/s]."""
     surprise: Positive = 4.0
-    """Mean squared innovation of a body, in units of the expected square, above which it counts
-    less."""
+    """Mean squared innovation of a body, in units of its expected square, above which the body has
+    less weight."""
     drift: NonNegative = 0.003
-    """What is added to the standard deviation (as squares) by every decision that pushes."""
+    """Standard deviation of the drift per decision that pushes; variances add."""
 
 
 class Calibration(Adaptive[EmbodiedPrediction]):
-    """Estimates the logarithms of ``n`` constants, in units of what was believed at first.
+    """Estimates the logarithms of ``n`` constants relative to their priors.
 
     Parameters
     ----------
@@ -55,12 +53,11 @@ class Calibration(Adaptive[EmbodiedPrediction]):
     n
         Number of constants.
     levers
-        ``(B,)`` speed per turning rate of each body that is measured [m].
+        ``(B,)`` speed per turning rate of each measured body [m].
 
     Examples
     --------
-    A box that moves at half the speed per constant: measured is what a constant 1.5 times as large
-    as believed would give.
+    A box moves in proportion to one constant, which is 1.5 times as large as its prior.
 
     >>> calibration = Calibration(CalibrationSettings(enabled=True), 1, np.array([0.1]))
     >>> for _ in range(20):
@@ -80,7 +77,7 @@ class Calibration(Adaptive[EmbodiedPrediction]):
 
     @classmethod
     def of(cls, settings: CalibrationSettings, scenario: Scenario) -> Calibration | None:
-        """Return that of a scenario's predictor, none if it is not enabled.
+        """Return the calibration of a scenario's predictor, None if it is not enabled.
 
         Raises
         ------
@@ -100,7 +97,7 @@ class Calibration(Adaptive[EmbodiedPrediction]):
     def adapt(
         self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
     ) -> None:
-        """Hold the constants against how what bodies push moved by a joint action, if it did."""
+        """Update the constants if a pushed object moved."""
         twists = transition.twists
         n_bodies = len(prediction.groups)
         if twists is not None and twists[:-n_bodies].any():
@@ -108,12 +105,12 @@ class Calibration(Adaptive[EmbodiedPrediction]):
 
     @property
     def points(self) -> FloatArray:
-        """Constants ``(2 n, n)`` whose outcomes are to be predicted: m + L u, then m - L u."""
+        """Sigma points ``(2 n, n)`` at which outcomes are predicted: m + L u, then m - L u."""
         spread = np.sqrt(len(self.constants)) * self._root.T
         return self.constants + np.concatenate([spread, -spread])
 
     def observe(self, measured: FloatArray, predicted: FloatArray) -> None:
-        """Take in the twists ``(B, 3)`` of all bodies against those ``(2 n, B, 3)`` predicted."""
+        """Update by measured twists ``(B, 3)`` of all bodies and predicted ones ``(2 n, B, 3)``."""
         n = len(self.constants)
         settings = self.settings
         plus = self._units * predicted[:n]
@@ -133,7 +130,7 @@ class Calibration(Adaptive[EmbodiedPrediction]):
         root = self._root
         self.constants += root @ (posterior @ (weighted @ innovation.ravel()))
         covariance = root @ posterior @ root.T
-        # Nothing becomes less certain than it was at first.
+        # No constant becomes less certain than its prior.
         known = np.diagonal(covariance) + settings.drift**2 < settings.prior**2
         self._covariance = 0.5 * (covariance + covariance.T) + np.diag(known * settings.drift**2)
         self._root = np.linalg.cholesky(self._covariance)
@@ -149,6 +146,6 @@ class Calibration(Adaptive[EmbodiedPrediction]):
         self._root = np.linalg.cholesky(self._covariance)
 
     def continue_from(self, former: Calibration) -> None:
-        """Go on from what another one has learned, if it measures bodies alike; else anew."""
+        """Start from another calibration if it measures the same kind of bodies."""
         if np.array_equal(self._units, former._units):
             self.restore(former.arrays())

@@ -1,4 +1,4 @@
-"""What agents predict by: the scenario's own predictor, revised or not, or one in its place."""
+"""The predictor of a team: the scenario's own, adapted or not, or a learned one."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from .self_model import SelfModel, SelfModelSettings
 
 
 class Foresight:
-    """Predicts, and revises what its predictions rest on.
+    """Predicts for a team, and adapts its models.
 
     Parameters
     ----------
     predictor, self_model, calibration
-        Settings of what predicts, and of what revises the scenario's own predictions.
+        Settings of the predictor, and of the models that adapt the scenario's own predictor.
     scenario
-        What is predicted.
+        The scenario to predict.
 
     Attributes
     ----------
     predictor
-        What predicts in place of the scenario; none: the scenario does.
+        Dynamics model used instead of the scenario's predictor, or None.
     self_model
-        What the wheels do, as learned; none: prediction takes every body as nominal.
+        Learned effects of the wheels; None: nominal effects.
     calibration
-        The predictor's constants, as learned; none: as the scenario believes them to be.
+        Learned constants of the predictor; None: the scenario's constants.
     adaptive
-        Those of the three that revise themselves, by name.
+        Those of the three models that adapt, by name.
 
     Raises
     ------
     ValueError
-        If what is to be revised is not there, or is not what predicts; one line.
+        If a model is to adapt that the scenario lacks or that another predictor replaces.
     """
 
     def __init__(
@@ -58,8 +58,8 @@ class Foresight:
             revised = {"self_model": self_model.enabled, "calibration": calibration.enabled}
             for name in (name for name, enabled in revised.items() if enabled):
                 raise ValueError(
-                    f"learner.{name}.enabled: revises what the scenario predicts, and {named} "
-                    "predicts in its place; use 'given'"
+                    f"learner.{name}.enabled: adapts the predictor of the scenario, but {named} "
+                    "replaces it; use 'given'"
                 )
             self.predictor = predictor.build(scenario)
         parts = {
@@ -72,14 +72,14 @@ class Foresight:
         }
 
     def predict(self, seen: Observation, errors: FloatArray | None = None) -> Prediction | None:
-        """Return the prediction from where agents are; None where nothing is predicted.
+        """Return the prediction from the present states; None if the scenario predicts nothing.
 
         Parameters
         ----------
         seen
-            Where they are.
+            Present observation.
         errors
-            ``(c,)`` added to the logarithms of the predictor's constants; none: it has no errors.
+            ``(c,)`` errors of the logarithms of the predictor's constants, or None.
         """
         if seen.imagined is not None:
             return seen.imagined
@@ -99,17 +99,17 @@ class Foresight:
         return bodies.predict_with(effects, constants)
 
     def learn(self, experience: Experience, prediction: Prediction | None) -> None:
-        """Revise what a prediction rested on."""
+        """Adapt the models by the outcome of a decision."""
         joint_action = experience.decision.joint_action
         for part in self.adaptive.values():
             part.adapt(prediction, joint_action, experience.transition)
 
     def end_episode(self) -> None:
-        """Revise what is revised after an episode."""
+        """Make the updates that follow an episode."""
         for part in self.adaptive.values():
             part.end_episode()
 
     def continue_from(self, former: Foresight) -> None:
-        """Go on from what another one has learned."""
+        """Start from the models of another team."""
         for name in self.adaptive.keys() & former.adaptive.keys():
             self.adaptive[name].continue_from(former.adaptive[name])

@@ -1,4 +1,4 @@
-"""Predictions of a learned predictor: one situation, and many joint actions at once."""
+"""Predictions of a learned predictor from one situation."""
 
 from functools import cached_property
 from typing import Any
@@ -15,14 +15,14 @@ class LearnedPrediction(Prediction):
     Parameters
     ----------
     predictor
-        What has been learned, a `LearnedPredictor`.
+        A `LearnedPredictor`.
     present
-        ``(n, d)`` the states of all agents.
+        ``(n, d)`` present states of all agents.
 
     Attributes
     ----------
     alike
-        ``(G, L)`` the first robot-action index that comes to the same, of groups of equal size.
+        ``(G, L)`` first equivalent robot-action index; None if groups differ in size.
     """
 
     def __init__(self, predictor: Any, present: FloatArray) -> None:
@@ -42,7 +42,7 @@ class LearnedPrediction(Prediction):
 
     @cached_property
     def alike(self) -> IntArray | None:
-        """The first robot-action index that comes to the same, see `Prediction`."""
+        """The first equivalent robot-action index, see `Prediction`."""
         return self._first
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -62,7 +62,7 @@ class LearnedPrediction(Prediction):
 
 
 class TabulatedPrediction(LearnedPrediction, Tables):
-    """The same of few agents, with tables of all their joint actions."""
+    """A learned prediction of few agents, with tables of all joint actions."""
 
     @cached_property
     def _table(self) -> tuple[FloatArray, IntArray]:

@@ -1,16 +1,17 @@
-"""A predictor that is learned online, from nothing, by regression on states and actions alone.
+"""A predictor learned online, without prior knowledge, from states and actions alone.
 
-Bodies are taken to be *driven*: nothing changes unless somebody does something. What an agent does
-is seen in its own variables (the speed of its wheel): these are regressed first, on the own
-variables before, by action. Own variables reached, in units of their limits, are the drivers of the
-agent's body; without own variables every action is a driver, and a constant. How the drivers move
-all other variables is regressed on the rules of a fuzzy rule base, see `driven`: changes and values
-both, and of each variable that is taken which leaves the smaller residual. Angles always change.
+Bodies are assumed to be *driven*: nothing changes unless an agent acts. The effect of an action
+appears in the agent's own variables (the speed of its wheel). These are regressed first, by action,
+on their previous values. The predicted own variables, in units of their limits, are the drivers of
+the agent's body. Without own variables, every action is a driver, and so is a constant. The effect
+of the drivers on all other variables is regressed on the rules of a fuzzy rule base (see
+`driven_states`), for changes and for values; each variable uses the one with the smaller residual.
+Angles always use changes.
 
-Bodies alike share weights: what each does to itself, and what to any other. Both regressions are
-ridge regressions (Hoerl and Kennard 1970) on sums over all experience, so that memory and time do
-not grow. What is predicted does not leave the range that has been seen, and several decisions ahead
-what agents do in the first is held.
+Bodies of one kind share weights: one set for the effect on itself, one for the effect on others.
+Both are ridge regressions (Hoerl and Kennard 1970) on sums over all experience, so that memory and
+time do not grow. Predictions stay within the observed range. Over several decisions, the first
+joint action is held.
 """
 
 from __future__ import annotations
@@ -21,42 +22,42 @@ import numpy as np
 
 from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
-from ..rules.kernels.fuzzy import Partition
-from ..rules.rule_base import RuleBase
+from ..values.partitions import Partition
+from ..values.rule_base import RuleBase
 from .adaptive import Adaptive, DynamicsModel
 from .learned_prediction import LearnedPrediction, TabulatedPrediction
 from .predictors import DrivenBodies, LearnedPredictorSettings, Mirror, driven_states
 
 INTERVAL = 100
-"""Decisions of an episode after which is regressed without waiting for its end."""
-MOST_FEATURES = 4096
-"""Of one regression: more take too long to be solved densely."""
-MOST_TABULATED = 4**6
-"""Joint actions up to which a prediction has tables of all."""
-STEADY = 1e-6
-"""Ridge of own variables: what has been seen of them is believed at once."""
-PASSES = 3
-"""How often a prediction by the middle of the way is computed, which follows from it in turn."""
+"""Number of decisions between regressions within an episode."""
+MAX_FEATURES = 4096
+"""Maximum number of features of a regression that is solved densely."""
+MAX_TABULATED = 4**6
+"""Maximum number of joint actions of which predictions have tables."""
+OWN_RIDGE = 1e-6
+"""Ridge of own variables, small since they are observed without noise."""
+MIDPOINT_ITERATIONS = 3
+"""Number of fixed-point iterations of a midpoint prediction."""
 GRAIN = 1e-3
-"""Own variables that differ by less than this, in units of their range, are the same."""
+"""Own variables are rounded to this share of their range, so that equal outcomes are found."""
 
 
 class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
-    """Regresses what agents' actions lead to; see the module.
+    """Learns the outcome of actions by regression; see the module.
 
     Parameters
     ----------
     settings
-        How far it looks, and how it regresses.
+        Horizon and regression.
     scenario
-        What is predicted. Known of it are agents, bodies, roles, state variables, how many actions
-        there are, and what a mirror does.
+        The scenario to predict. The predictor uses its agents, bodies, roles, state variables,
+        number of actions and mirror symmetry.
 
     Raises
     ------
     ValueError
-        If there are no variables that agents share, there are too many features, or the experience
-        of a mirror is wanted and there is none; one line.
+        If there are no shared variables, too many features, or no mirror symmetry although
+        mirrored experience is wanted.
     """
 
     def __init__(self, settings: LearnedPredictorSettings, scenario: Scenario) -> None:
@@ -72,14 +73,14 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
             raise ValueError("learner.predictor.mirrored: without own variables there is no mirror")
         mirrored = settings.mirrored
         if mirrored is None:
-            # What an action is in the mirror is not known, only what own variables are.
+            # The mirror image of an action is unknown, that of an own variable is known.
             mirrored = space.n_own > 0 and scenario.partners() is not None
         self.mirror = Mirror.of(scenario) if mirrored else None
         self.bodies = DrivenBodies(
             scenario, products=settings.products, memberships=settings.memberships
         )
         self.kinds = rows_of(scenario, np.arange(len(scenario.agents)), shared=True)
-        """``(n,)`` agents of one kind have own variables that change alike."""
+        """``(n,)`` kind of every agent; agents of one kind share the model of own variables."""
         own = [Partition.of(variable) for variable in space.own]
         self.own_rules = RuleBase(own, [(j,) for j in range(len(own))]) if own else None
         low, high = np.array([(v.low, v.high) for v in space.variables]).T
@@ -92,10 +93,10 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         v = len(self.bodies.common)
         k = w * (space.n_own or self.n_actions + 1)
         rules = self.bodies.rules.n_rules
-        if k * rules * min(b, 2) > MOST_FEATURES:
+        if k * rules * min(b, 2) > MAX_FEATURES:
             raise ValueError(
                 f"learner.predictor: {k * rules * min(b, 2)} features to regress on, allowed "
-                f"{MOST_FEATURES}; take fewer products or memberships"
+                f"{MAX_FEATURES}; take fewer products or memberships"
             )
         r = self.own_rules.n_rules if self.own_rules else 0
         of_own = (self.kinds.max() + 1, self.n_actions, r)
@@ -111,10 +112,10 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
             "keep": np.ones(v),
             "seen": np.where(self.periods > 0.0, [low, high], [[np.inf], [-np.inf]]),
         }
-        """Sums over all experience and what follows from them: all that is remembered."""
+        """Sums over all experience, and the weights computed from them."""
 
     def _tabulate(self) -> None:
-        """Write out the actions of a group, and of all agents if they are few."""
+        """Tabulate the joint actions of a group, and of all agents if there are few."""
         a = self.n_actions
         n = len(self.kinds)
         sizes = {len(group) for group in self.groups}
@@ -124,7 +125,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         if len(sizes) == 1:
             (w,) = sizes
             self.digits = np.indices((a,) * w).reshape(w, -1).T
-            if a**n <= MOST_TABULATED:
+            if a**n <= MAX_TABULATED:
                 self.joint = np.indices((a,) * n).reshape(n, -1).T
                 self.divisors = a ** np.arange(n - w, -1, -w)
                 self.local = np.arange(a**n)[:, None] // self.divisors % a**w
@@ -136,11 +137,11 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
     def adapt(
         self, prediction: LearnedPrediction, joint_action: IntArray, transition: Transition
     ) -> None:
-        """Note what a joint action led to from the states of a prediction, as `observe`."""
+        """Observe the outcome of a joint action from the states of a prediction."""
         self.observe(prediction.present, joint_action, transition.states)
 
     def observe(self, before: FloatArray, joint_action: IntArray, after: FloatArray) -> None:
-        """Take in what a joint action ``(n,)`` made of states ``(n, d)``."""
+        """Record a joint action ``(n,)``, the states ``(n, d)`` before it and those after it."""
         self._pending.append((before.copy(), joint_action.copy(), after.copy()))
         if len(self._pending) == INTERVAL:
             self.end_episode()
@@ -173,7 +174,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         at = np.tile(self.kinds, len(before)), joint.ravel()
         np.add.at(m["own_gram"], at, phi[:, :, None] * phi[:, None])
         np.add.at(m["own_moment"], at, phi[:, :, None] * change[:, None])
-        gram = m["own_gram"] + STEADY * np.eye(phi.shape[1])
+        gram = m["own_gram"] + OWN_RIDGE * np.eye(phi.shape[1])
         m["own_weights"] = np.linalg.solve(gram, m["own_moment"])
 
     def _regress(self, before: FloatArray, joint: IntArray, after: FloatArray) -> None:
@@ -205,9 +206,9 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         m["keep"] = np.where(by_value, 0.0, 1.0)
 
     def _solved(self, common: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the weights ``(f, 2 v)`` of own features and of others', and what they explain.
+        """Return weights ``(f, 2 v)`` of own and of other bodies' features, and explained squares.
 
-        Of all variables, by change and by value; what they explain is a part of the ``squares``.
+        The columns are the changes of all variables, then their values.
         """
         each, of_all, rest = self.memory["gram"]
         moment, summed = self.memory["moment"]
@@ -229,7 +230,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         return own, others, explained
 
     def _ridge(self, gram: FloatArray, moment: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the weights of ridge regression, and what they explain of the squares."""
+        """Return the weights of a ridge regression, and the sum of squares that they explain."""
         from scipy.linalg import cho_factor, cho_solve
 
         ridge = self.settings.ridge
@@ -238,7 +239,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         return weights, (weights * moment).sum(axis=0) + ridge * (weights**2).sum(axis=0)
 
     def drivers(self, own: FloatArray, joint_actions: IntArray) -> FloatArray:
-        """Return the drivers ``(m, b, k)``: own variables reached ``(m, n, n_own)``, or actions."""
+        """Return the drivers ``(m, b, k)``: next own variables ``(m, n, n_own)``, or actions."""
         if self.own_rules is not None:
             each = own / self.limits
         else:
@@ -248,7 +249,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         return each[:, members].reshape(len(each), len(members), -1)
 
     def reached(self, states: FloatArray) -> FloatArray:
-        """Return the own variables ``(n, A, n_own)`` that every action leads to."""
+        """Return the next own variables ``(n, A, n_own)`` for every action."""
         own = states[:, None, : self.space.n_own]
         if self.own_rules is None:
             return np.repeat(own, self.n_actions, axis=1)
@@ -257,16 +258,16 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         return np.round((own + change) / self.grains) * self.grains
 
     def after(self, states: FloatArray, drivers: FloatArray) -> FloatArray:
-        """Return the shared variables ``(G, m, s)`` that drivers ``(m, b, k)`` lead to."""
+        """Return the next shared variables ``(G, m, s)`` for drivers ``(m, b, k)``."""
         bodies = self.bodies
         m = self.memory
         columns = bodies.columns[0]
         present = states[bodies.agents, bodies.columns]
         ranges = np.ascontiguousarray(m["seen"][:, columns])
-        # Before anything is learned the present is all that has been seen.
+        # Before the first regression, only the present has been observed.
         ranges[0] = np.minimum(ranges[0], present.min(axis=0))
         ranges[1] = np.maximum(ranges[1], present.max(axis=0))
-        passes = PASSES if self.settings.midpoint else 1
+        passes = MIDPOINT_ITERATIONS if self.settings.midpoint else 1
         moved = driven_states(
             present,
             np.ascontiguousarray(drivers),
@@ -282,7 +283,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         return np.ascontiguousarray(np.moveaxis(moved[:, body, place], 0, 1))
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Return sums over all experience, and the weights that follow from them."""
+        """Return sums over all experience, and the weights computed from them."""
         return self.memory
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
@@ -290,13 +291,13 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         self.memory = {name: np.array(arrays[name]) for name in self.memory}
 
     def continue_from(self, former: LearnedPredictor) -> None:
-        """Go on from what another one has learned, if its bodies are built alike; else anew."""
+        """Start from another predictor if its bodies have the same variables."""
         theirs = former.memory
         if all(theirs[name].shape == array.shape for name, array in self.memory.items()):
             self.restore(theirs)
 
     def _apart(self, states: FloatArray, others: FloatArray) -> FloatArray:
-        """Return the change of states ``(..., d)``, of periodic variables the shorter way round."""
+        """Return differences of states ``(..., d)``; those of periodic variables are wrapped."""
         change = states - others
         turns = np.round(change / np.where(self.periods > 0.0, self.periods, np.inf))
         return change - self.periods * turns

@@ -1,14 +1,13 @@
-"""Settings of predictors, ``[learner] predictor`` of a spec, and what learned predictors rest on.
+"""Settings of predictors (``[learner] predictor`` of a spec), mirror symmetry, and driven bodies.
 
-Mirrored experience is what the image of a team would have met in the mirror image of its world. An
-agent that learns which way to turn with the goal on the left has learned it for the right, too, if
-it is told that the two are mirror images. In a mirror every agent stands where its partner stood
-(the left wheel of a robot where the right one was), some state variables change their sign, and
-rewards stay. So a step is two steps of experience, to learners that regress on after-states.
+Mirrored experience is that of the mirror image of a team. An agent that learns which way to turn
+with the goal on the left then learns it for the right, too. In the mirror image every agent takes
+the place of its partner (the left wheel of a robot that of the right one), some state variables
+change sign, and rewards stay the same. A step thus gives two steps of experience to learners that
+regress on after-states.
 
-Bodies are driven: how much a driver moves what is a function of the present state of its body: a
-sum over the active rules of a rule base. It moves the variables of its own body and those of all
-others::
+Bodies are driven: the effect of a driver is a function of the present state of its body, given by a
+rule base. A driver moves the variables of its own body and those of all others::
 
     x_b(t + 1) = keep * x_b(t) + sum_k d_bk W_k phi(x_b(t)) + sum_(j != b, k) d_jk V_k phi(x_j(t))
 """
@@ -25,46 +24,47 @@ from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray, IntArray, njit
 from ..plugins.settings import PartSettings, Positive, unwritten
-from ..rules.kernels.compact_states import active_compact
-from ..rules.kernels.fuzzy import Packed, Partition
-from ..rules.rule_base import RuleBase
+from ..values.partitions import Partition
+from ..values.rule_base import RuleBase
+from ..values.triangular import Layout, active_rules
 from .adaptive import DynamicsModel
 
 
 class GivenPredictor(PartSettings):
-    """What the scenario itself predicts."""
+    """The predictor of the scenario."""
 
     kind: Literal["given"] = "given"
 
 
 class StaticPredictor(PartSettings):
-    """Persistence: whatever is done, nothing changes. The baseline of every other predictor."""
+    """Persistence: nothing changes, whatever the action. The baseline of all predictors."""
 
     kind: Literal["static"] = "static"
     factory: ClassVar[str] = f"{__name__}:Persistence"
 
 
 class LearnedPredictorSettings(PartSettings):
-    """What is regressed from experience, online and from nothing: no model is given."""
+    """A model learned online from experience, without prior knowledge."""
 
     kind: Literal["learned"] = "learned"
     factory: ClassVar[str] = f"{__package__}.learned_predictor:LearnedPredictor"
     horizon: Annotated[int, Field(ge=1, le=50)] | None = None
-    """Decisions that it looks ahead, what agents do in the first being held; none: as many as the
-    scenario's own predictions do, 1 without such."""
+    """Number of decisions to predict; the first joint action is held. With none, that of the
+    scenario's own predictor, or 1 if it has none."""
     ridge: Positive = 10.0
-    """Weight of the squared weights against the squared errors."""
+    """Penalty on squared weights, relative to squared errors."""
     products: Literal["none", "private", "all"] = "private"
-    """Pairs of which variables of a body say, beside each alone, what an agent moves: of none, of
-    those that are its own to the body, or of the ``common`` ones, too."""
+    """Pairs of variables used as features, in addition to single variables: none, pairs of a body's
+    private variables, or all pairs including ``common`` variables."""
     memberships: Annotated[int, Field(ge=2, le=15)] | None = None
-    """Membership functions per variable, spread evenly; none: the state space's own centres."""
+    """Number of evenly spread membership functions per variable; with none, the centres of the
+    state space."""
     midpoint: Annotated[bool, unwritten(False)] = False
-    """Whether what moves what is taken from the middle of the way of a decision, where motion
-    changes what moves what, and not from its beginning."""
+    """Whether effects are evaluated at the midpoint of a decision instead of its beginning, for
+    bodies whose motion changes them."""
     mirrored: bool | None = None
-    """Whether what the mirror image of the team would have met is experience as well; none: if the
-    scenario tells what a mirror does."""
+    """Whether to learn from the mirror image of every step, too. With none, if the scenario
+    declares a mirror symmetry."""
 
 
 Predictor = Annotated[
@@ -85,7 +85,7 @@ class Persistence(DynamicsModel):
 
 
 class StaticPrediction(Prediction):
-    """The present states ``(n, d)``, whatever is done."""
+    """The present states ``(n, d)``, whatever the joint action."""
 
     def __init__(self, present: FloatArray) -> None:
         self._present = present
@@ -96,14 +96,14 @@ class StaticPrediction(Prediction):
 
 
 class Mirror:
-    """Doubles experience: agents, and behind them their mirror images.
+    """Doubles experience: agents, followed by their mirror images.
 
     Parameters
     ----------
     signs
-        ``(d,)`` -1 where a mirror turns the sign of a state variable, else 1.
+        ``(d,)`` -1 for state variables that change sign in a mirror, else 1.
     partners
-        ``(n,)`` the agent whose place each agent takes.
+        ``(n,)`` partner of every agent, whose place it takes.
 
     Examples
     --------
@@ -125,11 +125,11 @@ class Mirror:
         Raises
         ------
         ValueError
-            If it has none, or a state variable does not say what a mirror does to it; one line.
+            If it has none, or a state variable does not declare its mirror image.
         """
         partners = scenario.partners()
         if partners is None:
-            raise ValueError("learner.mirrored: the scenario does not tell what a mirror does")
+            raise ValueError("learner.mirrored: the scenario declares no mirror symmetry")
         variables = scenario.state_space.variables
         for variable in variables:
             if variable.mirrored is None:
@@ -141,48 +141,48 @@ class Mirror:
         return cls(np.array(signs), np.array(partners))
 
     def rows(self, rows: IntArray) -> IntArray:
-        """Return the rows of weights ``(2 n,)`` of agents and images, of those ``(n,)`` of agents.
+        """Return the rows of weights ``(2 n,)`` of agents and images, given ``(n,)`` of agents.
 
-        The image of an agent has learned for its partner, in whose place it stands.
+        The image of an agent has the weights of its partner.
         """
         return np.concatenate([rows, rows[self.partners]])
 
     def states(self, states: FloatArray) -> FloatArray:
-        """Return the states ``(2 n, d)`` of agents and images, of those ``(n, d)`` of agents."""
+        """Return states ``(2 n, d)`` of agents and images, given those ``(n, d)`` of agents."""
         return np.concatenate([states, self.signs * states])
 
     def reward(self, reward: float | FloatArray) -> float | FloatArray:
-        """Return what agents and images are paid: the same."""
+        """Return the rewards of agents and images, which are equal."""
         return np.tile(reward, 2) if isinstance(reward, np.ndarray) else reward
 
 
 class DrivenBodies:
-    """Which variables there are to predict, by body, and who drives them.
+    """Predicted variables and driving agents of every body.
 
-    Bodies alike, in the roles of their agents, have the shared variables of their group each.
-    Unlike ones count as one body, which has those of all groups, the common ones once.
+    If all bodies have agents of the same roles, each has the shared variables of its group. Bodies
+    of different kinds count as one body with the variables of all groups, common ones once.
 
     Parameters
     ----------
     scenario
-        Whose bodies they are.
+        The scenario with the bodies.
     products
-        Pairs of which variables rules are over, see `LearnedPredictorSettings`.
+        Pairs of variables with rules of their own, see `LearnedPredictorSettings`.
     memberships
-        Membership functions per variable; none: the state space's own centres.
+        Membership functions per variable; None: the centres of the state space.
 
     Attributes
     ----------
     members
         ``(b, w)`` the agents of each body.
     agents, columns
-        ``(b, v)`` each variable of a body is this column of this agent's state.
+        ``(b, v)`` agent and column of its state for every variable of a body.
     places
-        ``(2, G, s)`` each shared variable of a group is of this body this variable.
+        ``(2, G, s)`` body, and variable of the body, for every shared variable of a group.
     common
-        ``(v,)`` whether a variable is the same for all of several bodies.
+        ``(v,)`` whether a variable is common to several bodies.
     rules
-        The rule base over the variables of a body: single ones, and pairs of one group's.
+        The rule base over single variables of a body and over pairs of one group's variables.
     """
 
     def __init__(self, scenario: Scenario, *, products: str, memberships: int | None) -> None:
@@ -225,44 +225,44 @@ def driven_states(
     periods: FloatArray,
     horizon: int,
     passes: int,
-    packed: Packed,
+    layout: Layout,
 ) -> FloatArray:
-    """Return the states ``(m, b, v)`` of bodies some decisions ahead, the drivers being held.
+    """Return the states ``(m, b, v)`` of bodies after some decisions, with constant drivers.
 
     Parameters
     ----------
     present
-        ``(b, v)`` where they begin.
+        ``(b, v)`` initial states.
     drivers
         ``(m, b, k)`` of every joint action and body.
     weights
         ``(k, n_rules, 2 v)`` by driver, W of the body's own variables, then V of the others'.
     keep
-        ``(v,)`` 1 for variables whose change is regressed, 0 for those whose value is.
+        ``(v,)`` 1 for variables predicted by their change, 0 for those predicted by their value.
     ranges, periods
-        ``(2, v)`` what variables cannot leave; ``(v,)`` their periods, 0 where there is none.
+        ``(2, v)`` bounds of the variables, and ``(v,)`` their periods, 0 for linear variables.
     horizon
-        Decisions ahead.
+        Number of decisions.
     passes
-        How often each is computed: by the rules of where it begins, then of the middle of the way.
-    packed
+        Evaluations per decision: at the initial state, then at midpoints.
+    layout
         Layout of the rule base.
     """
     m, b, k = drivers.shape
     v = present.shape[1]
-    begun = np.empty((m * b, v))
+    initial = np.empty((m * b, v))
     moved = np.empty((b, 2 * v))
     for at in range(m * b):
         for x in range(v):
-            begun[at, x] = present[at % b, x]
-    middle = begun.copy()
-    states = begun.copy()
+            initial[at, x] = present[at % b, x]
+    middle = initial.copy()
+    states = initial.copy()
     for ahead in range(horizon * passes):
         if ahead % passes == 0:
             for at in range(m * b):
                 for x in range(v):
-                    begun[at, x] = middle[at, x] = states[at, x]
-        rules, strengths = active_compact(middle, packed)
+                    initial[at, x] = middle[at, x] = states[at, x]
+        rules, strengths = active_rules(middle, layout)
         for c in range(m):
             moved[:] = 0.0
             for i in range(b):
@@ -282,9 +282,9 @@ def driven_states(
                     others += moved[i, v + x]
                 for i in range(b):
                     at = c * b + i
-                    value = keep[x] * begun[at, x]
+                    value = keep[x] * initial[at, x]
                     value += moved[i, x] + (others - moved[i, v + x])
-                    middle[at, x] = 0.5 * (begun[at, x] + value)
+                    middle[at, x] = 0.5 * (initial[at, x] + value)
                     if periods[x] > 0.0:
                         value -= periods[x] * np.floor((value - ranges[0, x]) / periods[x])
                         turns = np.floor((middle[at, x] - ranges[0, x]) / periods[x])

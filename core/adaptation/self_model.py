@@ -1,20 +1,18 @@
-"""What bodies learn of themselves, from how they were seen to move.
+"""Self-models: Kalman estimates of the effect of every wheel on the motion of its body.
 
-A *self-model* says what each wheel of a body does to its motion. The twist of a body in its own
-frame is taken as linear in its commanded wheel speeds::
+The twist of a body in its own frame is modeled as linear in its commanded wheel speeds::
 
     twist = effect @ [u_1, ..., u_w, 1] + noise
 
 For each of its three components a Kalman filter tracks the row of the ``(3, w + 1)`` effect,
-starting from the nominal geometry. When an innovation is larger than the filter believes possible,
-its covariance is inflated: something has changed, so old experience counts less. The effect feeds
-the predictor; this is how a team learns that a wheel has failed.
+starting from the nominal geometry. When an innovation is improbably large, something has changed:
+the covariance is inflated, so that old experience counts less. The predictor uses the effect; this
+is how a team learns that a wheel has failed.
 
-Wheels that pull against each other skid, and a twist is then not linear in their speeds. The
-filter takes what is left over for a change and goes after it, surer of it than it should be. So it
-keeps count of how large its innovations have been, in units of what it expected: its own
-covariance, which decides how fast it learns, stays as it is; the deviations that it reports are
-multiplied by that ratio (Birge 1932).
+Wheels that pull against each other skid, and the twist is then not linear in their speeds. The
+filter treats the residual as a change and becomes overconfident. It therefore records the size of
+its innovations in units of their expected size. Its covariance, which sets the learning rate, is
+unaffected; the reported standard deviations are multiplied by this ratio (Birge 1932).
 """
 
 from __future__ import annotations
@@ -30,14 +28,14 @@ from ..plugins.settings import Positive, Settings
 from .adaptive import Adaptive
 
 MEMORY = 100
-"""Decisions over which the size of innovations is averaged."""
+"""Number of decisions over which the size of innovations is averaged."""
 
 
 class SelfModelSettings(Settings):
-    """Whether and how fast a body revises what it believes its wheels to do."""
+    """Whether and how fast a body adapts the estimated effects of its wheels."""
 
     enabled: bool = False
-    """Whether bodies learn it; otherwise prediction takes every body as nominal."""
+    """Whether effects adapt; otherwise predictions use the nominal geometry."""
     prior_effect: Positive = 0.3
     """Standard deviation of a wheel's effect around the nominal one [m/s per m/s]."""
     prior_constant: Positive = 0.003
@@ -45,9 +43,9 @@ class SelfModelSettings(Settings):
     noise: Positive = 0.004
     """Standard deviation of a measured speed around the model's [m/s]."""
     surprise: Positive = 9.0
-    """Squared innovation, in units of its expected square, from which on a change is assumed."""
+    """Squared innovation, in units of its expected square, above which a change is assumed."""
     inflation: Positive = 1.0
-    """Share of the prior covariance that is added then."""
+    """Share of the prior covariance that is added at a change."""
 
 
 class SelfModel(Adaptive[EmbodiedPrediction]):
@@ -63,7 +61,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
 
     Examples
     --------
-    A cart with one wheel, which turns out to be seized.
+    A cart whose only wheel is seized.
 
     >>> nominal = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
     >>> model = SelfModel(SelfModelSettings(enabled=True), [nominal])
@@ -77,7 +75,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
         self._settings = settings
         self._nominal = [np.array(effect, dtype=float) for effect in nominal]
         self.effects = tuple(effect.copy() for effect in self._nominal)
-        """Per body the ``(3, w + 1)`` effect of its wheels, as learned so far."""
+        """By body, the estimated ``(3, w + 1)`` effect of its wheels."""
         # A turning rate is measured in units of the nominal body's own turning per wheel speed.
         turning = [max(1.0, float(np.abs(effect[2]).max())) for effect in nominal]
         self._units = [np.array([1.0, 1.0, unit]) for unit in turning]
@@ -91,9 +89,9 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
 
     @property
     def deviations(self) -> tuple[FloatArray, ...]:
-        """Per body the ``(3, w + 1)`` standard deviations of its effect.
+        """By body, the ``(3, w + 1)`` standard deviations of its effect.
 
-        Those of its filters, times how much larger their innovations are than they expect.
+        Those of the filters are multiplied by the ratio of actual to expected innovations.
         """
         larger = (np.sqrt(np.maximum(1.0, ratio)) for ratio in self._ratios)
         scales = (scale[:, None] for scale in map(np.multiply, self._units, larger))
@@ -102,7 +100,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
 
     @classmethod
     def of(cls, settings: SelfModelSettings, scenario: Scenario) -> SelfModel | None:
-        """Return that of a scenario's bodies, none if it is not enabled.
+        """Return the self-model of a scenario's bodies, None if it is not enabled.
 
         Raises
         ------
@@ -119,10 +117,10 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
     def adapt(
         self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
     ) -> None:
-        """Revise all effects by how the bodies moved by a joint action.
+        """Update all effects by the motion of the bodies.
 
-        What contact is predicted to take from the motion is given back: a body that moves a load
-        is slow, not broken.
+        The predicted effect of contacts is subtracted: a body that moves a load is slow, not
+        broken.
         """
         if transition.twists is None:
             return
@@ -133,7 +131,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
             self.observe(body, speeds[list(group)], free[body])
 
     def observe(self, body: int, speeds: FloatArray, twist: FloatArray) -> None:
-        """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
+        """Update by a twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
         settings = self._settings
         regressor = np.append(speeds, 1.0)
         ratio = self._ratios[body]
@@ -154,7 +152,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
             covariance[row] -= np.outer(gain, carried)
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Return effects, covariances and ratios of innovations by robot."""
+        """Return effects, covariances and ratios of innovations by body."""
         kept = {"effect": self.effects, "covariance": self._covariances, "ratio": self._ratios}
         return {f"{name}{r}": array for name in kept for r, array in enumerate(kept[name])}
 
@@ -164,7 +162,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
             own[:] = arrays[name]
 
     def continue_from(self, former: SelfModel) -> None:
-        """Go on from what another one has learned, if its bodies are built alike; else anew."""
+        """Start from another self-model if its bodies have the same geometry."""
         mine = self._nominal
         theirs = former._nominal
         if len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs)):

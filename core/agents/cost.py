@@ -118,7 +118,7 @@ class Problem:
 
 def below_counts(hierarchy: Hierarchy) -> tuple[int, ...]:
     """Return the number of agents below each agent, in agent order."""
-    return tuple(len(hierarchy.below(i)) for i in range(len(hierarchy)))
+    return tuple(len(hierarchy.searched(i)) for i in range(len(hierarchy)))
 
 
 def is_chain(below: Iterable[int]) -> bool:

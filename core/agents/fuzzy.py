@@ -27,9 +27,6 @@ from .plain import as_explorer, as_learner
 from .valuing import Present, evaluator_of, is_private
 from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
 
-SHAPED = ("learner.theta", "learner.trace", "learner.reach", "seen", "explorer", "generator")
-"""What of a memory has a shape that the settings fix."""
-
 
 class FuzzyAgents(Agents[FuzzyInputs]):
     """Agents with one rule base each.
@@ -401,8 +398,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
                 f"team: saved arrays {', '.join(sorted(memory))} are not this team's "
                 f"{', '.join(sorted(own))}"
             )
-        for name in (name for name in SHAPED if name in own):
-            if memory[name].shape != own[name].shape:
+        fixed = [f"learner.{name}" for name in self.learner.fixed_arrays]
+        for name in [*fixed, "seen", "explorer", "generator"]:
+            if name in own and memory[name].shape != own[name].shape:
                 raise ValueError(
                     f"team: saved {name} has shape {memory[name].shape}, this team's "
                     f"{own[name].shape}"

@@ -10,7 +10,7 @@ from ..interface.agents import Placement
 from ..interface.scenario import Scenario
 from ..learners.learner import LearnerSettings
 from ..numerics import IntArray
-from ..rules.rule_base import RuleBase
+from ..values.rule_base import RuleBase
 from .plain import as_evaluator
 
 
@@ -75,7 +75,9 @@ def evaluator_of(
         value_of=decision.value_of,
         unseen=decision.unseen,
         plan=decision.plan,
-        handed_down=hierarchy.told == "ancestors" and not placement.messages_fail and not private,
+        handed_down=hierarchy.communication == "ancestors"
+        and not placement.messages_fail
+        and not private,
         first=next((i for i in hierarchy.order if i in own), members[0]),
         is_private=private,
     )

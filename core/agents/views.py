@@ -30,7 +30,7 @@ UNKNOWN: FloatArray = np.zeros(0)
 """The weights of agents of another part."""
 COSTS = (
     Measure("agreement", "agreement", gathering="mean", better="higher", least=0.0, greatest=1.0),
-    Measure("told", "actions told", "1/decision", gathering="mean", least=0.0),
+    Measure("received", "actions received", "1/decision", gathering="mean", least=0.0),
     Measure("broadcast", "states broadcast", "1/decision", gathering="mean", least=0.0),
 )
 """What is measured of agents with views of their own, as means of an episode: in how many of the
@@ -150,7 +150,7 @@ class Views:
         share = len(self._members) / len(hierarchy)  # those of other parts add theirs
         spent = {
             "agreement": inputs.agreement * share,
-            "told": float(sum(len(hierarchy.above(i)) for i in self._members)),
+            "received": float(sum(len(hierarchy.senders(i)) for i in self._members)),
             "broadcast": self._broadcast,
         }
         return {measure.name: spent[measure.name] for measure in self.costs}
@@ -190,10 +190,10 @@ def senders_of(settings: LearnerSettings, hierarchy: Hierarchy) -> list[list[int
     """Return, by agent, whose actions are part of its state, in the order of decision."""
     if not settings.values_actions:
         return []
-    if hierarchy.neighbours:
+    if hierarchy.neighbors:
         raise ValueError(
-            f"learner.kind = {settings.kind!r}: agents use what they are told, and neighbours tell "
-            "nothing; set topology.oriented, in which order they decide"
+            f"learner.kind = {settings.kind!r}: agents act on received actions, and neighbors send "
+            "none; set topology.decision_order"
         )
     every = range(len(hierarchy))
-    return [sorted(hierarchy.above(i), key=hierarchy.order.index) for i in every]
+    return [sorted(hierarchy.senders(i), key=hierarchy.order.index) for i in every]

@@ -1,18 +1,17 @@
-"""The maximum of a sum of tables: exact by variable elimination, or found by max-plus.
+"""Maximization of a sum of tables: exact by variable elimination, approximate by max-plus.
 
-To eliminate an agent, the tables that it takes part in are added, and replaced by their maximum
-over its actions, a table over its neighbours. When all are eliminated the maximum is known; going
-back, each agent takes its best action given those that were eliminated later. The tables grow to
-``A ** (1 + width)``; the width depends on the order, which is that of least fill-in (networkx).
+To eliminate an agent, its tables are added and replaced by their maximum over its actions, a table
+over its neighbors. When all agents are eliminated, the maximum is known; in reverse order, each
+agent takes its best action given those eliminated later. Tables grow to ``A ** (1 + width)``. The
+width depends on the order of elimination, which minimizes fill-in (networkx).
 
-Max-plus sends messages between agents and tables, round by round (Kok and Vlassis 2006). Every
-table sends each of its agents what each action would be worth with the best of the others, given
-the messages of these from other tables. On a tree the messages settle at the exact maximum; on
-graphs with loops they may not, so the best joint action of all rounds is kept (anytime), and
-improved by best responses, agent by agent, until none gains alone. Cost is linear in the number of
-tables, whatever the width.
+Max-plus sends messages between agents and tables in rounds (Kok and Vlassis 2006). Every table
+sends each of its agents the value of each action, given the best actions of its other agents and
+their messages from other tables. On a tree the messages converge to the exact maximum. On graphs
+with loops they may not: the best joint action of all rounds is kept and then improved by best
+responses, agent by agent, until no agent gains alone. The cost is linear in the number of tables.
 
-Shapes of undirected graphs over agents in their order, and what makes hierarchies of graphs.
+The module also builds undirected graphs over agents and orients them into hierarchies.
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ import numpy as np
 from ..numerics import FloatArray, IntArray, nx
 
 Scope = tuple[int, ...]
-MOST_ENTRIES = 4**10
-"""Of a table."""
+MAX_ENTRIES = 4**10
+"""Maximum number of entries of a table."""
 
 
 def interaction(scopes: Sequence[Scope], n: int) -> nx.Graph:
-    """Return the graph of n agents in which those that share a scope are joined."""
+    """Return the graph of n agents in which agents with a common scope are joined."""
     graph = nx.empty_graph(n)
     for scope in scopes:
         graph.add_edges_from((a, b) for a in scope for b in scope if a < b)
@@ -40,22 +39,22 @@ def interaction(scopes: Sequence[Scope], n: int) -> nx.Graph:
 
 
 def order_of(graph: nx.Graph) -> tuple[tuple[int, ...], int]:
-    """Return an order of elimination, by the heuristic of least fill-in, and its width.
+    """Return an order of elimination that minimizes fill-in heuristically, and its width.
 
     Examples
     --------
-    A line has width 1, a ring 2, and of four agents who are all joined, three are left at first.
+    A line has width 1, a ring has width 2, and four fully joined agents have width 3.
 
     >>> [order_of(g)[1] for g in (nx.path_graph(5), nx.cycle_graph(5), nx.complete_graph(4))]
     [1, 2, 3]
     """
     width, tree = nx.approximation.treewidth_min_fill_in(graph)
-    # Peel the decomposition from its leaves: what is in no other bag can be eliminated.
+    # Peel the decomposition from its leaves: agents in no other bag can be eliminated.
     order: list[int] = []
     while tree:
         bag = min((bag for bag in tree if tree.degree(bag) <= 1), key=sorted)
-        beside = set().union(*tree[bag])
-        order += sorted(set(bag) - beside)
+        neighbors = set().union(*tree[bag])
+        order += sorted(set(bag) - neighbors)
         tree.remove_node(bag)
     return tuple(order), int(width)
 
@@ -65,29 +64,29 @@ class _Step(NamedTuple):
 
     agent: int
     parts: tuple[tuple[int, tuple[int, ...], tuple[int, ...]], ...]
-    """Tables that it takes part in: number, order of axes, shape among the agents concerned."""
-    beside: tuple[int, ...]
-    """The others concerned: axes of the table that is left, its own axis was the last."""
+    """Its tables: number, order of axes, and shape over the agent and its neighbors."""
+    neighbors: tuple[int, ...]
+    """Other agents of these tables: axes of the remaining table. The agent's axis was the last."""
 
 
 class Elimination:
-    """Eliminates agents in an order that is found once.
+    """Variable elimination in a fixed order.
 
     Parameters
     ----------
     scopes
-        Of the tables; every agent is in one at least.
+        Agents of each table; every agent is in at least one.
     n, n_actions
-        Agents and actions.
+        Numbers of agents and of actions.
 
     Raises
     ------
     ValueError
-        If the largest table would have more than `MOST_ENTRIES`; before anything is allocated.
+        If the largest table would have more than `MAX_ENTRIES`; before anything is allocated.
 
     Examples
     --------
-    Two agents who like to do the same, and one who dislikes what the second does:
+    Two agents prefer equal actions, and a third prefers an action other than the second's:
 
     >>> same, other = np.eye(2), 2.0 * (1.0 - np.eye(2))
     >>> joint = Elimination([(0, 1), (1, 2)], 3, 2).best([same, other + [[0, 0], [1, 0]]])
@@ -98,10 +97,10 @@ class Elimination:
     def __init__(self, scopes: Sequence[Scope], n: int, n_actions: int) -> None:
         self.n_actions = n_actions
         self.order, self.width = order_of(interaction(scopes, n))
-        if n_actions ** (1 + self.width) > MOST_ENTRIES:
+        if n_actions ** (1 + self.width) > MAX_ENTRIES:
             raise ValueError(
                 f"width {self.width} of the coordination graph takes tables of {n_actions} ** "
-                f"{1 + self.width} entries, allowed: {MOST_ENTRIES:,}; use max-plus"
+                f"{1 + self.width} entries, allowed: {MAX_ENTRIES:,}; use max-plus"
             )
         self._steps = tuple(self._plan(scopes))
 
@@ -110,17 +109,17 @@ class Elimination:
         steps = []
         for agent in self.order:
             mine = [k for k, scope in known.items() if agent in scope]
-            beside = tuple(sorted({a for k in mine for a in known[k]} - {agent}))
-            axes = (*beside, agent)
+            neighbors = tuple(sorted({a for k in mine for a in known[k]} - {agent}))
+            axes = (*neighbors, agent)
             parts = []
             for k in mine:
-                # A table's axes in the order of the concerned, 1 where it has none.
+                # Axes of the table in the common order, of length 1 for other agents.
                 shape = tuple(self.n_actions if a in known[k] else 1 for a in axes)
                 places = tuple(known[k].index(a) for a in axes if a in known[k])
                 parts.append((k, places, shape))
                 del known[k]
-            steps.append(_Step(agent, tuple(parts), beside))
-            known[len(scopes) + len(steps) - 1] = beside
+            steps.append(_Step(agent, tuple(parts), neighbors))
+            known[len(scopes) + len(steps) - 1] = neighbors
         return steps
 
     def best(self, tables: Sequence[FloatArray]) -> IntArray:
@@ -141,7 +140,7 @@ class Elimination:
             known[len(tables) + number] = total.max(axis=-1)
         joint = np.zeros(len(self._steps), dtype=np.int64)
         for step, choice in zip(reversed(self._steps), reversed(choices), strict=True):
-            joint[step.agent] = choice[tuple(joint[list(step.beside)])]
+            joint[step.agent] = choice[tuple(joint[list(step.neighbors)])]
         return joint
 
 
@@ -151,9 +150,9 @@ class MaxPlus:
     Parameters
     ----------
     scopes
-        Of the tables; every agent is in one at least.
+        Agents of each table; every agent is in at least one.
     n, n_actions
-        Agents and actions.
+        Numbers of agents and of actions.
     rounds
         Most rounds; fewer are made if the messages settle.
     damping
@@ -162,7 +161,7 @@ class MaxPlus:
     Raises
     ------
     ValueError
-        If the largest table has more than `MOST_ENTRIES`; before anything is allocated.
+        If the largest table has more than `MAX_ENTRIES`; before anything is allocated.
 
     Examples
     --------
@@ -186,10 +185,10 @@ class MaxPlus:
         apart = list(dict.fromkeys(scopes))
         self._place = [apart.index(scope) for scope in scopes]
         k = max(map(len, apart))
-        if n_actions**k > MOST_ENTRIES:
+        if n_actions**k > MAX_ENTRIES:
             raise ValueError(
                 f"an agent with {k - 1} neighbours in the coordination graph takes a table of "
-                f"{n_actions} ** {k} entries, allowed: {MOST_ENTRIES:,}"
+                f"{n_actions} ** {k} entries, allowed: {MAX_ENTRIES:,}"
             )
         # Shorter scopes are filled up with an agent that is not there, number n.
         self._members = np.array([(*scope, *[n] * (k - len(scope))) for scope in apart])
@@ -302,7 +301,7 @@ def other_edges(graph: nx.Graph, seed: int) -> nx.Graph:
 
 
 def orient(graph: nx.Graph, order: Sequence[str], *, fill_in: bool) -> nx.DiGraph:
-    """Return a graph whose edges lead from whom comes first in `order` to whom comes later.
+    """Return a graph whose edges lead from earlier agents in `order` to later ones.
 
     With `fill_in`, those who are above an agent are joined, too, from the last agent to the first:
     eliminating it makes the best that it can do depend on all of them together (Dechter 1999).

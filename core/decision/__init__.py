@@ -1,1 +1,1 @@
-"""How the values of actions become an action."""
+"""Decision settings, exploration, and errors of agents."""

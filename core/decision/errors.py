@@ -1,11 +1,11 @@
-"""Errors of an agent's own, by which agents come to disagree.
+"""Individual errors of agents, which cause disagreement.
 
-An error is drawn once, from the seed of the trial, and stays::
+Errors are drawn once, from the seed of the trial, and stay constant::
 
     theta_i = theta + s * std(theta) * E_i,    c_i = c * exp(s_c * N_i)
 
-with the standard deviation over the consequent weights of one agent or role, and E_i, N_i of
-standard normal numbers of agent i.
+The standard deviation is over the consequent weights of one agent or role. E_i and N_i are standard
+normal numbers of agent i.
 """
 
 from __future__ import annotations
@@ -16,35 +16,35 @@ from ..numerics import FloatArray, IntArray
 from ..plugins.settings import NonNegative, Settings
 
 STREAM = 2**32 - 5
-"""Key of the stream from which errors of agents are drawn, under the seed of the team."""
+"""Spawn key of the random stream of errors, below the seed of the team."""
 
 
 class ErrorSettings(Settings):
-    """Errors of each agent's own: the ``[learner.decision.errors]`` table of a spec."""
+    """Individual errors of agents: the ``[learner.decision.errors]`` table of a spec."""
 
     weights: NonNegative = 0.0
-    """Standard deviation of the error of a consequent weight, in those of the agent's weights."""
+    """Standard deviation of errors of weights, relative to that of the agent's weights."""
     constants: NonNegative = 0.0
-    """Standard deviation of the logarithm of a constant of its predictor."""
+    """Standard deviation of the logarithm of each constant of the predictor."""
 
 
 class Errors:
-    """The errors of every agent, which stay what they are.
+    """Constant errors of every agent.
 
     Parameters
     ----------
     settings
-        How large they are.
+        Standard deviations.
     concerned
-        Per agent ``(k,)`` by whose values it decides.
+        By agent, ``(k,)`` the agents whose values it averages.
     rows
-        Per agent the row of its weights; none: they are not known.
+        By agent, the row of its weights; None if unknown.
     n_rules
-        Rules of the rule base.
+        Number of rules of the rule base.
     n_constants
-        Constants of the predictor.
+        Number of constants of the predictor.
     seed
-        That of the team.
+        Seed of the team.
 
     Examples
     --------
@@ -75,17 +75,17 @@ class Errors:
         self._rows: list[IntArray] = []
         self._weights: list[FloatArray] = []
         self._constants: list[FloatArray] = []
-        for agent, whose in enumerate(concerned):
+        for agent, averaged in enumerate(concerned):
             child = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, STREAM, agent))
             rng = np.random.default_rng(child)
-            known = {row for other in whose.tolist() if (row := rows[other]) is not None}
+            known = {row for other in averaged.tolist() if (row := rows[other]) is not None}
             self._rows.append(np.array(sorted(known), dtype=np.int64))
             size = len(known) if settings.weights else 0
             self._weights.append(rng.standard_normal((size, n_rules)))
             self._constants.append(settings.constants * rng.standard_normal(n_constants))
 
     def weights(self, agent: int, theta: FloatArray) -> FloatArray:
-        """Return what an agent takes for the weights `theta` ``(n_rows, n_rules)``."""
+        """Return the weights `theta` ``(n_rows, n_rules)`` with the errors of an agent."""
         if not self._settings.weights:
             return theta
         rows = self._rows[agent]
@@ -95,5 +95,5 @@ class Errors:
         return taken
 
     def constants(self, agent: int) -> FloatArray | None:
-        """Return an agent's errors ``(c,)`` of the logarithms of constants; None: it has none."""
+        """Return an agent's errors ``(c,)`` of the logarithms of constants, or None."""
         return self._constants[agent] if self._settings.constants else None

@@ -1,9 +1,9 @@
-"""From the values of an agent's actions to one action (Section V).
+"""Exploration: choice of an action given the values of all actions (Section V).
 
-An explorer serves all agents of a team. It is notified when an episode begins and when a step has
-been decided; it is asked for one action at a time. Everything random comes from the generator that
-is passed in; exact ties are broken at random, since they are common (maintaining and zeroing a
-resting wheel lead to the same state).
+An explorer serves all agents of a team, one action at a time, and is notified of the beginning of
+an episode and of the end of a decision. All random numbers come from the generator passed in. Exact
+ties are broken at random, because they are common (maintaining and zeroing a resting wheel lead to
+the same state).
 """
 
 from __future__ import annotations
@@ -31,50 +31,50 @@ def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
 
 
 def no_way_on(key: str, part: object) -> str:
-    """Return that a part of a team cannot go on with another team, in one line."""
+    """Return the message that a part cannot be warm-started from another team."""
     return (
-        f"{key}: {type(part).__name__} has no continue_from, by which it would go on with another "
-        "team"
+        f"{key}: {type(part).__name__} has no continue_from, which starting from another team "
+        "requires"
     )
 
 
 class Explorer(ABC):
-    """Chooses actions; its whole memory is one array."""
+    """Chooses actions. Its complete state is one array."""
 
     memory: FloatArray
 
     @property
     def exploring(self) -> Exploring | None:
-        """How it explores, if that is by random actions that are held; None: in another way."""
+        """State and probabilities of exploration by held random actions; None for other kinds."""
         return None
 
-    def begin_episode(self) -> None:  # noqa: B027 - by default nothing is to be done
-        """Begin an episode of learning."""
+    def begin_episode(self) -> None:  # noqa: B027 - optional
+        """Prepare for an episode of learning."""
 
     @abstractmethod
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
         """Return the action of `agent` given the values ``(A,)`` of its actions."""
 
     def advance(self) -> None:  # noqa: B027
-        """Go on to the next step: all agents have decided this one."""
+        """Prepare for the next step, after all agents have decided."""
 
     def continue_from(self, former: Self) -> None:
-        """Go on from an explorer of the same settings, which served other agents.
+        """Start from the state of an explorer with the same settings that served other agents.
 
         Raises
         ------
         ValueError
-            If it cannot; one line.
+            If this kind of exploration does not support it.
         """
         raise ValueError(no_way_on("learner.exploration.kind", self))
 
 
 class ExplorationSettings(PartSettings):
-    """What the settings of all kinds of exploration inherit; `build` is given how many agents."""
+    """Base class of settings of exploration; `build` takes the number of agents."""
 
 
 class BoltzmannExploration(ExplorationSettings):
-    """Actions drawn from the Boltzmann distribution (Eq. 14) while its temperature falls.
+    """Actions sampled from the Boltzmann distribution (Eq. 14) with a falling temperature.
 
     ``T(t) = 1 + T_max exp(-s t)`` after t steps; the defaults are those of Kapetanakis and Kudenko
     (2002) for games of 1,000 plays.
@@ -83,13 +83,13 @@ class BoltzmannExploration(ExplorationSettings):
     kind: Literal["boltzmann"] = "boltzmann"
     factory: ClassVar[str] = f"{__name__}:Boltzmann"
     max_temperature: Positive = 500.0
-    """Temperature that is added at first, T_max."""
+    """Initial temperature above 1, T_max."""
     decay: NonNegative = 0.006
     """Decay of the temperature per step, s."""
 
 
 class Boltzmann(Explorer):
-    """Samples the Boltzmann distribution; the clock counts the steps of the whole run."""
+    """Samples the Boltzmann distribution. The clock counts the steps of the whole run."""
 
     def __init__(self, settings: BoltzmannExploration | PaperExploration, n_agents: int) -> None:
         self.settings = settings
@@ -102,15 +102,15 @@ class Boltzmann(Explorer):
         return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
 
     def continue_from(self, former: Self) -> None:
-        """Go on with the clock."""
+        """Continue the clock."""
         self.memory[:] = former.memory
 
     def advance(self) -> None:
-        """Let the clock tick."""
+        """Advance the clock by one step."""
         self.memory[0] += 1.0
 
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
-        """Draw an action."""
+        """Sample an action."""
         return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
 
 
@@ -124,17 +124,17 @@ class PaperExploration(ExplorationSettings):
     kind: Literal["paper"] = "paper"
     factory: ClassVar[str] = f"{__name__}:EpsilonDecreasingBoltzmann"
     epsilon: Fraction = 1.0
-    """Exploration rate at the start; not printed in the paper."""
+    """Initial exploration rate; not given in the paper."""
     max_temperature: Annotated[float, Field(gt=1)] = 100.0
-    """T_max; not printed in the paper."""
+    """T_max; not given in the paper."""
     decay: NonNegative = 0.005
-    """Decay of the temperature per step, s; printed in Section IX."""
+    """Decay of the temperature per step, s (Section IX)."""
     clock: Literal["episode", "run"] = "run"
-    """Whether t counts the steps of the episode or of the whole run; not stated in the paper."""
+    """Whether t counts the steps of the episode or of the run; not given in the paper."""
     exploit: Literal["greatest", "sample"] = "greatest"
     """Take the action of greatest probability (Section V), or sample Eq. 14."""
     explore: Literal["uniform", "boltzmann"] = "uniform"
-    """How the "random action" of the other case is drawn; not stated in the paper."""
+    """Distribution of the "random action" otherwise; not given in the paper."""
 
 
 class EpsilonDecreasingBoltzmann(Boltzmann):
@@ -156,7 +156,7 @@ class EpsilonDecreasingBoltzmann(Boltzmann):
             self.memory[0] = 0.0
 
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
-        """Exploit with probability 1 - rate, else explore, each as the settings say."""
+        """Exploit with probability 1 - rate, otherwise explore."""
         if rng.random() < self.rate:
             if self.paper.explore == "uniform":
                 return int(rng.integers(len(values)))
@@ -167,7 +167,7 @@ class EpsilonDecreasingBoltzmann(Boltzmann):
 
 
 class BurstExploration(ExplorationSettings):
-    """Random actions that are held for a while, at a rate that falls from episode to episode.
+    """Random actions, each held for some decisions, at a rate that falls with every episode.
 
     The fraction of explorative decisions of an agent in episode ``k`` is ``max(floor, rate * decay
     ** k)``, and at most `team_limit` divided by the number of agents.
@@ -180,38 +180,38 @@ class BurstExploration(ExplorationSettings):
     decay: Fraction = 0.75
     """Factor on that fraction from episode to episode."""
     floor: Fraction = 0.02
-    """Fraction of explorative decisions below which it does not fall."""
+    """Minimum fraction of explorative decisions."""
     team_limit: Positive | None = None
-    """Agents that explore at a time, at most, in the mean: in a large team somebody else disturbs
-    always; none: no limit."""
+    """Maximum mean number of agents that explore at the same time. Without a limit, some agent of a
+    large team always disturbs the others."""
     length: Annotated[float, Field(ge=1)] = 4.0
-    """Mean number of decisions for which a random action is repeated."""
+    """Mean number of decisions for which a random action is held."""
 
 
 class Bursts(Explorer):
-    """Random actions held for a geometric number of decisions, less often in later episodes."""
+    """Random actions held for a geometric number of decisions."""
 
     def __init__(self, settings: BurstExploration, n_agents: int) -> None:
         self.settings = settings
         limit = settings.team_limit
         self._most = 1.0 if limit is None else min(1.0, limit / n_agents)
-        # The episode, then per agent: decisions left in its burst, the action held.
+        # The episode; then, by agent, the remaining decisions of its burst and the held action.
         self.memory: FloatArray = np.zeros(1 + 2 * n_agents)
         self.memory[0] = -1.0
         self._of_episode = (np.nan, 0.0, 0.0)
 
     @property
     def rate(self) -> float:
-        """Fraction of decisions that are explorative in this episode."""
+        """Fraction of explorative decisions in this episode."""
         s = self.settings
         return min(self._most, max(s.floor, s.rate * s.decay ** max(0.0, self.memory[0])))
 
     @property
     def exploring(self) -> Exploring:
-        """The memory, and how likely a burst is to begin and to end.
+        """The state, and the probabilities that a burst begins and ends.
 
-        Starting with probability p a burst of mean length l makes l p / (1 - p + l p) of all
-        decisions explorative; solved for p at the wanted rate.
+        If bursts of mean length l begin with probability p, the share l p / (1 - p + l p) of all
+        decisions is explorative. This is solved for p.
         """
         episode = float(self.memory[0])
         if self._of_episode[0] != episode:
@@ -221,16 +221,16 @@ class Bursts(Explorer):
         return Exploring(self.memory, *self._of_episode[1:])
 
     def begin_episode(self) -> None:
-        """Count the episode and end every burst."""
+        """Count the episode and end all bursts."""
         self.memory[0] += 1.0
         self.memory[1:] = 0.0
 
     def continue_from(self, former: Self) -> None:
-        """Go on counting episodes; bursts end with an episode."""
+        """Continue the count of episodes."""
         self.memory[0] = former.memory[0]
 
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
-        """Return the held action, start a burst, or take the greatest."""
+        """Return the held action, begin a burst, or return the greedy action."""
         at = 1 + 2 * agent
         if self.memory[at] > 0:
             self.memory[at] -= 1.0

@@ -1,4 +1,4 @@
-"""How values become a joint action: settings of decisions."""
+"""Settings of decisions."""
 
 from typing import Annotated, Literal
 
@@ -11,27 +11,27 @@ from .errors import ErrorSettings
 
 
 class DecisionSettings(Settings):
-    """How values become a joint action: the ``[learner.decision]`` table of a spec."""
+    """Settings of decisions: the ``[learner.decision]`` table of a spec."""
 
     rule: Literal["value", "reward", "reward-and-value", "random"] = "value"
-    """Decide by f of the predicted state, by its predicted reward, by reward + discount f, or at
-    random. f of an after-state contains its reward already: the sum weighs the reward twice, which
-    helps where rewards lead part of the way."""
+    """Criterion: the value f of the predicted state, its predicted reward, reward + discount f, or
+    random actions. The value of an after-state includes its reward; the sum therefore weighs the
+    reward twice, which helps if rewards lead part of the way."""
     teammates: Teammates = "best-response"
-    """What the agents below are expected to do: the best for this agent, anything with equal
-    probability, what they were seen to do so far (the paper's "stochastically observing"), or what
-    they were seen to do when this agent did the same as it considers now (``conditional``)."""
+    """Assumed actions of the agents below: the best for this agent, uniformly random, drawn by
+    their observed frequencies (the paper's "stochastically observing"), or drawn by their observed
+    frequencies given this agent's action (``conditional``)."""
     value_of: ValueOf = "own"
-    """Whose value decides: the agent's own; the mean of its own and those of the agents below it;
-    or the mean of all agents'. ``own`` where each state tells what its agent's action is worth,
-    ``team`` where what helps one may hinder others."""
+    """Averaged values: the agent's own, its own and those of the agents below it (``below``), or
+    those of all agents (``team``). Use ``own`` if an agent's state shows the effect of its action,
+    ``team`` if an action that helps one agent may hinder others."""
     unseen: Annotated[Unseen, unwritten("maintain")] = "maintain"
-    """What agents are expected to do that this one neither considers nor hears of: to maintain, to
-    do again what they did last, or to keep to the plan that ``best-response`` makes for them."""
+    """Assumed actions of agents that this agent neither hears nor searches over, silent agents
+    included: maintain, repeat the last action, or follow the plan of ``best-response``."""
     plan: Annotated[Plan, unwritten("private")] = "private"
-    """Whose plan ``best-response`` decides by: each agent's own, unless one above it hands it down
-    with what it tells; or one that all work out alike, which is common knowledge and no message."""
+    """Plans of ``best-response``: each agent makes its own unless an agent above hands one down
+    with its messages (``private``), or all agents compute the same plan from common knowledge."""
     evaluator: Annotated[EvaluatorSettings, Plugged(EVALUATORS, EVALUATORS.parsed)] = AutoSettings()
-    """Which joint actions of the agents below are tried: the name of an evaluator, or its table."""
+    """Search over joint actions of the agents below: the name of an evaluator, or its table."""
     errors: Annotated[ErrorSettings | None, unwritten(None)] = None
-    """Errors that each agent has of its own; with this table it also plans for itself alone."""
+    """Individual errors of agents. With this table every agent also makes plans of its own."""

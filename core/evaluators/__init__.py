@@ -1,10 +1,10 @@
-"""The values of an agent's own actions, over what the agents below it may do (Section V).
+"""Search over joint actions: values of an agent's own actions (Section V).
 
-Agent i proposes each of its actions; the actions above are fixed, the unseen maintain, and the
-joint actions of the agents below are tried. Their next states are predicted and valued, and the
-values are aggregated per own action, by the teammate model: their maximum (best response), their
-mean (uniform), or their mean weighted with how often the agents below were seen to act so
-(empirical frequencies). Evaluators differ in which joint actions they try.
+Agent i considers each of its actions together with joint actions of the agents below it. The
+actions of the agents above are given, and unseen agents maintain. The next states are predicted and
+evaluated, and the values are aggregated per own action by the teammate model: the maximum
+(best response), the mean (uniform), or the mean weighted by observed frequencies (empirical).
+Evaluators differ in the joint actions that they evaluate.
 """
 
 from .evaluator import EVALUATORS, EvaluatorSettings

@@ -1,20 +1,19 @@
-"""Evaluators that find what all do at once: in coordination graphs, or by planning ahead.
+"""Evaluators that find a joint action of all agents: coordination graphs and cross-entropy.
 
-In a coordination graph a team's value is a sum of parts, each over neighbours. Agent j values the
-joint actions of itself and its neighbours; all others are taken to maintain. These values, a table
-for each agent, are added up, and the joint action of the greatest sum is found: by variable
-elimination, exactly, or by max-plus, in time that is linear in the number of agents. It is found
-once for all agents of a decision. Each then values its own actions given that all others do their
-part of it. Where actions are equally good its own part comes first, so that agents who are told
-nothing agree.
+In a coordination graph the value of a team is a sum of parts, each over neighbors. Agent j
+evaluates the joint actions of itself and its neighbors; all others are assumed to maintain. The
+joint action with the greatest sum of these tables is found by variable elimination, exactly, or by
+max-plus, in time linear in the number of agents. It is found once per decision. Each agent then
+evaluates its own actions given the others' parts of this joint action. Ties are broken in favor of
+its own part, so that agents agree without messages.
 
-The cross-entropy method plans several decisions: a model-predictive controller. The first agent to
-decide plans for all. Sequences of joint actions are drawn, each agent and each
-decision by probabilities of their own, and valued by the discounted sum of the rewards that are
-predicted on the way, from predicted states. The probabilities move to the frequencies among the
-best sequences, and sequences are drawn anew (Rubinstein and Kroese 2004; as a controller with a
-learned model Chua et al. 2018). What the best sequence begins with is done; the next decision plans
-from nothing. It learns nothing and has the reward function: a control for what does learn.
+The cross-entropy method plans several decisions ahead: it is a model-predictive controller. The
+first agent to decide plans for all. Sequences of joint actions are sampled, with one distribution
+per agent and decision, and evaluated by the discounted sum of predicted rewards. The distributions
+move to the frequencies among the best sequences, and sequences are sampled again (Rubinstein and
+Kroese 2004; with a learned model Chua et al. 2018). The team takes the first joint action of the
+best sequence, and plans again at the next decision. The method learns nothing and is given the
+reward function: it is a control for learners.
 """
 
 from __future__ import annotations
@@ -33,11 +32,11 @@ from .enumeration import combinations
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
 
 FIRST = 1e-9
-"""By how much, relative to the value, an agent's own part comes before what is equally good."""
+"""Relative margin by which an agent prefers its own part of the joint action among ties."""
 
 
 class VariableEliminationSettings(EvaluatorSettings):
-    """The joint action of the greatest sum of values over neighbours, exactly."""
+    """The joint action of the greatest sum of values over neighbors, exactly."""
 
     kind: Literal["variable-elimination"] = "variable-elimination"
 
@@ -47,13 +46,13 @@ class VariableEliminationSettings(EvaluatorSettings):
 
 
 class MaxPlusSettings(EvaluatorSettings):
-    """The joint action of a great sum of values over neighbours, by messages between them."""
+    """A joint action of a great sum of values over neighbors, by messages between them."""
 
     kind: Literal["max-plus"] = "max-plus"
     rounds: Annotated[int, Field(ge=1, le=10_000)] = 100
-    """Most rounds of messages."""
+    """Maximum number of rounds of messages."""
     damping: Annotated[float, Field(ge=0, lt=1)] = 0.5
-    """Share of a message that is kept from the round before; in a graph without loops none is."""
+    """Share of the previous message that is kept, in graphs with loops."""
 
     def build(self, problem: DecisionProblem) -> Coordination:
         """Return the evaluator of a team."""
@@ -62,22 +61,22 @@ class MaxPlusSettings(EvaluatorSettings):
 
 
 class Coordination(Aggregation):
-    """Tables of values, and what is made of the joint action of their greatest sum.
+    """Values of own actions given the joint action that maximizes a sum of tables.
 
     Parameters
     ----------
     problem
-        What all decisions have in common.
+        Properties that all decisions of the team share.
     name
-        Of the evaluator, in messages.
+        Name of the evaluator in messages.
     maximiser
         Finds the joint action of the greatest sum, for scopes, agents and actions.
 
     Raises
     ------
     ValueError
-        If nobody has neighbours, anything but own values and best responses is asked for, or the
-        coordination graph is too wide; in one line, before anything is allocated.
+        If no agent has neighbors, the settings ask for other than own values and best responses,
+        or the coordination graph is too wide. Raised before memory is allocated.
     """
 
     def __init__(
@@ -85,7 +84,7 @@ class Coordination(Aggregation):
     ) -> None:
         super().__init__(problem)
         hierarchy = problem.hierarchy
-        if hierarchy.edges or not hierarchy.neighbours:
+        if hierarchy.edges or not hierarchy.neighbors:
             raise ValueError(
                 f"learner.decision.evaluator = {name!r}: the topology joins no neighbours, "
                 "use coordination-graph"
@@ -96,10 +95,10 @@ class Coordination(Aggregation):
             ("value_of", problem.value_of, "own"),
         )
         for key, value, allowed in required:
-            why = f"{name} adds up own values over neighbours, allowed: {allowed!r}"
+            why = f"{name} adds up own values over neighbors, allowed: {allowed!r}"
             self.require(key, value, allowed, why)
         n = len(hierarchy)
-        self.scopes = [tuple(sorted((i, *hierarchy.below(i)))) for i in range(n)]
+        self.scopes = [tuple(sorted((i, *hierarchy.searched(i)))) for i in range(n)]
         try:
             self._maximiser = maximiser(self.scopes, n, self.n_actions)
         except ValueError as error:
@@ -128,7 +127,7 @@ class Coordination(Aggregation):
         return values
 
     def _table(self, deliberation: Deliberation, agent: int) -> FloatArray:
-        """Return what an agent's value makes of the joint actions of its scope."""
+        """Return an agent's values of the joint actions of its scope."""
         scope = self.scopes[agent]
         tried = self._tried[len(scope)]
         self.count(agent, len(tried))
@@ -143,39 +142,39 @@ class Coordination(Aggregation):
 
 
 class CrossEntropySettings(EvaluatorSettings):
-    """Plan several decisions ahead by the cross-entropy method; decides by rewards alone."""
+    """Plan several decisions ahead by the cross-entropy method, by predicted rewards alone."""
 
     kind: Literal["cross-entropy"] = "cross-entropy"
     factory: ClassVar[str] = f"{__name__}:CrossEntropy"
     horizon: Annotated[int, Field(ge=1, le=50)] = 4
-    """Decisions that a plan looks ahead."""
+    """Number of decisions in a plan."""
     samples: Annotated[int, Field(ge=2, le=100_000)] = 32
-    """Plans that are drawn in an iteration."""
+    """Plans sampled per iteration."""
     iterations: Annotated[int, Field(ge=1, le=100)] = 3
-    """How often plans are drawn."""
+    """Number of iterations."""
     elite: Annotated[float, Field(gt=0, le=1)] = 0.25
-    """Fraction of the plans of an iteration whose frequencies the next one draws by."""
+    """Fraction of best plans whose action frequencies define the next distribution."""
     smoothing: Annotated[float, Field(ge=0, le=1)] = 0.1
-    """Weight of equal probabilities in those that the next iteration draws by."""
+    """Weight of the uniform distribution in the next distribution."""
 
 
 class CrossEntropy(Aggregation):
-    """Gives one to the action that the plan holds for an agent, and zero to the others.
+    """Gives value one to the planned action of an agent and zero to the others.
 
     Raises
     ------
     ValueError
-        If it is not to decide by rewards, or nobody is above all others and could plan for them.
+        If the decision rule is not ``reward``, or no agent is above all others to plan for them.
     """
 
     continues = True
-    """It needs a prediction with ``after``."""
+    """The method needs predictions with ``after``."""
 
     def __init__(self, settings: CrossEntropySettings, problem: DecisionProblem) -> None:
         super().__init__(problem)
         self.require("rule", problem.rule, "reward", f"{settings.kind} plans by 'reward' only")
         hierarchy = problem.hierarchy
-        if len(hierarchy.below(hierarchy.order[0])) < len(hierarchy) - 1:
+        if len(hierarchy.searched(hierarchy.order[0])) < len(hierarchy) - 1:
             raise ValueError(
                 f"learner.decision.evaluator = {settings.kind!r}: needs a topology whose first "
                 "agent is above all others and plans for them, as in a chain"
@@ -200,7 +199,7 @@ class CrossEntropy(Aggregation):
         n_elite = max(1, round(s.elite * s.samples))
         elite: IntArray = np.zeros((0, *shape[:2]), dtype=np.int64)
         for _ in range(s.iterations):
-            plans = self.drawn(probabilities, s.samples, rng)
+            plans = self.sample(probabilities, s.samples, rng)
             plans[: len(elite[:1])] = elite[:1]  # the best so far
             worths = self._worths(deliberation.agent, prediction, plans)
             elite = plans[np.argsort(-worths, kind="stable")[:n_elite]]
@@ -209,7 +208,7 @@ class CrossEntropy(Aggregation):
         return elite[0, 0]
 
     def _worths(self, agent: int, prediction: Prediction, plans: IntArray) -> FloatArray:
-        """Return what plans ``(samples, horizon, n)`` are paid, predicted once where they agree."""
+        """Return the discounted rewards ``(samples,)`` of plans ``(samples, horizon, n)``."""
         worths = np.zeros(len(plans))
         waiting = [(prediction, np.arange(len(plans)), 0)]
         while waiting:

@@ -1,4 +1,4 @@
-"""How compiled evaluators draw: the very actions of `greatest` and of `Bursts.choose`."""
+"""Compiled tie-breaking and exploration, equal to `greatest` and `Bursts.choose`."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from ..numerics import SAME, FloatArray, IntArray, njit
 
 @njit(cache=True)
 def draw(worths: FloatArray, rng: np.random.Generator) -> int:
-    """Return the action that is worth most as `greatest` does; -1 where that refuses."""
+    """Return the action of greatest value, as `greatest`; -1 if a value is not a number."""
     top = worths[0]
     for worth in worths:
         top = worth if worth > top else top
@@ -27,7 +27,7 @@ def draw(worths: FloatArray, rng: np.random.Generator) -> int:
 
 @njit(cache=True)
 def explored(agent: int, worths: FloatArray, exploring: Exploring, rng: np.random.Generator) -> int:
-    """Return the action that an agent takes, as `Bursts.choose` does."""
+    """Return the action of an agent that may explore, as `Bursts.choose`."""
     memory, chance, stop = exploring
     at = 1 + 2 * agent
     if chance >= 0.0:
@@ -46,7 +46,7 @@ def explored(agent: int, worths: FloatArray, exploring: Exploring, rng: np.rando
 def drawn_equal(
     order: IntArray, n_actions: int, exploring: Exploring, rng: np.random.Generator
 ) -> IntArray:
-    """Return the actions ``(n,)`` of agents to whom all are worth the same."""
+    """Return the actions ``(n,)`` of agents for whom all actions have the same value."""
     joint = np.empty_like(order)
     worths = np.zeros(n_actions)
     for agent in order:

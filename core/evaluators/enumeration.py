@@ -1,8 +1,7 @@
 """Evaluators that try every joint action of the agents below, or a random sample of them.
 
-Few agents are enumerated, some sampled, and many planned for. Of many agents best responses around
-a plan reach greater values than a sample, in half of its time. They are also taken for some, if the
-values of others decide too, and wherever there must be a plan.
+``auto`` enumerates the joint actions of few agents, samples those of some, and plans for many. For
+many agents, best responses around a plan reach greater values than a sample in half of its time.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -12,7 +11,6 @@ from pydantic import Field
 
 from ..interface.prediction import Tables
 from ..numerics import FloatArray, IntArray
-from ..rules.kernels.dense import Tried
 from .evaluator import (
     EVALUATORS,
     Aggregation,
@@ -22,8 +20,8 @@ from .evaluator import (
     EvaluatorSettings,
 )
 
-MOST_JOINT_ACTIONS = 4**11
-"""The most of some agents that are tried with each action of another: more fill the memory."""
+MAX_JOINT_ACTIONS = 4**11
+"""Maximum number of joint actions per own action; more would fill the memory."""
 
 
 def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
@@ -32,12 +30,12 @@ def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
     Raises
     ------
     ValueError
-        If they are too many; before anything is allocated.
+        If there are too many; raised before memory is allocated.
     """
-    if n_actions ** len(agents) > MOST_JOINT_ACTIONS:
+    if n_actions ** len(agents) > MAX_JOINT_ACTIONS:
         raise ValueError(
             f"learner.decision.evaluator: {n_actions} ** {len(agents)} joint actions of "
-            f"{len(agents)} agents would be tried, allowed {MOST_JOINT_ACTIONS}; use sampling"
+            f"{len(agents)} agents would be tried, allowed {MAX_JOINT_ACTIONS}; use sampling"
         )
     k = len(agents)
     grid = np.indices((n_actions,) * k).reshape(k, n_actions**k)
@@ -58,97 +56,96 @@ def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatAr
 class ExactEnumeration(Aggregation):
     """Tries every joint action of the agents below, as the paper: ``A ** (1 + len(below))`` each.
 
-    If all agents together try at least as many joint actions as there are, and the prediction has
-    tables of all, next states are taken from there; else they are predicted for the joint actions
-    that are tried.
+    Next states come from tables of all joint actions, if the prediction has such tables and all
+    agents together evaluate at least that many joint actions.
 
     Raises
     ------
     ValueError
-        If an agent would have to try more than `MOST_JOINT_ACTIONS`.
+        If an agent would have to try more than `MAX_JOINT_ACTIONS`.
     """
 
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
         n, a = len(self.hierarchy), self.n_actions
-        self._below = [combinations(self.hierarchy.below(i), a) for i in range(n)]
-        uniform = problem.teammates == "uniform"
-        self._expected = np.full((n, a), 1.0 / a) if uniform else np.zeros((0, 0))
-        self._tried: list[Tried] = []
+        self._below = [combinations(self.hierarchy.searched(i), a) for i in range(n)]
+        self._indices: list[IntArray] = []
+        self._given_places: list[IntArray] = []
         self._means: tuple[tuple[object, ...], FloatArray] | None = None
-        if self.hierarchy.joint_actions(a) >= a**n:
+        self._uses_tables = self.hierarchy.count_joint_actions(a) >= a**n
+        if self._uses_tables:
             places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
-            self._tried = [self._tried_by(i, places) for i in range(n)]
-
-    def _tried_by(self, agent: int, places: IntArray) -> Tried:
-        below = np.array(self.hierarchy.below(agent), dtype=np.int64)
-        own = np.arange(self.n_actions)[:, None] * places[agent]
-        given = places.copy()
-        given[agent] = given[below] = 0
-        return own + self._below[agent] @ places[below], given, below
+            for agent in range(n):
+                below = list(self.hierarchy.searched(agent))
+                own = np.arange(a)[:, None] * places[agent]
+                self._indices.append((own + self._below[agent] @ places[below]).ravel())
+                given = places.copy()
+                given[[agent, *below]] = 0
+                self._given_places.append(given)
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        agent, problem = deliberation.agent, self.problem
-        conditional = problem.teammates == "conditional"
-        own_value = problem.rule == "value" and len(self.concerned[agent]) == 1
-        tables = None
-        if own_value and not conditional and self._tried:
-            tables = deliberation.prediction.tables()
-        if tables is not None:
-            tried, blocks = self._tried[agent], tables.blocks(agent)
-            self.count(agent, tried[0].size)
-            empirical = problem.teammates == "empirical"
-            expected = deliberation.frequencies if empirical else self._expected
-            weights, joint = deliberation.own_weights, deliberation.joint_action
-            return self.rules.enumerate(weights, blocks, tried, joint, expected)
-        below, probabilities = self.hierarchy.below(agent), None
-        if problem.teammates == "empirical":
+        agent = deliberation.agent
+        below = self.hierarchy.searched(agent)
+        probabilities = None
+        if self.problem.teammates == "empirical":
             probabilities = probabilities_of(deliberation.frequencies, below)
-        elif conditional:
+        elif self.problem.teammates == "conditional":
             probabilities = np.stack([probabilities_of(rows, below) for rows in deliberation.given])
         return self.aggregate(deliberation, self._below[agent], probabilities)
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
-        """Value each own action with each of the joint actions below, from tables if there are."""
-        tables = deliberation.prediction.tables() if self._tried else None
-        if tables is None or not tables.rewarded:
+        """Return values ``(A, m)``, from tables of all joint actions if the prediction has them."""
+        tables = deliberation.prediction.tables() if self._uses_tables else None
+        if tables is None or (self.problem.rule != "value" and not tables.rewarded):
             return super().worths(deliberation, tried)
-        known, places, _ = self._tried[deliberation.agent]
-        indices = (known + int(deliberation.joint_action @ places)).ravel()
-        self.count(deliberation.agent, len(indices))
+        agent = deliberation.agent
+        given = int(deliberation.joint_action @ self._given_places[agent])
+        indices = self._indices[agent] + given
+        self.count(agent, len(indices))
         worth = self.combine(
             lambda: tables.reward_table()[indices],
-            lambda: self._mean(deliberation, tables)[indices],
+            lambda: self._table_values(deliberation, tables, indices),
         )
         return worth.reshape(self.n_actions, -1)
 
-    def _mean(self, deliberation: Deliberation, tables: Tables) -> FloatArray:
-        """Return the mean value ``(A ** n,)`` of all joint actions, once for a whole decision."""
-        weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
-        of = tables, weights, concerned
-        if self._means is None or any(a is not b for a, b in zip(self._means[0], of, strict=True)):
-            indices, value = np.arange(self.n_actions ** len(weights)), self.rules.block_values
-            each = [value(weights[i], tables.blocks(i), indices) for i in concerned]
-            self._means = of, np.add.reduce(each) / len(each)
-        return self._means[1]
+    def _table_values(
+        self, deliberation: Deliberation, tables: Tables, indices: IntArray
+    ) -> FloatArray:
+        """Return the values ``(m,)`` of joint-action indices ``(m,)`` to the deciding agent.
+
+        The mean over several agents is computed for all joint actions, once in a decision.
+        """
+        weights = deliberation.weights
+        concerned = self.concerned[deliberation.agent]
+        if len(concerned) == 1:
+            blocks = tables.blocks(deliberation.agent)
+            return self.rules.block_values(deliberation.own_weights, blocks, indices)
+        key = tables, weights, concerned
+        if self._means is None or any(a is not b for a, b in zip(self._means[0], key, strict=True)):
+            every = np.arange(self.n_actions ** len(weights))
+            values = [
+                self.rules.block_values(weights[i], tables.blocks(i), every) for i in concerned
+            ]
+            self._means = key, np.add.reduce(values) / len(values)
+        return self._means[1][indices]
 
 
 class SamplingSettings(EvaluatorSettings):
-    """Try a random sample of the joint actions of the agents below."""
+    """Evaluate a random sample of the joint actions of the agents below."""
 
     kind: Literal["sampling"] = "sampling"
     factory: ClassVar[str] = f"{__name__}:Sampling"
     samples: Samples = 64
-    """Joint actions of the agents below that are tried with each own action."""
+    """Sample size: joint actions of the agents below, evaluated with each own action."""
 
 
 class Sampling(Aggregation):
-    """Tries a random sample of the joint actions below, the same ones for every own action.
+    """Evaluates a random sample of the joint actions below, the same for every own action.
 
-    Drawn with equal probability, or from the empirical frequencies if these are the teammate model
-    (then the plain mean estimates the weighted one). With no more joint actions than samples, all
-    are tried.
+    The sample is uniform, or drawn by the empirical frequencies if these are the teammate model;
+    the plain mean then estimates the weighted one. If there are no more joint actions than samples,
+    all are evaluated.
 
     Raises
     ------
@@ -167,7 +164,7 @@ class Sampling(Aggregation):
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        below, a = self.hierarchy.below(deliberation.agent), self.n_actions
+        below, a = self.hierarchy.searched(deliberation.agent), self.n_actions
         frequencies, rng = deliberation.frequencies, deliberation.rng
         empirical = self.problem.teammates == "empirical"
         probabilities = None
@@ -176,35 +173,35 @@ class Sampling(Aggregation):
             if empirical:
                 probabilities = probabilities_of(frequencies, below)
         elif empirical:
-            tried = self.drawn(frequencies[list(below)], self.samples, rng)
+            tried = self.sample(frequencies[list(below)], self.samples, rng)
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
         return self.aggregate(deliberation, tried, probabilities)
 
 
 class AutoSettings(EvaluatorSettings):
-    """Exact enumeration as long as it is quick, then sampling, then best responses."""
+    """Exact enumeration for small teams, then sampling, then best responses."""
 
     kind: Literal["auto"] = "auto"
     exact_up_to: Annotated[int, Field(ge=1, le=10)] = 5
-    """Agents that may still be free for exact enumeration."""
+    """Maximum number of agents whose joint actions are enumerated."""
     sampling_up_to: Annotated[int, Field(ge=1)] = 12
-    """Agents that may still be free for sampling, if agents decide by their own value and expect
-    best responses."""
+    """Maximum number of agents whose joint actions are sampled, if agents decide by their own value
+    and assume best responses."""
     samples: Samples = 64
-    """Joint actions that are tried by sampling, as of the evaluator ``sampling``."""
+    """Sample size, see the evaluator ``sampling``."""
 
     def build(self, problem: DecisionProblem) -> Evaluator:
         """Return the evaluator of a team."""
         return self.chosen(problem).build(problem)
 
     def chosen(self, problem: DecisionProblem) -> EvaluatorSettings:
-        """Return the settings of the evaluator that a team gets."""
+        """Return the settings of the chosen evaluator."""
         hierarchy = problem.hierarchy
         if problem.unseen == "plan" or problem.plan == "common":
             return EVALUATORS.parsed("best-response")
-        free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
-        if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MOST_JOINT_ACTIONS:
+        free = max(1 + len(hierarchy.searched(i)) for i in range(len(hierarchy)))
+        if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MAX_JOINT_ACTIONS:
             return EVALUATORS.parsed("exact")
         is_large = free > self.sampling_up_to or problem.value_of != "own"
         if is_large and problem.teammates == "best-response":

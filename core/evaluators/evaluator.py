@@ -1,9 +1,9 @@
-"""Evaluators: their interface, and what those that value joint actions have in common.
+"""Interface of evaluators, and the base class of those that evaluate joint actions.
 
-In the mean value of several agents each thing that they share is valued once. A rule base is a sum
-of terms. What a term of common variables is worth to all agents is what it is worth to one that has
-the sum of their consequent weights; likewise for the agents of one body and the variables that they
-share. So the mean of many agents costs little more than the value of a few.
+The mean value of several agents evaluates shared variables once. A rule base is a sum of terms; the
+value of a term of common variables to all agents equals its value under the sum of their weights.
+The same holds for the agents of one body and the variables of that body. The mean of many agents
+therefore costs little more than the value of a few.
 """
 
 from abc import ABC, abstractmethod
@@ -20,55 +20,52 @@ from ..interface.prediction import Exploring, Prediction, rewards_of, states_by_
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import PartSettings
-from ..rules.rule_base import Pooled, RuleBase
+from ..values.rule_base import PooledWeights, RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]
-"""By what a joint action is valued."""
+"""Decision rule: the criterion by which joint actions are compared."""
 Teammates = Literal["best-response", "uniform", "empirical", "conditional"]
-"""The teammate model: what the agents below are expected to do."""
-
+"""Teammate model: the assumed behavior of the agents below."""
 ValueOf = Literal["own", "below", "team"]
-"""Whose value decides: the agent's own, the mean of its own and those below it, or all agents'."""
+"""Averaged values: the agent's own, its own and those of the agents below, or all agents'."""
 Unseen = Literal["maintain", "last", "plan"]
-"""What agents are expected to do of whom nothing is heard and who are not considered."""
+"""Assumed behavior of agents that are neither heard nor searched over."""
 Plan = Literal["private", "common"]
 """Whether each agent makes its own plan, or all work out the same one."""
-
-
 Predicted = Callable[[], FloatArray]
-"""Predicts something of joint actions."""
+"""Predicts rewards or values of joint actions."""
 NOTHING_GIVEN: FloatArray = np.zeros((0, 0, 0))
-"""Conditional frequencies that nobody counts."""
+"""Empty conditional frequencies."""
 NO_STATES: FloatArray = np.zeros((0, 0))
-"""States that nobody looks at."""
+"""An empty array of states."""
 NOBODY: IntArray = np.zeros(0, dtype=np.int64)
-"""No agents."""
+"""An empty array of agents."""
 
 
 class Deliberation(NamedTuple):
-    """What an agent knows when it decides."""
+    """Knowledge of an agent that decides."""
 
     agent: int
     """The deciding agent."""
     joint_action: IntArray
-    """``(n,)`` the actions of which it was told; of the unseen what they are taken to do; neutral
-    for those below."""
+    """``(n,)`` actions that the agent was told, assumed actions of unseen agents, and neutral
+    actions of the agents below."""
     prediction: Prediction
-    """Predicts what joint actions would lead to."""
+    """Predicts the outcome of joint actions."""
     weights: Sequence[FloatArray]
     """The consequent weights ``(n_rules,)`` of every agent, in agent order."""
     frequencies: FloatArray
-    """``(n, A)`` how often each agent was seen to take each action, rows summing to one."""
+    """``(n, A)`` observed action frequencies of every agent; rows sum to one."""
     rng: np.random.Generator
     """Source of randomness."""
     given: FloatArray = NOTHING_GIVEN
-    """``(A, n, A)`` the same frequencies, given each action of the deciding agent; counted where
-    the teammate model asks for it, else empty."""
+    """``(A, n, A)`` the same frequencies given each action of the deciding agent. Empty unless the
+    teammate model is ``conditional``."""
     told: IntArray = NOBODY
-    """``(k,)`` the agents of whose actions it was told."""
+    """``(k,)`` agents whose actions it was told."""
     present: FloatArray = NO_STATES
-    """``(n, d)`` the states that all agents are in; where the learner values actions, with the
-    actions that they are told."""
+    """``(n, d)`` present states of all agents. Learners of action values append the actions that
+    each agent was told."""
 
     @property
     def own_weights(self) -> FloatArray:
@@ -80,63 +77,65 @@ class Evaluator(ABC):
     """Values the actions of one agent."""
 
     continues: ClassVar[bool] = False
-    """Whether it needs a prediction that goes on from where it leads, see `Prediction.after`."""
+    """Whether it needs predictions of several decisions (`Prediction.after`)."""
     counts: Counts
-    """What has been evaluated so far; the agents add what they learn."""
+    """Number of evaluations so far; the agents add their weight updates."""
     expected: IntArray | None = None
-    """``(n,)`` the joint action that the last agent to decide expected; none: it had no plan."""
+    """``(n,)`` joint action that the last deciding agent expected; None without a plan."""
 
     @abstractmethod
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
 
     def decide(self, first: Deliberation, exploring: Exploring) -> IntArray | None:
-        """Return what all agents decide ``(n,)``, who all hear all; None: ask one by one.
+        """Return the joint action ``(n,)`` of agents that all hear each other.
+
+        None if the evaluator has no joint search; then the agents decide one by one.
 
         Parameters
         ----------
         first
-            What the first agent knows.
+            Knowledge of the first agent.
         exploring
-            How agents explore, by actions that are held.
+            State and probabilities of exploration.
         """
         return None
 
 
 @dataclass(frozen=True)
 class DecisionProblem:
-    """What all decisions of a team have in common."""
+    """Properties that all decisions of a team share."""
 
     rules: RuleBase
     """The agents' rule base."""
     hierarchy: Hierarchy
-    """Who considers whom, and who is told by whom."""
+    """Communication and lookahead among the agents."""
     n_actions: int
-    """Actions A of every agent."""
+    """Number A of actions of every agent."""
     groups: tuple[tuple[int, ...], ...]
     """Agents by body."""
     rule: Rule
-    """By what a joint action is valued."""
+    """Decision rule."""
     teammates: Teammates
-    """What the agents below are expected to do."""
+    """Teammate model."""
     discount: float
-    """Weight of the value, where it is added to the reward."""
+    """Weight of the value if it is added to the reward."""
     value_of: ValueOf = "own"
-    """Whose value decides."""
+    """Agents whose values are averaged."""
     unseen: Unseen = "maintain"
-    """What the unseen are expected to do."""
+    """Assumed behavior of unseen agents."""
     plan: Plan = "private"
-    """Who makes a plan."""
+    """Whether plans are private or common."""
     handed_down: bool = True
-    """Whether all that is told arrives, so that a plan may be told, too."""
+    """Whether all messages arrive, so that plans may be handed down with them."""
     first: int | None = None
-    """Who of those agents decides first; none: the first of the hierarchy."""
+    """The agent of this group that decides first; None: the first of the hierarchy."""
     is_private: bool = False
-    """Whether agents have views of their own, so that nothing worked out for one is another's."""
+    """Whether agents have views of their own and share no intermediate results."""
 
 
 class EvaluatorSettings(PartSettings):
-    """What the settings of all evaluators inherit; `build` is given a `DecisionProblem`."""
+    """Base class of settings of evaluators; `build` takes a `DecisionProblem`."""
 
 
 EVALUATORS = SettingsRegistry(
@@ -156,7 +155,7 @@ EVALUATORS = SettingsRegistry(
 
 
 def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
-    """Return, for every agent, the agents whose values decide what it does, in agent order.
+    """Return, for every agent, the agents whose values it averages, in agent order.
 
     >>> chain = Hierarchy("abc", [("a", "b"), ("b", "c")])
     >>> [[list(map(int, who)) for who in concerned(chain, of)] for of in ("own", "below")]
@@ -165,19 +164,19 @@ def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
     every = range(len(hierarchy))
     if value_of == "team":
         return [np.arange(len(hierarchy))] * len(hierarchy)
-    below = [hierarchy.below(i) if value_of == "below" else () for i in every]
+    below = [hierarchy.searched(i) if value_of == "below" else () for i in every]
     return [np.array(sorted((i, *below[i]))) for i in every]
 
 
 class Learned:
-    """What some agents have learned when they decide; each of its parts is worked out once.
+    """Consequent weights of some agents during one decision; derived arrays are computed once.
 
     Parameters
     ----------
     weights
         The consequent weights ``(n_rules,)`` of every agent, in agent order.
     agents
-        ``(k,)`` the agents that it is about, in agent order.
+        ``(k,)`` the agents, in agent order.
     body_of
         ``(n,)`` the body of every agent.
     """
@@ -188,31 +187,33 @@ class Learned:
         self._body_of = body_of
 
     @cached_property
-    def is_nothing(self) -> bool:
+    def is_zero(self) -> bool:
         """Whether all their weights are zero."""
         each = (self.weights[i] for i in self.agents.tolist())
         return not any(own[:64].any() or own.any() for own in each)
 
     @cached_property
-    def pooled(self) -> Pooled:
-        """Their weights, summed where they see the same."""
+    def pooled(self) -> PooledWeights:
+        """Weights of the agents, summed over agents with the same variables."""
         theta = np.array([self.weights[i] for i in self.agents], dtype=float)
         bodies, firsts = np.unique(self._body_of[self.agents], return_index=True)
         summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
-        return Pooled((theta, *summed), self.agents, bodies, np.append(firsts, len(self.agents)))
+        return PooledWeights(
+            (theta, *summed), self.agents, bodies, np.append(firsts, len(self.agents))
+        )
 
 
 class Aggregation(Evaluator):
-    """What evaluators share: the decision rule, and the aggregation over teammates.
+    """Base class of evaluators: the decision rule and the aggregation over teammates.
 
     Raises
     ------
     ValueError
-        If there is to be a plan, and the evaluator makes none.
+        If the settings ask for a plan and the evaluator makes none.
     """
 
     plans: ClassVar[bool] = False
-    """Whether it makes plans for the other agents."""
+    """Whether the evaluator makes plans for the other agents."""
 
     def __init__(self, problem: DecisionProblem) -> None:
         wants_plans = {"unseen": problem.unseen == "plan", "plan": problem.plan == "common"}
@@ -229,7 +230,7 @@ class Aggregation(Evaluator):
         self.counts = Counts()
         self._prediction: Prediction | None = None
         self.concerned = concerned(self.hierarchy, problem.value_of)
-        """Per agent ``(k,)`` the agents whose values decide."""
+        """By agent, ``(k,)`` the agents whose values it averages."""
         self._body_of = np.array([g for g, group in enumerate(problem.groups) for _ in group])
         self._learned: Learned | None = None
         self._have_learned: set[int] = set()
@@ -241,9 +242,9 @@ class Aggregation(Evaluator):
             raise ValueError(f"learner.decision.{key} = {value!r}: {why}")
 
     def begins(self, deliberation: Deliberation) -> bool:
-        """Return whether a decision of the team begins with this one's; it is asked of each.
+        """Return whether this agent is the first in a decision of the team.
 
-        Of agents with views of their own each begins anew.
+        With views of their own, all agents are.
         """
         before, self._prediction = self._prediction, deliberation.prediction
         first = self.hierarchy.order[0] if self.problem.first is None else self.problem.first
@@ -251,23 +252,23 @@ class Aggregation(Evaluator):
         return is_first or self.problem.is_private
 
     def count(self, agent: int, joint_actions: int) -> None:
-        """Note that joint actions have been tried: valued by each agent concerned, or rewarded."""
+        """Count evaluated joint actions, and the rules that each averaged agent evaluated."""
         valued = 0 if self.problem.rule == "reward" else len(self.concerned[agent])
         self.counts.joint_actions += joint_actions
         self.counts.rule_evaluations += joint_actions * valued * self.rules.n_rules
 
-    def indifferent(self, deliberation: Deliberation) -> bool:
-        """Return whether every action must come to zero: nothing is learned yet, or ever."""
+    def all_values_zero(self, deliberation: Deliberation) -> bool:
+        """Return whether all weights are zero, as before learning."""
         agent = deliberation.agent
         if self.problem.rule != "value" or agent in self._have_learned:
             return False
-        if self.learned(deliberation).is_nothing:
+        if self.learned(deliberation).is_zero:
             return True
         self._have_learned.add(agent)
         return False
 
     def learned(self, deliberation: Deliberation) -> Learned:
-        """Return what those concerned have learned: one and the same for agents of one decision."""
+        """Return the weights of the averaged agents, the same object within a decision."""
         weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
         last = self._learned
         if last is None or last.weights is not weights or last.agents is not concerned:
@@ -275,12 +276,12 @@ class Aggregation(Evaluator):
         return last
 
     def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
-        """Return what joint actions ``(m, n)`` are worth to the deciding agent, ``(m,)``."""
+        """Return the values ``(m,)`` of joint actions ``(m, n)`` to the agent, and count them."""
         self.count(deliberation.agent, len(joint_actions))
         return self.predicted_worth(deliberation, joint_actions)
 
     def predicted_worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
-        """Return the same of joint actions, which the caller counts."""
+        """Return the same values without counting."""
         prediction = deliberation.prediction
         concerned = self.concerned[deliberation.agent]
 
@@ -292,30 +293,30 @@ class Aggregation(Evaluator):
 
         return self.combine(lambda: rewards_of(prediction, joint_actions), values)
 
-    def mean(self, pooled: Pooled, prediction: Prediction, joint: IntArray) -> FloatArray:
+    def mean(self, pooled: PooledWeights, prediction: Prediction, joint: IntArray) -> FloatArray:
         """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""
         own, shared = states_by_group(prediction, joint, self.problem.groups, self.rules.n_own)
         if len(pooled.bodies) < len(shared):
             shared = shared[pooled.bodies]
-        return self.rules.total(pooled, own, shared) / len(pooled.agents)
+        return self.rules.summed_values(pooled, own, shared) / len(pooled.agents)
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
-        """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
+        """Return values ``(A, m)`` of own actions, each with joint actions `tried` ``(m, k)``."""
         agent, a = deliberation.agent, self.n_actions
         n = len(deliberation.joint_action)
         joint = np.empty((a, len(tried), n), dtype=np.int64)
         joint[:] = deliberation.joint_action
         joint[:, :, agent] = np.arange(a)[:, None]
-        joint[:, :, list(self.hierarchy.below(agent))] = tried
+        joint[:, :, list(self.hierarchy.searched(agent))] = tried
         return self.worth(deliberation, joint.reshape(-1, n)).reshape(a, -1)
 
-    def drawn(self, probabilities: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:
-        """Return actions ``(samples, ...)`` drawn by their probabilities ``(..., A)``."""
+    def sample(self, probabilities: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:
+        """Sample actions ``(samples, ...)`` by their probabilities ``(..., A)``."""
         ladder = probabilities.cumsum(axis=-1)[..., :-1]
         return (rng.random((samples, *ladder.shape[:-1], 1)) >= ladder).sum(axis=-1)
 
     def combine(self, rewards: Predicted, values: Predicted) -> FloatArray:
-        """Return what the decision rule makes of rewards and values; it predicts what it needs."""
+        """Combine rewards and values by the decision rule; predict only those that it needs."""
         if self.problem.rule == "value":
             return values()
         if self.problem.rule == "reward":
@@ -325,18 +326,19 @@ class Aggregation(Evaluator):
     def aggregate(
         self, deliberation: Deliberation, tried: IntArray, probabilities: FloatArray | None
     ) -> FloatArray:
-        """Return the maximum, mean or weighted mean ``(A,)`` of worths, by the teammate model.
+        """Return the maximum, mean or weighted mean ``(A,)`` of values, by the teammate model.
 
         Parameters
         ----------
         deliberation
-            Whose.
+            Knowledge of the deciding agent.
         tried
             ``(m, k)`` joint actions of the agents below.
         probabilities
-            Of these ``(m,)``, or ``(A, m)`` where they depend on the own action; none: equal ones.
+            ``(m,)`` probabilities of these joint actions, or ``(A, m)`` given each own action;
+            None: all equal.
         """
-        if self.indifferent(deliberation):
+        if self.all_values_zero(deliberation):
             self.count(deliberation.agent, self.n_actions * len(tried))
             return np.zeros(self.n_actions)
         values = self.worths(deliberation, tried)

@@ -1,31 +1,29 @@
-"""The hierarchy of agents: who considers whom, and who is told by whom (Section II-D, Fig. 1).
+"""Hierarchies: the order of decisions, communication and lookahead (Section II-D, Fig. 1).
 
-A hierarchy is a directed acyclic graph, superior -> subordinate, over named agents. The agents
-decide in topological order, ties in agent order. An edge is two relations in one, which a
-hierarchy can part:
+A hierarchy is a directed acyclic graph over named agents, with edges from superior to subordinate.
+The agents decide in topological order; ties are broken by agent order. An edge stands for two
+relations, which can be switched separately:
 
-- *considering*: an agent tries the actions of those below it (averages or maximises over them):
-  of all its descendants, as in the paper, of its children alone, or of nobody;
-- *telling*: an agent is told what those above it have decided: all its ancestors, as in the paper,
-  its parents alone, or nobody.
+- *communication*: an agent receives the decided actions of its ancestors, as in the paper, of its
+  parents only, or of no agent;
+- *lookahead*: an agent searches over the actions of its descendants, as in the paper, of its
+  children only, or of no agent.
 
-Either may hold for ancestors or descendants in some bodies alone: within an agent's own body, in
-the next ones, which come directly before and after it in the order of bodies, or in those farther
-away.
+Either relation may be restricted to agents in certain bodies (robots): in the agent's own body, in
+the next bodies in the order of bodies, or in bodies farther away.
 
-Whom an agent neither considers nor is told of is *unseen*: it is taken to perform the neutral
-action, maintain, even if it has decided, unless the team reads the unseen otherwise (see
-`nested_agents.core.learners.learner`). In the paper's chain nobody is unseen.
+An agent that another one neither receives actions from nor searches over is *unseen* by it. The
+learner's settings say what is assumed about unseen agents. A chain has none.
 
-*Neighbours* are joined by an undirected edge: they decide at the same time. Each considers all
-actions of the other, as if it were below, and neither is told what the other does. Neighbours make
-joint-action learners (everybody is everybody's neighbour) and coordination graphs (few are).
+*Neighbors* are joined by an undirected edge. They decide at the same time: each searches over the
+actions of the other and receives no action from it. Complete graphs of neighbors are joint-action
+learners; sparse ones are coordination graphs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Collection, Iterable, Sequence
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator
 
@@ -33,59 +31,61 @@ from ..numerics import nx
 from ..plugins.words import expect, expect_each, expect_pairs
 from .picture import svg
 
-ARROW, LINE = "{} -> {}", "{} - {}"
-"""How a superior and its subordinate are written, and two neighbours."""
-WHERE = ("body", "next", "farther")
-"""In which body another agent is: in the same one, in the next one, or farther away."""
+ARROW = "{} -> {}"
+LINE = "{} - {}"
+BODY_DISTANCES = ("body", "next", "farther")
+"""Position of another agent's body: the same one, a next one, or one farther away."""
 
 
-def _some(where: tuple[str, ...]) -> tuple[str, ...]:
-    if not 1 <= len(where) <= 2 or not {*where} <= {*WHERE}:
-        raise ValueError(f"must be a list of one or two of {', '.join(WHERE)}")
-    return where
+def _check_body_distances(distances: tuple[str, ...]) -> tuple[str, ...]:
+    if not 1 <= len(distances) <= 2 or not {*distances} <= {*BODY_DISTANCES}:
+        raise ValueError(f"must be a list of one or two of {', '.join(BODY_DISTANCES)}")
+    return distances
 
 
-SomeBodies = Annotated[tuple[str, ...], AfterValidator(_some)]
-Told = Literal["ancestors", "parents", "none"] | SomeBodies
-"""By whom an agent is told what was decided; or in which bodies its ancestors tell it."""
-Considers = Literal["descendants", "children", "none"] | SomeBodies
-"""Whose actions an agent tries; or in which bodies those of its descendants."""
+BodyDistances = Annotated[tuple[str, ...], AfterValidator(_check_body_distances)]
+Communication = Literal["ancestors", "parents", "none"] | BodyDistances
+"""Agents whose decided actions an agent receives; or the bodies of the ancestors among them."""
+Lookahead = Literal["descendants", "children", "none"] | BodyDistances
+"""Agents whose actions an agent searches over; or the bodies of the descendants among them."""
 
 
 class Hierarchy:
-    """A directed acyclic graph over agents, some of whom may be neighbours.
+    """A directed acyclic graph over agents, some of which may be neighbors.
 
     Parameters
     ----------
     agents
-        Distinct agent names; their order is the agent order.
+        Distinct agent names, in agent order.
     edges
         Pairs (superior, subordinate) of names.
-    neighbours
-        Pairs of names of those who decide at the same time, each pair once.
-    told
-        By whom an agent is told what was decided.
-    considers
-        Whose actions an agent tries beside its own; neighbours count as its children.
+    neighbors
+        Pairs of names of agents that decide at the same time, each pair once.
+    communication
+        Agents whose decided actions an agent receives.
+    lookahead
+        Agents whose actions an agent searches over; neighbors count as children.
     bodies
-        Names of the agents of each body, in the order of bodies; none: each is a body of its own.
+        Names of the agents of each body, in the order of bodies. By default each agent is a body.
 
     Raises
     ------
     ValueError
-        If an agent is named twice or unknown, an edge occurs twice, leads to itself, or closes a
-        cycle, or two neighbours are superior and subordinate. The message names it.
+        If an agent is unknown or named twice, an edge is repeated, is a loop or closes a cycle, or
+        two neighbors are superior and subordinate.
 
     Examples
     --------
     >>> chain = Hierarchy(["a", "b", "c"], [("a", "b"), ("b", "c")])
-    >>> chain.order, chain.below(0), chain.above(2)
+    >>> chain.order, chain.searched(0), chain.senders(2)
     ((0, 1, 2), (1, 2), (0, 1))
-    >>> both = Hierarchy(["a", "b"], [], neighbours=[("a", "b")])
-    >>> both.below(0), both.below(1), both.above(1)
+    >>> both = Hierarchy(["a", "b"], [], neighbors=[("a", "b")])
+    >>> both.searched(0), both.searched(1), both.senders(1)
     ((1,), (0,), ())
-    >>> silent = Hierarchy("abc", [("a", "b"), ("b", "c")], told="none", considers="children")
-    >>> silent.below(0), silent.above(2), silent.unseen(1)
+    >>> silent = Hierarchy(
+    ...     "abc", [("a", "b"), ("b", "c")], communication="none", lookahead="children"
+    ... )
+    >>> silent.searched(0), silent.senders(2), silent.unseen(1)
     ((1,), (), (0,))
     """
 
@@ -93,130 +93,149 @@ class Hierarchy:
         self,
         agents: Sequence[str],
         edges: Iterable[tuple[str, str]],
-        neighbours: Iterable[tuple[str, str]] = (),
-        told: Told = "ancestors",
-        considers: Considers = "descendants",
+        neighbors: Iterable[tuple[str, str]] = (),
+        communication: Communication = "ancestors",
+        lookahead: Lookahead = "descendants",
         bodies: Iterable[Sequence[str]] = (),
     ) -> None:
         expect("the names of agents", Collection, agents=agents)
-        expect("pairs of names", Iterable, edges=edges, neighbours=neighbours, bodies=bodies)
+        expect("pairs of names", Iterable, edges=edges, neighbors=neighbors, bodies=bodies)
         expect_each("the names of agents", str, agents=agents)
+        self.agents = tuple(agents)
         pairs = tuple(edges)
-        beside_each_other = tuple(neighbours)
-        expect_pairs("pairs of names", edges=pairs, neighbours=beside_each_other)
-        agents = tuple(agents)
-        edges = [(str(a), str(b)) for a, b in pairs]
-        if not agents:
+        undirected = tuple(neighbors)
+        expect_pairs("pairs of names", edges=pairs, neighbors=undirected)
+        if not self.agents:
             raise ValueError("hierarchy: no agents")
-        for name in agents:
-            if agents.count(name) > 1:
+        for name in self.agents:
+            if self.agents.count(name) > 1:
                 raise ValueError(f"hierarchy: agent {name!r} is named more than once")
-        sides = [(str(a), str(b)) for a, b in beside_each_other]
-        if sides and considers not in ("descendants", "children"):
+        if undirected and lookahead not in ("descendants", "children"):
             raise ValueError(
-                f"hierarchy: considers = {considers!r}: neighbours consider each other; without "
-                "neighbours use independent"
+                f"hierarchy: lookahead = {lookahead!r}: neighbors search over each other's "
+                "actions; without neighbors use independent"
             )
-        _check_edges(edges, agents, ARROW, "superior")
-        _check_edges([tuple(sorted(pair)) for pair in sides], agents, LINE, "neighbour")
-        index = {name: i for i, name in enumerate(agents)}
-        graph = nx.empty_graph(len(agents), create_using=nx.DiGraph)
-        graph.add_edges_from((index[a], index[b]) for a, b in edges)
-        if not nx.is_directed_acyclic_graph(graph):
-            cycle = [agents[a] for a, _ in nx.find_cycle(graph)]
-            raise ValueError(f"hierarchy: cycle {' -> '.join([*cycle, cycle[0]])}")
-        self.agents = agents
-        self.edges = tuple(sorted(graph.edges))
-        beside = nx.empty_graph(len(agents))
-        beside.add_edges_from((index[a], index[b]) for a, b in sides)
-        self.neighbours = tuple(sorted(beside.edges))
-        """Pairs of neighbours, by index, each once."""
-        self.order: tuple[int, ...] = tuple(nx.lexicographical_topological_sort(graph))
-        for a, b in self.neighbours:
-            if nx.has_path(graph, a, b) or nx.has_path(graph, b, a):
-                pair = LINE.format(agents[a], agents[b])
-                raise ValueError(f"hierarchy: neighbours {pair} are superior and subordinate, too")
-        self.bodies = tuple(bodies) or tuple((name,) for name in agents)
-        place = {index[name]: k for k, body in enumerate(self.bodies) for name in body}
-
-        def related(agent: int, relation: Any, every: str) -> Iterable[int]:
-            if isinstance(relation, str):
-                return RELATIONS[relation](graph, agent)
-            away = {j: abs(place[j] - place[agent]) for j in RELATIONS[every](graph, agent)}
-            return [j for j, bodies in away.items() if WHERE[min(bodies, 2)] in relation]
-
-        below = [{*related(i, considers, "descendants"), *beside[i]} for i in beside]
-        self._below = tuple(tuple(sorted(agents)) for agents in below)
-        self._above = tuple(tuple(sorted(related(i, told, "ancestors"))) for i in beside)
-        self.told, self.considers = told, considers
-        self.depth: int = nx.dag_longest_path_length(graph) + 1
+        self._graph = self._directed([(superior, other) for superior, other in pairs])
+        self._undirected = self._joined(undirected)
+        self.edges: tuple[tuple[int, int], ...] = tuple(sorted(self._graph.edges))
+        """Pairs (superior, subordinate) of agent indices."""
+        self.neighbors: tuple[tuple[int, int], ...] = tuple(sorted(self._undirected.edges))
+        """Pairs of agent indices, each once."""
+        self.order: tuple[int, ...] = tuple(nx.lexicographical_topological_sort(self._graph))
+        """Agent indices in the order of decision."""
+        self.depth: int = nx.dag_longest_path_length(self._graph) + 1
         """Number of agents on the longest path."""
+        self.communication = communication
+        self.lookahead = lookahead
+        self.bodies = tuple(bodies) or tuple((name,) for name in self.agents)
+        body_index = {name: k for k, body in enumerate(self.bodies) for name in body}
+        self._body_of = [body_index[name] for name in self.agents]
+        agent_indices = range(len(self.agents))
+        self._senders = tuple(self._related(i, communication, "ancestors") for i in agent_indices)
+        searched = ({*self._related(i, lookahead, "descendants")} for i in agent_indices)
+        self._searched = tuple(
+            tuple(sorted(agents.union(self._undirected[i]))) for i, agents in enumerate(searched)
+        )
 
     def __len__(self) -> int:
         return len(self.agents)
 
     def __repr__(self) -> str:
         pairs = [ARROW.format(self.agents[a], self.agents[b]) for a, b in self.edges]
-        pairs += [LINE.format(self.agents[a], self.agents[b]) for a, b in self.neighbours]
+        pairs += [LINE.format(self.agents[a], self.agents[b]) for a, b in self.neighbors]
         return f"Hierarchy({len(self)} agents: {', '.join(pairs) or 'no edges'})"
 
     def _repr_svg_(self) -> str:
         levels = [0] * len(self)
-        for agent in self.order:
-            above = [levels[a] + 1 for a, b in self.edges if b == agent]
-            levels[agent] = max(above, default=0)
-        return svg(self.agents, levels, self.edges, self.neighbours)
+        for level, agents in enumerate(nx.topological_generations(self._graph)):
+            for agent in agents:
+                levels[agent] = level
+        return svg(self.agents, levels, self.edges, self.neighbors)
 
-    def below(self, agent: int) -> tuple[int, ...]:
-        """Return all agents whose actions `agent` considers, in agent order."""
-        return self._below[agent]
+    def senders(self, agent: int) -> tuple[int, ...]:
+        """Return the agents whose decided actions `agent` receives, in agent order."""
+        return self._senders[agent]
 
-    def above(self, agent: int) -> tuple[int, ...]:
-        """Return all agents whose actions `agent` is told, in agent order."""
-        return self._above[agent]
+    def searched(self, agent: int) -> tuple[int, ...]:
+        """Return the agents whose actions `agent` searches over, in agent order."""
+        return self._searched[agent]
 
     def unseen(self, agent: int) -> tuple[int, ...]:
-        """Return the agents that `agent` neither considers nor is told of."""
-        seen = {agent, *self._below[agent], *self._above[agent]}
+        """Return the agents that `agent` neither receives from nor searches over."""
+        seen = {agent, *self._searched[agent], *self._senders[agent]}
         return tuple(i for i in range(len(self)) if i not in seen)
 
     @property
-    def messages(self) -> int:
-        """How many messages there are in one decision of all agents.
+    def n_messages(self) -> int:
+        """Number of messages in one joint decision.
 
-        An agent is told by each agent above it what was decided; neighbours tell each other what
-        they have done, or what would be best.
+        Each agent receives one message from each of its senders. Neighbors exchange their last or
+        their best actions.
         """
-        return sum(map(len, self._above)) + 2 * len(self.neighbours) * (self.told != "none")
+        between_neighbors = 0 if self.communication == "none" else 2 * len(self.neighbors)
+        return sum(map(len, self._senders)) + between_neighbors
 
-    def joint_actions(self, n_actions: int) -> int:
-        """Return how many joint actions one decision of all agents enumerates (exact integer)."""
-        return sum(n_actions ** (1 + len(below)) for below in self._below)
+    def count_joint_actions(self, n_actions: int) -> int:
+        """Return the number of joint actions that exhaustive search tries in one joint decision."""
+        return sum(n_actions ** (1 + len(searched)) for searched in self._searched)
 
+    def _directed(self, edges: Sequence[tuple[str, str]]) -> nx.DiGraph:
+        """Return the checked graph of superiors and subordinates, over agent indices."""
+        self._check_edges(edges, ARROW, "superior")
+        graph = nx.DiGraph()
+        graph.add_nodes_from(range(len(self.agents)))
+        index = self.agents.index
+        graph.add_edges_from((index(superior), index(other)) for superior, other in edges)
+        if not nx.is_directed_acyclic_graph(graph):
+            cycle = [self.agents[superior] for superior, _ in nx.find_cycle(graph)]
+            raise ValueError(f"hierarchy: cycle {' -> '.join([*cycle, cycle[0]])}")
+        return graph
 
-RELATIONS: dict[str, Callable[[nx.DiGraph, int], Iterable[int]]] = {
-    "ancestors": lambda graph, agent: nx.ancestors(graph, agent),
-    "parents": lambda graph, agent: graph.predecessors(agent),
-    "descendants": lambda graph, agent: nx.descendants(graph, agent),
-    "children": lambda graph, agent: graph.successors(agent),
-    "none": lambda graph, agent: (),
-}
-"""Who is related to an agent in a hierarchy's graph."""
+    def _joined(self, pairs: Sequence[tuple[str, str]]) -> nx.Graph:
+        """Return the checked graph of neighbors, over agent indices."""
+        self._check_edges([tuple(sorted(pair)) for pair in pairs], LINE, "neighbor")
+        graph = nx.empty_graph(len(self.agents))
+        index = self.agents.index
+        graph.add_edges_from((index(first), index(second)) for first, second in pairs)
+        for a, b in sorted(graph.edges):
+            if nx.has_path(self._graph, a, b) or nx.has_path(self._graph, b, a):
+                pair = LINE.format(self.agents[a], self.agents[b])
+                raise ValueError(f"hierarchy: neighbors {pair} are superior and subordinate, too")
+        return graph
 
+    def _check_edges(self, edges: Sequence[tuple[str, ...]], form: str, role: str) -> None:
+        checked = set()
+        for edge in edges:
+            for name in edge:
+                if name not in self.agents:
+                    raise ValueError(
+                        f"hierarchy: edge {form.format(*edge)} names unknown agent {name!r}, "
+                        f"known: {', '.join(self.agents)}"
+                    )
+            if edge[0] == edge[1]:
+                raise ValueError(f"hierarchy: agent {edge[0]!r} cannot be its own {role}")
+            if edge in checked:
+                raise ValueError(f"hierarchy: edge {form.format(*edge)} is given more than once")
+            checked.add(edge)
 
-def _check_edges(
-    edges: Sequence[tuple[str, ...]], agents: tuple[str, ...], form: str, kind: str
-) -> None:
-    known, seen = set(agents), set()
-    for edge in edges:
-        for name in edge:
-            if name not in known:
-                raise ValueError(
-                    f"hierarchy: edge {form.format(*edge)} names unknown agent {name!r}, known: "
-                    f"{', '.join(agents)}"
-                )
-        if edge[0] == edge[1]:
-            raise ValueError(f"hierarchy: agent {edge[0]!r} cannot be its own {kind}")
-        if edge in seen:
-            raise ValueError(f"hierarchy: edge {form.format(*edge)} is given more than once")
-        seen.add(edge)
+    def _related(
+        self, agent: int, relation: str | tuple[str, ...], everyone: str
+    ) -> tuple[int, ...]:
+        """Return the agents in a relation to `agent`; `everyone` are those without restriction."""
+        related: Iterable[int]
+        match relation if isinstance(relation, str) else everyone:
+            case "ancestors":
+                related = nx.ancestors(self._graph, agent)
+            case "parents":
+                related = self._graph.predecessors(agent)
+            case "descendants":
+                related = nx.descendants(self._graph, agent)
+            case "children":
+                related = self._graph.successors(agent)
+            case _:
+                related = ()
+        if not isinstance(relation, str):
+            own = self._body_of[agent]
+            distances = {i: min(abs(self._body_of[i] - own), 2) for i in related}
+            related = [i for i, k in distances.items() if BODY_DISTANCES[k] in relation]
+        return tuple(sorted(related))

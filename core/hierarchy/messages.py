@@ -85,7 +85,9 @@ class Messages:
         """Who decides before whom of those who are there."""
         self.gone: BoolArray = np.zeros(n, dtype=bool)
         """``(n,)`` who has left."""
-        self.told: list[IntArray] = [np.array(hierarchy.above(i), dtype=np.int64) for i in range(n)]
+        self.told: list[IntArray] = [
+            np.array(hierarchy.senders(i), dtype=np.int64) for i in range(n)
+        ]
         """Per agent those who tell it, if no message fails."""
         self._repaired: dict[tuple[int, ...], Hierarchy] = {(): hierarchy}
         self._told_instead = {
@@ -94,7 +96,7 @@ class Messages:
             if isinstance(failure, ReparentedAgents)
         }
         beside: list[list[int]] = [[] for _ in range(n)]
-        for a, b in hierarchy.neighbours if hierarchy.told != "none" else ():
+        for a, b in hierarchy.neighbors if hierarchy.communication != "none" else ():
             beside[a].append(b)
             beside[b].append(a)
         self._beside = [np.array(sorted(others), dtype=np.int64) for others in beside]
@@ -130,7 +132,7 @@ class Messages:
             self._repaired[left] = self._without(left)
         self.hierarchy = self._repaired[left]
         every = range(len(self.hierarchy))
-        self.told = [np.array(self.hierarchy.above(i), dtype=np.int64) for i in every]
+        self.told = [np.array(self.hierarchy.senders(i), dtype=np.int64) for i in every]
         self.gone = np.zeros(len(self.hierarchy), dtype=bool)
         for k in left:
             self.gone |= self._masks[k]
@@ -246,5 +248,7 @@ def _reparented(
             raise ValueError(f"{known}: must decide before {names[agent]!r}")
     edges = [(names[a], names[b]) for a, b in hierarchy.edges if b not in agents]
     edges += [(failure.superior, names[agent]) for agent in agents]
-    changed = Hierarchy(names, edges, told=hierarchy.told, bodies=hierarchy.bodies)
-    return {i: np.array(changed.above(i), dtype=np.int64) for i in range(len(hierarchy))}
+    changed = Hierarchy(
+        names, edges, communication=hierarchy.communication, bodies=hierarchy.bodies
+    )
+    return {i: np.array(changed.senders(i), dtype=np.int64) for i in range(len(hierarchy))}

@@ -47,8 +47,8 @@ def without(hierarchy: Hierarchy, gone: Sequence[int], repair: Repair) -> Hierar
     return Hierarchy(
         names,
         [(names[a], names[b]) for a, b in graph.edges],
-        [(names[a], names[b]) for a, b in hierarchy.neighbours if not {a, b} & left],
-        told=hierarchy.told,
-        considers=hierarchy.considers,
+        [(names[a], names[b]) for a, b in hierarchy.neighbors if not {a, b} & left],
+        communication=hierarchy.communication,
+        lookahead=hierarchy.lookahead,
         bodies=hierarchy.bodies,
     )

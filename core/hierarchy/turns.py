@@ -74,7 +74,7 @@ def slots_of(
 def all_hear_all(hierarchy: Hierarchy) -> bool:
     """Return whether everybody is told all that was decided before, and considers all others."""
     return all(
-        len(hierarchy.above(agent)) == place and not hierarchy.unseen(agent)
+        len(hierarchy.senders(agent)) == place and not hierarchy.unseen(agent)
         for place, agent in enumerate(hierarchy.order)
     )
 
@@ -86,7 +86,7 @@ def levels_of(hierarchy: Hierarchy) -> list[int]:
     """
     levels: dict[int, int] = {}
     for agent in hierarchy.order:
-        above = [levels[other] for other in hierarchy.above(agent)]
+        above = [levels[other] for other in hierarchy.senders(agent)]
         levels[agent] = 1 + max(above, default=-1)
     return [levels[agent] for agent in range(len(hierarchy))]
 
@@ -104,7 +104,7 @@ def _runs(hierarchy: Hierarchy, part_of: Sequence[int], at_once: Sequence[bool])
         part = part_of[agent]
         last = runs[-1] if runs else []
         joins = at_once[part] and bool(last) and part_of[last[0]] == part
-        if joins and not set(last) & set(hierarchy.above(agent)):
+        if joins and not set(last) & set(hierarchy.senders(agent)):
             last.append(agent)
         else:
             runs.append([agent])
@@ -112,7 +112,7 @@ def _runs(hierarchy: Hierarchy, part_of: Sequence[int], at_once: Sequence[bool])
 
 
 def _slot(hierarchy: Hierarchy, part: int, agents: list[int]) -> Slot:
-    above = [hierarchy.above(agent) for agent in agents]
+    above = [hierarchy.senders(agent) for agent in agents]
     receivers = np.repeat(np.array(agents, dtype=np.int64), [len(senders) for senders in above])
     senders = np.array([j for senders in above for j in senders], dtype=np.int64)
     return Slot(part, np.array(agents, dtype=np.int64), receivers, senders)

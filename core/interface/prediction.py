@@ -42,12 +42,16 @@ class Blocks:
     where others matter to them. If not, the blocks give for every index exactly what
     `Prediction.states` gives; if so, of the shared variables only."""
 
+    def rows(self, indices: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the rows ``(m,)`` of `own` and of `shared` for joint-action indices ``(m,)``."""
+        local = indices // self.divisor % (len(self.own_rows) or len(self.own))
+        own = self.own_rows[local] if len(self.own_rows) else local
+        return own, self.shared_rows[indices] if len(self.shared_rows) else indices
+
     def states(self, indices: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of joint-action indices ``(m,)``."""
-        local = indices // self.divisor % (len(self.own_rows) or len(self.own))
-        own = self.own[self.own_rows[local] if len(self.own_rows) else local]
-        shared = self.shared[self.shared_rows[indices] if len(self.shared_rows) else indices]
-        return np.concatenate([own, shared], axis=1)
+        own_rows, shared_rows = self.rows(indices)
+        return np.concatenate([self.own[own_rows], self.shared[shared_rows]], axis=1)
 
 
 class Exploring(NamedTuple):

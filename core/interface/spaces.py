@@ -71,7 +71,7 @@ class Variable:
     """Whether `low` and `high` are the same point (an angle)."""
     centres: tuple[float, ...] = ()
     """Default centres of the membership functions, increasing, within the range. Empty: spread
-    evenly, see `core.rules.kernels.fuzzy.Partition.of`."""
+    evenly, see `core.values.partitions.Partition.of`."""
     labels: tuple[str, ...] = ()
     """Words for the membership functions, in the order of `centres`; empty: numbered."""
     mirrored: Literal["same", "opposite"] | None = None

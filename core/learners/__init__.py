@@ -1,9 +1,8 @@
-"""Learners: how the consequent weights of all agents follow from experience.
+"""Learners, which update the consequent weights of all agents from experience.
 
-Conventions. A learner sees *after-states*: the states ``(n, d)`` that the agents enter, with the
-reward received on entering them, R(s) of Eq. 7. The first state of an episode carries no reward
-and is not learned from. A terminal state counts as entered again for ever: its value is
-R(s) / (1 - discount). Siblings differ where their mathematics differs.
+A learner observes *after-states*: the states ``(n, d)`` that the agents enter, with the reward
+received on entering them, R(s) of Eq. 7. The first state of an episode has no reward and is not
+learned from. A terminal state counts as entered forever: its value is R(s) / (1 - discount).
 """
 
 from pkgutil import resolve_name
@@ -18,7 +17,7 @@ FUNCTIONS = f"{CORE}.functions.settings:FunctionSettings"
 
 
 def base_of(thing: object) -> type[TeamSettings]:
-    """Return which settings a user's thing has: those of a function that decides, or a learner."""
+    """Return the settings class of a user's part: a decision function, or a learner."""
     base: type[TeamSettings] = resolve_name(FUNCTIONS) if decides(thing) else LearnerSettings
     return base
 
@@ -50,12 +49,12 @@ LEARNERS = SettingsRegistry(
 
 
 def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
-    """Refuse a learner that needs a prediction in a scenario that has none.
+    """Refuse a learner that needs predictions in a scenario without a predictor.
 
     Raises
     ------
     ValueError
-        If it is so; one line, which names the learners that need none.
+        If there is no predictor; the message names the learners that need none.
     """
     if not settings.needs_prediction or scenario.predicts:
         return

@@ -1,10 +1,10 @@
 """Learning by ridge regression on all experience (Ernst, Geurts and Wehenkel 2005).
 
-After every episode, and during long ones, several times over: give every after-state s in memory a
-target, and find the weights that minimise the squared errors of f plus ``ridge`` times the squared
-weights. Batch TD(lambda) aims at the lambda-return of what followed. Targets are clipped to the
-range that discounted sums of the rewards seen so far can reach: no extrapolation can run away.
-Agents that share weights share the regression: the experience of all of them is pooled.
+After every episode, and during long ones, the following is repeated several times: give every
+stored after-state s a target, and find the weights that minimize the squared errors of f plus
+``ridge`` times the squared weights. The targets of batch TD(lambda) are lambda-returns. They are
+clipped to the range of discounted sums of the observed rewards, so that extrapolation cannot
+diverge. Agents that share weights share the regression and pool their experience.
 """
 
 from __future__ import annotations
@@ -17,60 +17,60 @@ from pydantic import Field
 
 from ..numerics import FloatArray, IntArray, njit
 from ..plugins.settings import Fraction, Positive
-from ..rules.rule_base import RuleBase
+from ..values.rule_base import RuleBase
 from .learner import Learner, LearnerSettings
 
 TERMINAL, CUT_OFF = -1, -2
-"""In place of the index of the next after-state: it is entered for ever; it is not known."""
+"""Indices of the next after-state: the same state forever, or unknown."""
 REWARD_SCALE = 100.0
-"""Rewards are of the order of 0.01; the ridge weighs against rewards times this."""
+"""Scale of rewards, which are of the order of 0.01, in the regression."""
 MOST_RULES = 4096
-"""Of one agent: more make normal equations that take too long to be solved densely."""
+"""Maximum number of rules of an agent: normal equations are solved densely."""
 Function = Callable[[FloatArray], FloatArray]
 
 
 class BatchTDSettings(LearnerSettings):
-    """Batch TD(lambda): towards what followed, regressing on all experience."""
+    """Batch TD(lambda): regression on all experience, with lambda-returns as targets."""
 
     kind: Literal["batch-td"] = "batch-td"
     factory: ClassVar[str] = f"{__name__}:BatchTD"
     ridge: Positive = 10.0
-    """Weight of the squared consequents against squared errors of rewards scaled by 100: larger, if
-    values are jagged; smaller, if they are flat."""
+    """Penalty on squared weights, relative to squared errors of rewards scaled by 100. Increase it
+    if values are jagged, decrease it if they are flat."""
     regression_iterations: Annotated[int, Field(ge=1, le=10_000)] = 30
-    """Regressions on freshly discounted targets each time."""
+    """Number of regressions per update, each with new targets."""
     target_averaging_rate: Annotated[float, Field(gt=0, le=1)] = 0.5
-    """Share of the way that the weights go towards the last regression's: below 1 the policy does
-    not jump from episode to episode."""
+    """Step from the old weights to those of the last regression. Below 1, the policy changes
+    smoothly from episode to episode."""
     interval: Annotated[int, Field(ge=1)] = 100
-    """Decisions of an episode after which is regressed without waiting for its end."""
+    """Number of decisions between updates within an episode."""
     mirrored: bool = False
-    """Whether what the mirror image of the team would have met is experience as well."""
+    """Whether to learn from the mirror image of every step, too."""
     trace_decay: Fraction = 0.0
     """Trace decay lambda: 0 bootstraps from the next state, 1 sums the rewards of an episode."""
 
     @property
     def is_mirrored(self) -> bool:
-        """Whether what the mirror image of the team would have met is experience as well."""
+        """Whether to learn from the mirror image of every step, too."""
         return self.mirrored
 
 
 def solver(gram: FloatArray) -> Function:
-    """Return what solves ``gram theta = moment`` for theta, the matrix being factored once."""
+    """Return a function that solves ``gram theta = moment`` for theta; factor the matrix once."""
     from scipy.linalg import cho_factor
-    from scipy.linalg.lapack import dpotrs  # `cho_solve` without what that does around it
+    from scipy.linalg.lapack import dpotrs  # `cho_solve` without its checks
 
     factor, lower = cho_factor(gram, check_finite=False)
     return lambda moment: dpotrs(factor, moment, lower)[0]
 
 
 class Earlier(NamedTuple):
-    """After-states of a row that agents of another team met."""
+    """After-states of a row from another team."""
 
     states: FloatArray
     """``(m, d)``."""
     rewards: FloatArray
-    """``(m,)``, as they were received."""
+    """``(m,)`` rewards."""
     follower: IntArray
     """``(m,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
 
@@ -81,7 +81,7 @@ class BatchTD(Learner):
     Raises
     ------
     ValueError
-        If the rule base is too large for its normal equations to be solved densely.
+        If the rule base is too large for a dense solution.
     """
 
     def __init__(self, settings: Any, rules: RuleBase, rows: IntArray) -> None:
@@ -100,24 +100,24 @@ class BatchTD(Learner):
         self._states: list[FloatArray] = []
         self._rewards: list[FloatArray] = []
         self._follower: list[int] = []
-        self._begun = 0  # the first after-state of the running episode
-        # By row, active rules and strengths of the after-states so far regressed on.
+        self._episode_start = 0  # index of the first after-state of the episode
+        # By row, active rules and strengths of the after-states in the last regression.
         self._active: list[tuple[IntArray, FloatArray]] = []
         self._regressed = 0
-        # By row, the ridge and the sum of phi phi' over so many of these.
+        # By row, the ridge plus the sum of phi phi', and the number of after-states in it.
         self._summed: dict[int, tuple[FloatArray, int]] = {}
 
     def begin_episode(self) -> None:
-        """Note that the first after-state follows none, even if the last episode was given up."""
+        """Begin an episode, even if the last one was interrupted."""
         self._cut_off()
-        self._begun = len(self._states)
+        self._episode_start = len(self._states)
 
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
-        """Remember an after-state; regress if the episode has gone on for long enough."""
+        """Store an after-state; regress after every `interval` decisions."""
         self._states.append(states.copy())
         self._rewards.append(np.broadcast_to(np.asarray(reward, dtype=float), (len(states),)))
         self._follower.append(TERMINAL if terminated else len(self._states))
-        lasted = len(self._states) - self._begun
+        lasted = len(self._states) - self._episode_start
         return 0 if terminated or lasted % self.settings.interval else self._regress()
 
     def end_episode(self) -> int:
@@ -130,7 +130,7 @@ class BatchTD(Learner):
             self._follower[-1] = CUT_OFF
 
     def _regress(self) -> int:
-        """Return how many weights have changed: all of them."""
+        """Update all weights; return their number."""
         self._extend()
         s = self.settings
         outcomes = self._outcomes()
@@ -149,26 +149,26 @@ class BatchTD(Learner):
         return self.theta.size
 
     def _equations(self, row: int, known: FloatArray) -> tuple[FloatArray, Function, Function]:
-        """Return the weights ``(N,)`` of after-states, and how their values and theta follow.
+        """Return weights ``(N,)`` of after-states, and functions for their values and for theta.
 
         Parameters
         ----------
         row
-            Whose.
+            Row of weights.
         known
-            ``(N,)`` 1 for after-states of which it is known what followed, 0 for others.
+            ``(N,)`` 1 for after-states with a known successor, 0 for others.
         """
         active, strengths = self._active[row]
         k = self.rules.n_rules
         gram, begin = self._summed.get(row, (self.settings.ridge * np.eye(k), 0))
-        # The last is added once it is known what followed.
+        # The last after-state is added once its successor is known.
         end = len(known) if known[-1] else len(known) - len(self.members[row])
         add_gram(gram, active[begin:end], strengths[begin:end], known[begin:end])
         self._summed[row] = gram, end
         return known, lambda theta: row_values(theta, active, strengths), solver(gram)
 
     def _extend(self) -> None:
-        """Find the active rules of the after-states that are new since the last regression."""
+        """Find the active rules of after-states that are new since the last regression."""
         if self._regressed == len(self._states):
             return
         rows = range(len(self.theta))
@@ -184,12 +184,12 @@ class BatchTD(Learner):
         return self.rules.active(states)
 
     def _outcomes(self) -> list[tuple[FloatArray, IntArray]]:
-        """Return rewards and followers of all after-states by row, the earlier ones first.
+        """Return rewards and successors of all after-states by row, earlier ones first.
 
-        Of k agents and N steps, after-state ``s * k + j`` is that of agent j after step s.
+        With k agents, after-state ``s * k + j`` is that of agent j after step s.
         """
         steps = np.array(self._follower, dtype=np.int64)[:, None]
-        steps[steps == len(steps)] = CUT_OFF  # of a running episode: not known yet
+        steps[steps == len(steps)] = CUT_OFF  # the episode continues
         paid = np.array(self._rewards).reshape(-1, self._n_agents)
         outcomes = []
         for earlier, members in zip(self._earlier, self.members, strict=True):
@@ -200,7 +200,7 @@ class BatchTD(Learner):
         return outcomes
 
     def states_of(self, row: int, since: int = 0) -> FloatArray:
-        """Return the after-states ``(m, d)`` of a row, those since a step of this team alone."""
+        """Return the after-states ``(m, d)`` of a row, or those of this team since a step."""
         d = len(self.rules.partitions)
         new = np.array(self._states[since:]).reshape(-1, self._n_agents, d)
         own = new[:, self.members[row]].reshape(-1, d)
@@ -228,7 +228,7 @@ class BatchTD(Learner):
         self._rewards = list(arrays["rewards"])
         self._follower = [int(f) for f in arrays["follower"]]
         ended = [s for s, f in enumerate(self._follower) if f in (TERMINAL, CUT_OFF)]
-        self._begun = ended[-1] + 1 if ended else 0
+        self._episode_start = ended[-1] + 1 if ended else 0
         rows = arrays["earlier_rows"]
         self._earlier = [
             Earlier(*(arrays[f"earlier_{name}"][rows == row] for name in Earlier._fields))
@@ -237,7 +237,7 @@ class BatchTD(Learner):
         self._active, self._regressed, self._summed = [], 0, {}
 
     def continue_from(self, former: Self, rows: IntArray) -> None:
-        """Begin with weights and experience of another team, of which no episode is under way."""
+        """Start from weights and experience of another team, between its episodes."""
         self.theta = former.theta[rows]
         outcomes = former._outcomes()
         self._earlier = [Earlier(former.states_of(row), *outcomes[row]) for row in rows]
@@ -247,7 +247,7 @@ class BatchTD(Learner):
 def add_gram(
     gram: FloatArray, active: IntArray, strengths: FloatArray, weights: FloatArray
 ) -> None:
-    """Add the weighted phi phi' of every row to `gram`."""
+    """Add the weighted phi phi' of every after-state to `gram`."""
     for s in range(len(active)):
         for a in range(active.shape[1]):
             weighted = weights[s] * strengths[s, a]

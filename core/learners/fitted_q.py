@@ -1,19 +1,18 @@
-"""Fitted Q: values of actions, regressed without a predictor (Ernst, Geurts and Wehenkel 2005).
+"""Fitted Q iteration: action values without a predictor (Ernst, Geurts and Wehenkel 2005).
 
-An agent values its own actions in the state that it is in, given the actions that it is told; it
-needs no prediction of where they lead, and considers nobody. Its rule base is over its state
-variables and, for each agent that tells it something, a variable with a membership function at
-every action and one for ``nobody``; every rule has as many consequents as the agent has actions. So
-the hierarchy says what an agent can make its action depend on: agents that are told nothing are
-independent learners.
+An agent evaluates its own actions in its present state, given the actions that it is told. It needs
+no predictor and does not search over the actions of others. Its rule base is over its state
+variables and, for each sender, a variable with a membership function at every action and one for
+a missing sender. Every rule has one consequent per action. The hierarchy thus determines the inputs
+of an agent's policy; agents without messages are independent learners.
 
-Learning is that of batch TD, but for the target. With x what an agent knew at a decision, u what it
-did then, r what all this paid, and (x', u') the next decision::
+Learning is that of batch TD with another target. Let x be the knowledge of an agent at a decision,
+u its action, r the reward, and (x', u') the next decision::
 
     Q(x, u) = r + gamma max_v Q(x', v)
 
-The maximum is the agent's own: what it was told is part of x', and is not maximised over. There is
-one reward and one target for each *joint* step, so that no agent learns from another's turn.
+The maximum is over the agent's own actions; messages are part of x'. There is one reward and one
+target for each *joint* step, so that no agent learns from another agent's turn.
 """
 
 from __future__ import annotations
@@ -32,54 +31,55 @@ from ..interface.spaces import ActionSet, StateSpace, choice
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
 from ..plugins.settings import Positive
-from ..rules.kernels.fuzzy import Partition
-from ..rules.rule_base import RuleBase
+from ..values.partitions import Partition
+from ..values.rule_base import RuleBase
 from .batch import BatchTD, Earlier, Function, add_gram, row_values, solver
 from .learner import LearnerSettings
 
 NOBODY = "nobody"
-"""What an agent is told by a sender that it has not."""
+"""Message of a missing sender."""
 
 
 class FittedQSettings(LearnerSettings):
-    """Fitted Q: values of actions, without a predictor."""
+    """Fitted Q iteration: action values without a predictor."""
 
     kind: Literal["fitted-q"] = "fitted-q"
     factory: ClassVar[str] = f"{__name__}:FittedQ"
     values_actions = True
     ridge: Positive = 0.1
-    """Weight of the squared consequents against squared errors of rewards scaled by 100."""
+    """Penalty on squared weights, relative to squared errors of rewards scaled by 100."""
     regression_iterations: Annotated[int, Field(ge=1, le=10_000)] = 8
-    """Regressions on freshly discounted targets each time."""
+    """Number of regressions per update, each with new targets."""
     target_averaging_rate: Annotated[float, Field(gt=0, le=1)] = 1.0
-    """Share of the way that the weights go towards the last regression's."""
+    """Step from the old weights to those of the last regression."""
     interval: Annotated[int, Field(ge=1)] = 1_000_000
-    """Decisions of an episode after which is regressed without waiting for its end."""
+    """Number of decisions between updates within an episode."""
     trace_decay: ClassVar[float] = 0.0
     forgetting: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    """Share of its weight that experience loses from regression to regression: what it was worth to
-    act so depends on what the others did then."""
+    """Share of its weight that old experience loses per update, because its rewards depend on the
+    former actions of the other agents."""
     mirrored: bool = False
-    """Whether what the mirror image of the team would have met is experience as well; of agents
-    that are told nothing."""
+    """Whether to learn from the mirror image of every step, too; only for agents without
+    messages."""
     exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration(
         rate=1.0, decay=0.85, floor=0.05, length=1.0
     )
-    """How agents explore: without a predictor they begin at random."""
+    """Exploration. Without a predictor, agents begin with random actions."""
 
     @property
     def is_mirrored(self) -> bool:
-        """Whether what the mirror image of the team would have met is experience as well."""
+        """Whether to learn from the mirror image of every step, too."""
         return self.mirrored
 
     def rules_over(
         self, space: StateSpace, actions: ActionSet, n_told: int
     ) -> tuple[StateSpace, RuleBase]:
-        """Return what values are functions of, the own action last, and their rule base."""
+        """Return the inputs of the value function, the own action last, and their rule base."""
         self._check_decision()
         if self.mirrored and n_told:
             raise ValueError(
-                "learner.mirrored = true: messages have no mirror image; set topology.told = 'none'"
+                "learner.mirrored = true: messages have no mirror image; set "
+                "topology.communication = 'none'"
             )
         told = [choice(f"told{k + 1}", (*actions.names, NOBODY)) for k in range(n_told)]
         names = tuple(variable.name for variable in told)
@@ -94,7 +94,7 @@ class FittedQSettings(LearnerSettings):
         return StateSpace(space.name, (*known.variables, action)), rules
 
     def _check_decision(self) -> None:
-        """Refuse what takes a prediction."""
+        """Refuse decision settings that need a predictor."""
         decision = self.decision
         allowed = DecisionSettings(rule=decision.rule, unseen=decision.unseen)
         refused = {
@@ -134,7 +134,7 @@ class FittedQ(BatchTD, Evaluator):
         k = self._known.n_rules
         self._gram: FloatArray = np.zeros((len(self.theta), self._n_actions, k, k))
         self._weights: list[FloatArray] = [np.zeros(0)] * len(self.theta)
-        """By row, with what weight the sums hold each decision."""
+        """Weight of each decision in the sums, by row."""
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action in the agent's present state."""
@@ -161,7 +161,7 @@ class FittedQ(BatchTD, Evaluator):
         return active * self._n_actions + states[:, -1:].astype(np.int64), strengths
 
     def _equations(self, row: int, known: FloatArray) -> tuple[FloatArray, Function, Function]:
-        """As in batch TD, action by action; a state is worth its best action."""
+        """Solve as in batch TD, by action. The value of a state is that of its best action."""
         (taken, strengths), n_actions = self._active[row], self._n_actions
         active, ridge = taken // n_actions, self.settings.ridge * np.eye(self._known.n_rules)
         gram, weights = self._sums(row, known)
@@ -213,12 +213,12 @@ class FittedQ(BatchTD, Evaluator):
     def continue_from(self, former: Self, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way.
 
-        Agents may be told by another number of others: see `carried_weights` and `_with_told`.
+        The number of messages may differ: see `carried_weights` and `_with_told`.
 
         Raises
         ------
         ValueError
-            If the values of the others are no sum of these rules; one line.
+            If the former values are not a sum of these rules.
         """
         super().continue_from(former, rows)
         self._weights = [former._weights[row].copy() for row in rows]
@@ -235,7 +235,7 @@ class FittedQ(BatchTD, Evaluator):
             self._add(row, taken, strengths, self._weights[row])
 
     def _with_told(self, earlier: Earlier) -> FloatArray:
-        """Return decisions as they are known here: told by fewer others, or by nobody else."""
+        """Return decisions with the number of messages of this team; missing senders are marked."""
         states = earlier.states
         missing = max(len(self.rules.partitions) - states.shape[1], 0)
         known = states[:, : len(self.rules.partitions) - 1 - missing]
@@ -244,15 +244,15 @@ class FittedQ(BatchTD, Evaluator):
 
 
 def carried_weights(former: RuleBase, rules: RuleBase, theta: FloatArray) -> FloatArray:
-    """Return the weights ``(k, n_rules)`` by which rules have the values of others ``(k, n)``.
+    """Convert the weights ``(k, n)`` of one rule base to those ``(k, n_rules)`` of another.
 
-    Variables are the same, but for the last of those that are told. Where rules are of one that
-    there was not, it says nothing. One that there is no more is told ``nobody``.
+    The rule bases differ in the number of messages only. The value does not depend on a new
+    message; a removed message is fixed to a missing sender.
 
     Raises
     ------
     ValueError
-        If a product of variables that is left is none of these rules.
+        If a remaining product of variables is not a term of the new rule base.
     """
     shared = min(len(former.partitions), len(rules.partitions)) - 1
     own = len(rules.partitions) - 1
@@ -267,8 +267,8 @@ def carried_weights(former: RuleBase, rules: RuleBase, theta: FloatArray) -> Flo
         into = [k for k, other in enumerate(rules.terms) if set(kept) <= set(other)]
         if not into:
             raise ValueError(
-                "learner.rule_base: an agent is told by fewer others than when it learned, and "
-                "has no rules over what is left of its products"
+                "learner.rule_base: an agent receives fewer messages than when it learned, and "
+                "has no rules over the remaining variables of its products"
             )
         place = next((k for k in into if len(rules.terms[k]) == len(kept)), into[0])
         wide = [

@@ -1,4 +1,4 @@
-"""What every learner is to a team, and what the settings of all learners share."""
+"""Interface of learners, and the base classes of their settings."""
 
 from __future__ import annotations
 
@@ -27,29 +27,31 @@ from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
 from ..plugins.settings import PartSettings, unwritten
-from ..rules.rule_base import RuleBase, RuleBaseSettings
+from ..values.rule_base import RuleBase, RuleBaseSettings
 
 CORE = __name__.rpartition(".learners")[0]
-"""Where the rooms are in which agents are found by name."""
+"""Dotted name of the package that holds the kinds of agents."""
 
 
 class Learner(ABC):
-    """Turns experience into consequent weights.
+    """Learns consequent weights from experience.
 
-    Agents that share weights have one row of them in common; `rows`, which a learner is built with,
-    says which row is whose.
+    Agents that share weights have one row of them in common. A learner is built with the row of
+    every agent.
     """
 
+    fixed_arrays: ClassVar[tuple[str, ...]] = ("theta",)
+    """Names of saved arrays whose shapes the settings determine."""
     theta: FloatArray
     """``(n_rows, n_rules)`` consequent weights."""
 
     @abstractmethod
     def begin_episode(self) -> None:
-        """Forget what reached into the past: an episode begins."""
+        """Begin an episode: clear traces of the last one."""
 
     @abstractmethod
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
-        """Take in the states entered; return the number of consequent weights changed.
+        """Learn from the states entered; return the number of weights changed.
 
         Parameters
         ----------
@@ -69,15 +71,15 @@ class Learner(ABC):
         reward: float | FloatArray,
         terminated: bool,
     ) -> int:
-        """Take in what a decision led to; learners of after-states `observe` that alone.
+        """Learn from a decision and its outcome. Learners of state values use the outcome only.
 
         Parameters
         ----------
         left
-            ``(n, d)`` what the agents knew when they decided: the states that they were in, with
-            the actions that they were told if the learner values actions.
+            ``(n, d)`` states in which the agents decided. Learners of action values append the
+            actions that each agent was told.
         joint_action
-            ``(n,)`` what they then did.
+            ``(n,)`` actions taken.
         states, reward, terminated
             As of `observe`.
         """
@@ -85,7 +87,7 @@ class Learner(ABC):
 
     @abstractmethod
     def end_episode(self) -> int:
-        """Learn what is learned after an episode. Returns the number of weights changed."""
+        """Make the updates that follow an episode; return the number of weights changed."""
 
     @abstractmethod
     def arrays(self) -> dict[str, FloatArray]:
@@ -96,115 +98,114 @@ class Learner(ABC):
         """Continue from `arrays`."""
 
     def continue_from(self, former: Self, rows: IntArray) -> None:
-        """Begin with what a learner of the same settings has learned for other agents.
+        """Start from the weights of a learner with the same settings that served other agents.
 
         Parameters
         ----------
         former
-            The other one, which is not modified and whose episodes are over.
+            The other learner, not modified, between episodes.
         rows
-            ``(n_rows,)`` from which of its rows each row goes on.
+            ``(n_rows,)`` the row of `former` that each row starts from.
 
         Raises
         ------
         ValueError
-            If it cannot; one line.
+            If this kind of learner does not support it.
         """
         raise ValueError(no_way_on("learner.kind", self))
 
 
 class MembersOf(NamedTuple):
-    """Agents of a team that are of one kind."""
+    """Agents of one kind in a team."""
 
     members: IntArray
-    """``(k,)`` who they are, in agent order."""
+    """``(k,)`` indices of the agents, in agent order."""
     settings: TeamSettings
-    """How they decide and learn."""
+    """Settings of these agents."""
     team: str | None = None
-    """File of a team whose weights they begin with; none: they have learned nothing."""
+    """File of a team whose weights they start from, or None."""
 
 
 class TeamSettings(PartSettings):
-    """What stands in the ``[learner]`` table of a spec: how those who act learn.
+    """Base class of the settings of agents: the ``[learner]`` table of a spec.
 
-    `LearnerSettings` are of fuzzy agents; others are in `core.networks`.
+    `LearnerSettings` configure fuzzy agents. Other subclasses are in `core.networks`.
     """
 
     uses_hierarchy: ClassVar[bool] = False
-    """Whether those who act pass actions down a hierarchy."""
+    """Whether the agents communicate in a hierarchy."""
     kind_of_agents: ClassVar[str] = ""
-    """Where the class of `Agents` is that they are settings of, imported when it is wanted."""
+    """Location of the configured subclass of `Agents`, imported on use."""
 
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
-    """Discount per decision, gamma of Eq. 7: low where actions pay at once, high where they pay
-    late."""
+    """Discount per decision, gamma of Eq. 7: low for immediate rewards, high for delayed ones."""
 
     def agents(self, placement: Placement) -> Agents[Any]:
-        """Return the agents that act in a scenario, in their place of a hierarchy.
+        """Return the agents for a scenario and a hierarchy.
 
         Raises
         ------
         ValueError
-            If they cannot act there; one line.
+            If they cannot act there.
         """
         agents: Agents[Any] = resolve_name(self.kind_of_agents)(self, placement)
         return agents
 
     def members(self, scenario: Scenario, hierarchy: Hierarchy) -> list[MembersOf]:
-        """Return the agents of every kind: by default all are of one.
+        """Return the agents by kind; by default all are of one kind.
 
         Raises
         ------
         ValueError
-            If nobody decides for an agent; one line.
+            If an agent has no settings.
         """
         return [MembersOf(np.arange(len(hierarchy)), self)]
 
     @property
     def n_environments(self) -> int:
-        """Number of environments in which it learns at once."""
+        """Number of environments in parallel."""
         return 1
 
     @property
     def needs_prediction(self) -> bool:
-        """Whether it acts only in scenarios that predict, see `core.interface.scenario`."""
+        """Whether it requires a scenario with a predictor, see `core.interface.scenario`."""
         return False
 
     @property
     def needs_rewards(self) -> bool:
-        """Whether it decides by predicted rewards, so that a world is asked for them."""
+        """Whether it decides by predicted rewards."""
         return False
 
 
 class LearnerSettings(TeamSettings):
-    """What the settings of all learners share.
+    """Base class of the settings of learners of fuzzy agents.
 
-    `build` returns the learner of a team, all consequent weights zero. It is given the agents' rule
-    base and the row of weights of every agent ``(n,)``; all rows are somebody's.
+    `build` returns the learner of a team, with all consequent weights zero. It takes the agents'
+    rule base and the row of weights of every agent ``(n,)``.
     """
 
     uses_hierarchy = True
     kind_of_agents = f"{CORE}.agents.fuzzy:FuzzyAgents"
 
     values_actions: ClassVar[bool] = False
-    """Whether the learner values an agent's own actions in its present state and given what it is
-    told, which takes no prediction: then it is the team's evaluator, too."""
+    """Whether the learner learns values of an agent's own actions in its present state, given its
+    messages. Such a learner needs no predictor and is also the team's evaluator."""
 
     rule_base: RuleBaseSettings = RuleBaseSettings()
-    """Fuzzy rule base of every agent."""
+    """The fuzzy rule base of every agent."""
     weights: Literal["own", "role"] = "own"
-    """Whether every agent has consequent weights of its own, or all agents of one role (the left
-    wheels, say) share them and pool their experience; alike where a scenario has no roles."""
+    """Parameter sharing: every agent has weights of its own, or all agents of one role (all left
+    wheels, for example) share weights and pool their experience."""
     exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration()
-    """How agents explore."""
+    """Exploration of the agents."""
     decision: DecisionSettings = DecisionSettings()
-    """How values become a joint action."""
+    """Decisions: search, teammate model and criterion."""
     self_model: SelfModelSettings = SelfModelSettings()
-    """What bodies learn of their own wheels."""
+    """Self-model: learned effects of the wheels of every body."""
     calibration: CalibrationSettings = CalibrationSettings()
-    """What the team learns of the constants of its predictor."""
+    """Calibration of the constants of the predictor."""
     predictor: Annotated[Predictor, unwritten(GivenPredictor())] = GivenPredictor()
-    """What predicts: the scenario, nothing but persistence, or what has been learned."""
+    """The predictor: that of the scenario, persistence, or a learned model."""
 
     @property
     def needs_rewards(self) -> bool:
@@ -213,25 +214,25 @@ class LearnerSettings(TeamSettings):
 
     @property
     def is_mirrored(self) -> bool:
-        """Whether what the mirror image of the team would have met is experience as well."""
+        """Whether to learn from the mirror image of every step, too."""
         return False
 
     def rules_over(
         self, space: StateSpace, actions: ActionSet, n_told: int
     ) -> tuple[StateSpace, RuleBase]:
-        """Return what values are functions of, and the agents' rule base over it.
+        """Return the inputs of the value function as a state space, and the rule base over it.
 
         Parameters
         ----------
         space, actions
             Those of the scenario.
         n_told
-            By how many others an agent is told what they decided, at most.
+            Maximum number of agents whose actions an agent is told.
         """
         return space, RuleBase.build(space, self.rule_base)
 
     @property
     def needs_prediction(self) -> bool:
-        """Whether it acts only in scenarios that predict: unless it has a predictor of its own."""
+        """Whether it requires a scenario with a predictor; a learned predictor replaces it."""
         is_given = isinstance(self.predictor, GivenPredictor)
         return is_given and self.decision.rule != "random" and not self.values_actions

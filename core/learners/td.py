@@ -1,22 +1,18 @@
-"""Online TD(lambda) with accumulating traces (Eq. 7-13).
+"""Online learners: TD(lambda) with accumulating traces (Eq. 7-13), and variants of TD(0).
 
-And what online learners share, traces and one update per step, the one that never learns, and TD(0)
-of normalised steps with what agents that do not see one another learn by it.
+An agent that does not observe the actions of others cannot distinguish a bad action from a good one
+that they spoiled. Lauer and Riedmiller (2000) let values only rise; Matignon, Laurent and Le
+Fort-Piat (2007) let them fall more slowly than they rise. The frequency of the maximum reward
+distinguishes an action that pays well in coordination from a lucky one (Kapetanakis and Kudenko
+2002).
 
-An agent that does not see what the others do cannot tell a bad action from a good one that they
-spoilt. Lauer and Riedmiller (2000) let values rise only; Matignon, Laurent and Le Fort-Piat (2007)
-let them fall, more slowly than they rise. The frequency of the maximum reward tells an action that
-pays well if the others do their part from one that was lucky (Kapetanakis and Kudenko 2002).
+Q-learning learns from the best next action. It requires a state space that includes the actions
+taken, so that the value of a state is the value of an action (Watkins and Dayan 1992).
 
-Q-learning learns values of states and actions from the best action that could follow. It is for
-state spaces that hold what has been chosen beside the situation it was chosen in: there the value
-of a state is the value of an action (Watkins and Dayan 1992).
-
-Agents' values may add up to the team's. In sparse cooperative Q-learning each agent learns its part
-of the sum, over its neighbours in a coordination graph; what all are paid together is shared out
-equally, so that the parts add up to it (Kok and Vlassis 2006). In value decomposition the sum
-learns from one error: what all are paid says nothing of who earned it, and the TD error of the sum
-goes back to every agent alike (Sunehag et al. 2018).
+The values of agents may add up to that of the team. In sparse cooperative Q-learning each agent
+learns its part of the sum over its neighbors in a coordination graph; a common reward is divided
+equally (Kok and Vlassis 2006). In value decomposition the sum learns from one error: the TD error
+of the sum updates every agent (Sunehag et al. 2018).
 """
 
 from __future__ import annotations
@@ -31,23 +27,24 @@ from pydantic import Field
 
 from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Fraction, NonNegative, Positive, unwritten
-from ..rules.kernels.updates import add_features, td_update
-from ..rules.rule_base import RuleBase
+from ..values.rule_base import RuleBase
+from ..values.updates import td_lambda_update
 from .learner import Learner, LearnerSettings
 
 
 class Online(Learner):
-    """Learns from one state to the next, agent by agent; those of one row change it in turn.
+    """Learns at every step, agent by agent. Agents that share a row update it in turn.
 
-    A terminal state is followed by itself for ever, which adds one update with the reward
+    A terminal state counts as entered forever: it adds one update with the reward
     R / (1 - discount) and no next state.
     """
 
-    kept: tuple[str, ...] = ("theta", "trace", "reach")
-    """Names of the arrays that are saved: those of rows, and of agents the `traces`."""
-    traces = ("trace", "reach")
+    kept: tuple[str, ...] = ("theta", "trace")
+    """Names of saved arrays. Those in `traces` have one row per agent, the others one per row."""
+    traces = ("trace",)
+    fixed_arrays: ClassVar[tuple[str, ...]] = ("theta", "trace")
     reward_of: Literal["left", "entered"] = "left"
-    """Whose reward is in the TD error of a step: of the state left, or of the one entered."""
+    """Reward in the TD error of a step: that of the state left or of the state entered."""
 
     def __init__(self, settings: Any, rules: RuleBase, rows: IntArray) -> None:
         self.settings, self.discount = settings, settings.discount
@@ -55,15 +52,14 @@ class Online(Learner):
         n_rows = int(rows.max()) + 1
         self.theta: FloatArray = np.zeros((n_rows, rules.n_rules), rules.dtype)
         self.weights = self.theta
-        """The consequent weights that learn; those that decide, theta, may be an average."""
+        """Weights that are updated. Agents decide by `theta`, which may be an average of them."""
         self.trace: FloatArray = np.zeros((len(rows), rules.n_rules), rules.dtype)
-        self.reach: FloatArray = np.zeros((len(rows), rules.n_parts))
         self._previous: FloatArray | None = None
         self._rewards: FloatArray = np.zeros(len(rows))
 
     @property
     def of_agents(self) -> FloatArray:
-        """The weights of every agent ``(n, n_rules)``, no copy if each has its own row."""
+        """Weights ``(n, n_rules)`` of every agent; not a copy if each has its own row."""
         return self.weights if len(self.weights) == len(self.rows) else self.weights[self.rows]
 
     def errors(
@@ -74,14 +70,14 @@ class Online(Learner):
         if entered is not None:
             met = np.empty((len(states), 2, states.shape[1]))
             met[:, 0], met[:, 1] = states, entered
-        values = self.rules.each(self.of_agents, met)
+        values = self.rules.values_of_agents(self.of_agents, met)
         ahead = 0.0 if entered is None else self.discount * values[:, 1]
         return rewards + ahead - values[:, 0]
 
     def begin_episode(self) -> None:
         """Clear the traces."""
-        if self._previous is not None:  # memory that is never written is never taken
-            self.trace[:], self.reach[:] = 0.0, 0.0
+        if self._previous is not None:  # untouched memory is not allocated
+            self.trace[:] = 0.0
         self._previous = None
 
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
@@ -103,7 +99,7 @@ class Online(Learner):
 
     @abstractmethod
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        """Learn from the rewards of `states` and the states entered after them, none if terminal.
+        """Learn from the rewards of `states` and the next states, None if they are terminal.
 
         Returns the number of weights changed.
         """
@@ -126,7 +122,7 @@ class Online(Learner):
         self._rewards = arrays["rewards"].copy()
 
     def continue_from(self, former: Self, rows: IntArray) -> None:
-        """Begin with all weights of another team; traces are of an episode, and begin anew."""
+        """Start from the weights of another team, with zero traces."""
         others = former._kept()
         for name, own in self._kept().items():
             if name not in self.traces:
@@ -134,22 +130,22 @@ class Online(Learner):
 
 
 class FrozenSettings(LearnerSettings):
-    """No learning: the consequents stay zero. The control of every learning curve."""
+    """No learning: the weights stay zero. The control of every learning curve."""
 
     kind: Literal["frozen"] = "frozen"
     factory: ClassVar[str] = f"{__name__}:Frozen"
 
 
 class Frozen(Online):
-    """Never learns: the consequent weights stay as they are, zero from the start."""
+    """Never learns: the consequent weights stay zero."""
 
-    kept = ("theta",)
+    kept = fixed_arrays = ("theta",)
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         return 0
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Return the weights, which is all there is."""
+        """Return the weights."""
         return {"theta": self.theta}
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
@@ -169,10 +165,10 @@ class TDLambdaSettings(LearnerSettings):
     normalised: bool = False
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
-    """Steps over which the weights that decide average those that learn; 1: they are the same."""
+    """Number of updates over which the agents average the learned weights to decide; 1: none."""
     reward_of: Annotated[Literal["left", "entered"], unwritten("left")] = "left"
-    """Whose reward R in Eq. 7 is: of the state that a step leaves, s_previous, as it is printed
-    there; or of the one that it enters, as Section V calculates rewards, after the move."""
+    """Reward R in Eq. 7: that of the state left, s_previous, as printed; or that of the state
+    entered, as in Section V, where rewards are computed after the move."""
 
 
 class TDLambda(Online):
@@ -187,11 +183,11 @@ class TDLambda(Online):
     With a normalised step size alpha is divided by the squared length of phi(s), so that
     ``step_size = 1`` would remove the TD error of s at once.
 
-    R(s') stands in place of R(s) with ``reward_of = "entered"``, as Section V can be read: then a
-    value does not contain the reward of its own state, which all after-states of a decision differ
-    in. A terminal state is worth the same in either reading.
+    With ``reward_of = "entered"``, R(s') replaces R(s), another reading of Section V: a value then
+    excludes the reward of its own state, in which the after-states of a decision differ. Terminal
+    states have the same value in both readings.
 
-    With averaging over n steps this is learned by w in place of theta, and the agent decides by::
+    With averaging over n steps, w learns in place of theta, and the agent decides by::
 
         theta = theta + (w - theta) / min(t, n)    after t updates
 
@@ -211,12 +207,15 @@ class TDLambda(Online):
         lengths: FloatArray = np.ones(len(states))
         if self.settings.normalised:
             lengths = self.rules.squared_lengths(states)
-        states, to = map(np.ascontiguousarray, (states, states if entered is None else entered))
-        td_update(
-            self.weights, self.rows, self.trace, self.reach, states, to, rewards,
-            0.0 if entered is None else self.discount, self.settings.step_size, lengths,
-            self.discount * self.settings.trace_decay, self.rules.layout,
-        )  # fmt: skip
+        discount = 0.0 if entered is None else self.discount
+        step_sizes = self.settings.step_size / lengths
+        decay = self.discount * self.settings.trace_decay
+        active = self.rules.active(states)
+        active_next = active if entered is None else self.rules.active(entered)
+        constants = discount, step_sizes, decay
+        td_lambda_update(
+            self.weights, self.rows, self.trace, active, active_next, rewards, constants
+        )
         if self.settings.averaging > 1:
             self.updates += 1.0
             rate = 1.0 / min(float(self.updates), self.settings.averaging)
@@ -225,14 +224,14 @@ class TDLambda(Online):
 
 
 class OneStepSettings(LearnerSettings):
-    """What the settings of `OneStep` learners share."""
+    """Base class of the settings of `OneStep` learners."""
 
     step_size: Positive = 0.1
     """alpha, divided by the squared length of the feature vector."""
 
 
 class OneStep(Online):
-    """TD(0) whose steps are divided by the squared lengths of feature vectors."""
+    """TD(0) with step sizes divided by the squared lengths of feature vectors."""
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         return self._step(states, self.errors(states, rewards, entered))
@@ -240,27 +239,26 @@ class OneStep(Online):
     def _step(
         self, states: FloatArray, delta: FloatArray, lengths: FloatArray | np.float64 | None = None
     ) -> int:
-        """Add ``alpha delta phi / lengths`` to the weights; return how many there are.
+        """Add ``alpha delta phi / lengths`` to the weights; return their number.
 
         Parameters
         ----------
         states
-            ``(n, d)`` of which phi are the feature vectors.
+            ``(n, d)`` states with feature vectors phi.
         delta
             ``(n,)`` errors.
         lengths
-            ``(n,)`` or one for all: what steps are divided by; the squared lengths of phi if none
-            is given.
+            ``(n,)`` or a scalar; by default the squared lengths of phi.
         """
         if lengths is None:
             lengths = self.rules.squared_lengths(states)
         steps = self.settings.step_size * delta / lengths
-        add_features(self.weights, self.rows, states, steps, self.rules.layout)
+        self.rules.add_features(self.weights, self.rows, states, steps)
         return self.theta.size
 
 
 class OptimisticTDSettings(OneStepSettings):
-    """TD(0) whose values rise faster than they fall, for agents that do not see one another."""
+    """TD(0) whose values rise faster than they fall, for agents that do not observe others."""
 
     kind: Literal["optimistic-td"] = "optimistic-td"
     factory: ClassVar[str] = f"{__name__}:OptimisticTD"
@@ -270,7 +268,7 @@ class OptimisticTDSettings(OneStepSettings):
 
 
 class OptimisticTD(OneStep):
-    """TD(0) that believes good news more than bad.
+    """TD(0) with a smaller step size for negative TD errors.
 
     On entering state s' after state s::
 
@@ -286,20 +284,19 @@ class OptimisticTD(OneStep):
 
 
 class FMQSettings(OneStepSettings):
-    """Frequency maximum Q-value, for agents that do not see one another."""
+    """Frequency maximum Q-value, for agents that do not observe others."""
 
     kind: Literal["fmq"] = "fmq"
     factory: ClassVar[str] = f"{__name__}:FMQ"
     weight: NonNegative = 10.0
-    """c: how much the frequency of the maximum reward counts."""
+    """Weight c of the frequency of the maximum reward."""
 
 
 class FMQ(OneStep):
     """TD(0) with a bonus for rules under which the greatest reward came often.
 
-    ``weights`` learn as in TD(0). Of the rule k that fires most in the state left, a table keeps
-    the greatest reward R_max(k), and how often it came, F(k), as a fraction of visits. Agents
-    decide by::
+    ``weights`` learn as in TD(0). For the rule k that fires most in the state left, a table keeps
+    the greatest reward R_max(k) and its frequency F(k) as a fraction of visits. Agents decide by::
 
         theta_k = weights_k + c F(k) R_max(k)
 
@@ -307,7 +304,7 @@ class FMQ(OneStep):
     membership functions it is an approximation.
     """
 
-    kept = ("theta", "weights", "greatest", "hits", "visits", "trace", "reach")
+    kept = ("theta", "weights", "greatest", "hits", "visits", "trace")
 
     def __init__(self, settings: FMQSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
@@ -334,7 +331,7 @@ class FMQ(OneStep):
 
 
 class QLearningSettings(OneStepSettings):
-    """Q-learning, for state spaces that hold the actions taken."""
+    """Q-learning, for state spaces that include the actions taken."""
 
     kind: Literal["q-learning"] = "q-learning"
     factory: ClassVar[str] = f"{__name__}:QLearning"
@@ -343,29 +340,28 @@ class QLearningSettings(OneStepSettings):
 
 
 class QLearning(OneStep):
-    """TD(0) whose target is the greatest value over the actions in the state that was entered.
+    """TD(0) whose target is the greatest value over the actions in the next state.
 
-    With x the situation of a state and u the actions that it holds, on entering (x', u') after
-    (x, u)::
+    Let x be the situation of a state and u the actions in it. On entering (x', u') after (x, u)::
 
         delta = R(x, u) + gamma max_v f(x', v) - f(x, u)
         theta = theta + alpha delta phi(x, u) / |phi(x, u)|^2
 
-    Where u holds the actions of several agents, the maximum is over all their joint actions: the
-    team Q-learning of agents that are paid together. It takes as many values as there are.
+    If u includes the actions of several agents, the maximum is over all their joint actions: this
+    is team Q-learning with a common reward.
 
     Raises
     ------
     ValueError
-        If the state space holds no actions.
+        If the state space includes no actions.
     """
 
     def __init__(self, settings: QLearningSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
         if not rules.actions:
             raise ValueError(
-                "learner.kind = 'q-learning': the state space holds no actions to maximise over, "
-                "use td-lambda"
+                "learner.kind = 'q-learning': the state space includes no actions to maximize "
+                "over, use td-lambda"
             )
         self._columns = sorted(rules.actions)
         centres = [rules.partitions[column].centres for column in self._columns]
@@ -376,12 +372,12 @@ class QLearning(OneStep):
         if entered is not None:
             met = np.repeat(entered[:, None], len(self._choices), axis=1)
             met[:, :, self._columns] = self._choices
-            delta += self.discount * self.rules.each(self.of_agents, met).max(axis=1)
+            delta += self.discount * self.rules.values_of_agents(self.of_agents, met).max(axis=1)
         return self._step(states, delta)
 
 
 class SparseCooperativeSettings(OneStepSettings):
-    """Agents learn the parts of a sum, each by its share of the reward."""
+    """Sparse cooperative Q-learning: agents learn the parts of a sum."""
 
     kind: Literal["sparse-cooperative"] = "sparse-cooperative"
     factory: ClassVar[str] = f"{__name__}:SparseCooperative"
@@ -395,9 +391,9 @@ class SparseCooperative(OneStep):
         delta_i = R_i(s) + gamma f_i(s') - f_i(s)
         theta_i = theta_i + alpha delta_i phi_i(s) / |phi_i(s)|^2
 
-    where R_i is its own reward, or R / n if one is paid to all: then the deltas add up to the TD
-    error of ``sum_i f_i``. The state entered stands for the best one, which is what the greedy
-    joint action of the graph leads to.
+    where R_i is its own reward, or R / n for a common reward: the deltas then add up to the TD
+    error of ``sum_i f_i``. The state entered replaces the best next state, which the greedy joint
+    action of the graph leads to.
     """
 
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
@@ -407,7 +403,7 @@ class SparseCooperative(OneStep):
 
 
 class ValueDecompositionSettings(OneStepSettings):
-    """The sum of all agents' values learns from the TD error of the team."""
+    """Value decomposition: the sum of all values learns from the TD error of the team."""
 
     kind: Literal["vdn"] = "vdn"
     factory: ClassVar[str] = f"{__name__}:ValueDecomposition"
@@ -423,7 +419,7 @@ class ValueDecomposition(SparseCooperative):
         delta   = R(s) + gamma sum_i f_i(s') - sum_i f_i(s)
         theta_i = theta_i + alpha delta phi_i(s) / sum_j |phi_j(s)|^2
 
-    The state entered stands for what the agents' greatest values lead to, as in all learners here.
+    The state entered replaces the best next state, as in all learners here.
     """
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:

@@ -1,8 +1,7 @@
-"""A value that nobody learned: a formula over state variables, as a control of learning.
+"""A hand-written value function over state variables: a control of learning.
 
-A person who knows the task writes down what a state is worth. Decisions are those of any team, with
-the same predictor and the same search of joint actions. So what a team has learned is what it does
-better than this one; the rest is in its variables, its predictor and its search.
+The agents decide like any team, with the same predictor and the same search over joint actions. The
+advantage of a learning team over this one is therefore due to learning alone.
 """
 
 from collections.abc import Mapping
@@ -11,31 +10,31 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ..numerics import FloatArray, IntArray
-from ..rules.rule_base import RuleBase
+from ..values.rule_base import RuleBase
 from .learner import LearnerSettings
 from .td import Frozen
 
 
 class WrittenSettings(LearnerSettings):
-    """No learning: a value that a person has written. A control, like ``frozen``."""
+    """No learning: a hand-written value function. A control, like ``frozen``."""
 
     kind: Literal["written"] = "written"
     factory: ClassVar[str] = f"{__name__}:Written"
     value: Mapping[str, float] = {}
-    """By state variable, what every unit of its distance from 0 is worth; others are worth 0. The
+    """Weight of the absolute value of each named state variable; other variables have weight 0. The
     preset `hand-written` has one for boxes and arms."""
 
 
 class Written(Frozen):
     """Never learns: f(s) is the sum over state variables of ``value`` times ``|s_j|``.
 
-    Consequent weights are what this is at the centres of the membership functions, so that f is
-    exact for triangular ones between the outermost centres, if one centre is 0.
+    Consequent weights are the values of f at the centres of the membership functions. f is exact
+    for triangular ones between the outermost centres, if one centre is 0.
 
     Raises
     ------
     ValueError
-        If a variable is unknown, or no term of the rule base is over it alone; one line.
+        If a variable is unknown, or no term of the rule base is over it alone.
     """
 
     def __init__(self, settings: WrittenSettings, rules: RuleBase, rows: IntArray) -> None:
@@ -53,7 +52,7 @@ def _weights(value: Mapping[str, float], rules: RuleBase) -> FloatArray:
         variable = rules.names.index(name)
         if (variable,) not in rules.terms:
             raise ValueError(
-                "learner.rule_base.order: must be 1, as a written value is a sum over single "
+                "learner.rule_base.order: must be 1, because a written value is a sum over single "
                 "variables"
             )
         term = rules.terms.index((variable,))

@@ -73,7 +73,7 @@ class PPOAgents(Agents[PolicyInputs]):
         hierarchy = placement.hierarchy
         if not settings.uses_hierarchy:
             hierarchy = Hierarchy(scenario.agents, [])
-        if hierarchy.neighbours:
+        if hierarchy.neighbors:
             raise ValueError(
                 f"learner.kind = {settings.kind!r}: neighbors act at the same time and tell each "
                 "other nothing; use a topology without neighbors"
@@ -335,5 +335,5 @@ class CentralPPOAgents(PPOAgents):
 
 def senders_of(hierarchy: Hierarchy) -> list[int]:
     """Return the agents whose actions some agent is told, in agent order."""
-    superiors = (hierarchy.above(agent) for agent in range(len(hierarchy)))
+    superiors = (hierarchy.senders(agent) for agent in range(len(hierarchy)))
     return sorted({sender for senders in superiors for sender in senders})

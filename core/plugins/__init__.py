@@ -1,1 +1,1 @@
-"""How things of users get in: registries, settings, files, messages on what is wrong."""
+"""Plug-ins: registries, settings, files of users, and messages about mistakes."""

@@ -1,8 +1,8 @@
-"""Copies of users' files that numba caches compiled code beside, in a folder of the user's own.
+"""Copies of users' files in a private folder, next to which numba caches compiled code.
 
-The index of numba's cache is a pickle in ``__pycache__`` beside the file that defines the function.
-In a folder that somebody else has filled, reading it would run their code, and a file that is kept
-with a study lies in no folder at all.
+The index of numba's cache is a pickle in ``__pycache__`` next to the file that defines the
+function. In a downloaded folder, reading this index would run the code of another person, and a
+file that is kept with a study is not in any folder.
 """
 
 import os

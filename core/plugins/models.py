@@ -1,6 +1,6 @@
-"""Which settings model a table of a spec is for: by the fields of models, and the kinds of tables.
+"""Settings models of the tables of a spec, found by the fields of models and the kinds of tables.
 
-A *slot* is what a table is for: a model, or a field of a model, which may hold one of several.
+A *slot* takes a table: it is a model, or a field of a model that may hold one of several models.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 Slot = type[BaseModel] | FieldInfo | None
-"""What a table is for; None: nothing is known of it."""
+"""Model or field that takes a table; None if it is unknown."""
 
 
 class Kinds(ABC):
-    """Marks a field that holds settings of one of several kinds, which a table names."""
+    """Mark of a field that holds settings of one of several kinds."""
 
     @abstractmethod
     def model(self, kind: str) -> type[BaseModel]:
@@ -35,7 +35,7 @@ class Kinds(ABC):
 
 
 def annotation_of(slot: Slot) -> object:
-    """Return the type of what a slot holds."""
+    """Return the type of the value in a slot."""
     return slot.annotation if isinstance(slot, FieldInfo) else slot
 
 
@@ -47,19 +47,19 @@ def models_of(annotation: object) -> list[type[BaseModel]]:
 
 
 def kind_of(model: type[BaseModel]) -> str | None:
-    """Return the `kind` by which a table names this model, if it has one."""
+    """Return the `kind` of a model, or None."""
     field = model.model_fields.get("kind")
     return None if field is None else field.default or None
 
 
 def kinds_at(slot: Slot) -> Kinds | None:
-    """Return the kinds that a field is marked with, if it is."""
+    """Return the kinds with which a field is marked, or None."""
     marks = slot.metadata if isinstance(slot, FieldInfo) else []
     return next((mark for mark in marks if isinstance(mark, Kinds)), None)
 
 
 def model_at(slot: Slot, table: object) -> type[BaseModel] | None:
-    """Return the model that a table is for; none if its kind is unknown or missing."""
+    """Return the model of a table; None if its kind is unknown or missing."""
     kind = table.get("kind") if isinstance(table, Mapping) else None
     kinds = kinds_at(slot)
     if kinds is not None:
@@ -74,5 +74,5 @@ def model_at(slot: Slot, table: object) -> type[BaseModel] | None:
 
 
 def field_of(model: type[BaseModel] | None, key: str) -> FieldInfo | None:
-    """Return the field that a key of a model's table names."""
+    """Return the field of a model for a key of its table."""
     return None if model is None else model.model_fields.get(key)

@@ -26,7 +26,7 @@ def checked_origin(
     kind
         Word for what it should be, for the message.
     bases
-        Classes whose subclasses are allowed wherever they are defined.
+        Classes with subclasses that are allowed wherever they are defined.
 
     Raises
     ------

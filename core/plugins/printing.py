@@ -1,14 +1,13 @@
-"""Text of others, written so that a terminal obeys nothing of it."""
+"""Escaping of control characters in text from files, so that a terminal does not obey them."""
 
 import unicodedata
 
 
 def printable(text: str) -> str:
-    r"""Return text in which what a terminal obeys is written out: nothing of it is an order.
+    r"""Return text in which control characters are escaped.
 
-    These are control characters, such as those of colours and of the cursor, but for line feeds and
-    tabs; marks that reverse the direction of writing; and halves of surrogate pairs, which cannot
-    be written.
+    These are control characters except line feeds and tabs, such as those of colors and of the
+    cursor; marks that reverse the direction of writing; and halves of surrogate pairs.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""What is wrong with settings, in one line that a user can act on.
+"""Messages about mistakes in settings: one line that a user can act on.
 
-pydantic says where and what; this is turned into the path as it stands in the spec, the value
-there, what is allowed, and the closest known name.
+Each names the path in the spec, the value, what is allowed and the closest known name, from the
+errors of pydantic.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from .models import Slot, annotation_of, field_of, kind_of, kinds_at, model_at, 
 from .words import closest, near, show
 
 Keys = tuple[int | str, ...]
-"""Where a value stands: keys of tables, and indices of lists."""
+"""Path of a value: keys of tables and indices of lists."""
 Table = Mapping[str, object]
-"""As TOML reads it."""
+"""Nested dictionary as TOML reads it."""
 
 
 def dotted(keys: Keys) -> str:
-    """Return where a value stands as it is written: ``overrides[1].learner.ridge``."""
+    """Return a path as text, such as ``overrides[1].learner.ridge``."""
     path = ""
     for key in keys:
         path += f"[{key}]" if isinstance(key, int) else f".{key}"
@@ -33,7 +33,7 @@ def dotted(keys: Keys) -> str:
 
 
 def rule(message: str) -> str:
-    """Return what a value must be, for the message with which pydantic refuses it.
+    """Return the requirement in a message of pydantic, in words of ours.
 
     Examples
     --------
@@ -76,26 +76,26 @@ def mistaken(key: object, known: Collection[str], problem: str) -> str:
 
 
 class Complaint(NamedTuple):
-    """Something that pydantic refuses."""
+    """One error of pydantic."""
 
     keys: Keys
-    """Where it stands in the table."""
+    """Path in the table."""
     details: ErrorDetails
-    """What pydantic says of it."""
+    """The error as pydantic reports it."""
 
     @property
     def path(self) -> str:
-        """Where it stands, as it is written."""
+        """The path as text."""
         return dotted(self.keys)
 
 
 def problems_of(error: ValidationError, table: Table) -> list[Complaint]:
-    """Return what pydantic refuses of a table."""
+    """Return the errors of pydantic about a table."""
     return [Complaint(place(e["loc"], table), e) for e in error.errors(include_url=False)]
 
 
 def place(loc: Sequence[int | str], data: object) -> Keys:
-    """Drop from pydantic's path what names a member of a union rather than a key of the table."""
+    """Return a path of pydantic without parts that name members of unions."""
     keys: list[int | str] = []
     for index, item in enumerate(loc):
         is_table = isinstance(data, Mapping)
@@ -134,15 +134,15 @@ def explain(
     Parameters
     ----------
     error
-        What pydantic raised when it validated the table.
+        Error of pydantic.
     model
         The model of the table.
     table
-        As the user gave it.
+        The table of the user.
     outer
-        Model and table of all that a misplaced key may belong to; none: `model` and `table`.
+        Model and table to which a misplaced key may belong. By default, `model` and `table`.
     swept_in
-        The table where values to compare stand; empty: there is none.
+        Name of the table of swept values; empty if there is none.
     """
     problems = problems_of(error, table)
     # Where a name or a table may stand and a table does, what is wrong is in the table.
@@ -185,7 +185,7 @@ def _on_unknown_key(
 
 
 def _on_kind(problem: Complaint) -> str:
-    """Return how a line begins on the kind of a table, or on the name that stands for one."""
+    """Return the beginning of a line about the kind of a table."""
     value = problem.details["input"]
     if isinstance(value, Mapping) and "kind" in value:
         return f"{problem.path}.kind = {show(value['kind'])}: "
@@ -217,7 +217,7 @@ def _on_value(
 
 
 def several(keys: Keys, value: object, text: str, swept_in: str) -> str:
-    """Return where the values of a key of a section stand if a list was given for one value.
+    """Return a hint at the table of swept values if a list was given for one value.
 
     Examples
     --------
@@ -244,10 +244,9 @@ def misplaced(path: str, model: type[BaseModel], table: Table) -> str:
     path
         The key as it stands in the spec.
     model
-        The model whose tables are looked through, at any depth.
+        Model with the tables to search, at any depth.
     table
-        The table that it is of, as the user gave it: where it says a kind, no others are looked
-        through.
+        The table of the user: where it has a kind, other kinds are not searched.
     """
     key = path.rpartition(".")[2]
     places = (name for name, _ in _places(key, model, table) if not f".{path}".endswith(f".{name}"))

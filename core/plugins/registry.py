@@ -1,15 +1,15 @@
-"""Registries: everything that a user would vary, by name.
+"""Registries of everything that a spec can name.
 
-Each kind of thing has one registry. A thing gets in
+Each kind of thing has one registry. A thing is registered
 
 1. by a line in the registry's own table (built in);
-2. by an entry point of an installed package, in the group ``nested_agents.KIND``;
-3. by a name such as ``"arm.py:Arm"``, relative to the spec that says it;
-4. as the object itself, from Python: it becomes the name of where it is defined.
+2. by an entry point of an installed package in the group ``nested_agents.KIND``;
+3. by a name such as ``"arm.py:Arm"``, relative to the spec;
+4. as the object itself, from Python, which is converted to the name of its definition.
 
-What has settings is in a registry of their *settings models*, whose method `build` makes the thing.
-A class with a nested ``Settings`` stands for the model that builds it; a function for one whose
-fields are its annotated keyword-only parameters, documented as its docstring does.
+Things with settings are in a registry of *settings models*; the method `build` of a model makes the
+thing. A class with a nested ``Settings`` is built from these settings. A function is called with
+the settings as its annotated keyword-only parameters; its docstring documents them.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
 
 MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
-"""A parameter in a docstring: its name, and what is said of it, indented."""
+"""A parameter in a docstring: its name, and its indented description."""
 
 
 def _folders() -> tuple[tuple[str, int], ...]:
-    """Return where packages are looked for, and when something was last installed there [ns]."""
+    """Return the folders of packages, and the time of the last installation in each [ns]."""
     places = map(os.path.abspath, sys.path)  # "" is where the process is
     return tuple((place, os.stat(place).st_mtime_ns) for place in places if os.path.exists(place))
 
@@ -57,21 +57,21 @@ def _folders() -> tuple[tuple[str, int], ...]:
 def _offered(
     entry_points: Callable[..., EntryPoints], group: str, folders: tuple[tuple[str, int], ...]
 ) -> tuple[EntryPoint, ...]:
-    """Return the entry points of a group: a hundred packages are read for them, so once only."""
+    """Return the entry points of a group; cached, because hundreds of packages are read."""
     return tuple(entry_points(group=group))
 
 
 class Registry:
-    """The things of one kind, by name.
+    """Things of one kind by name.
 
     Parameters
     ----------
     kind
-        What they are called in messages, and in the name of the entry-point group.
+        Name of the kind in messages and in the entry-point group.
     built_in
-        By name where each is, as ``"package.module:Name"``; imported when it is asked for.
+        Place of each thing by name, as ``"package.module:Name"``; imported on first use.
     moved
-        By names of earlier versions, what is written in their place.
+        Message for each name that has moved elsewhere.
 
     Examples
     --------
@@ -98,7 +98,7 @@ class Registry:
         return f"nested_agents.{plural.replace(' ', '_')}"
 
     def installed(self) -> dict[str, str]:
-        """Return what installed packages offer: by name where it is.
+        """Return the places of the things of installed packages by name.
 
         Raises
         ------
@@ -116,11 +116,11 @@ class Registry:
         return places
 
     def names(self) -> list[str]:
-        """Return the names of all that is built in or installed."""
+        """Return the names of all built-in and installed things."""
         return [*self.built_in, *self.installed()]
 
     def find(self, name: str) -> Any:
-        """Return a thing by its name, or by where it is.
+        """Return a thing by its name or place.
 
         Raises
         ------
@@ -146,7 +146,7 @@ class Registry:
             raise ValueError(f"cannot be loaded: {sources.format_error(error)}") from None
 
     def reference_to(self, thing: object) -> str:
-        """Return the name of an object: the registered one, or where it is defined.
+        """Return the registered name of an object, or the place of its definition.
 
         Raises
         ------
@@ -174,22 +174,22 @@ class Registry:
 
 
 class SettingsRegistry(Registry):
-    """The things of a kind that have settings, distinguished by ``kind`` in a table.
+    """Things of a kind that have settings, selected by ``kind`` in a table.
 
     Parameters
     ----------
     kind, built_in, moved
         As of `Registry`.
     base
-        What the settings of things of the kind inherit.
+        Base class of the settings.
     root
-        What those inherit at least that are of another sort; none: there is no other sort.
+        Base class of further settings that are allowed. By default, `base`.
     base_of
-        Says which settings stand for a thing of a user's that has none; none: `base`.
+        Returns the base class of settings for a user's thing without settings. By default, `base`.
 
     Examples
     --------
-    A class of one's own needs a nested model, and gets its instance:
+    A user's class needs a nested model and gets an instance of it:
 
     >>> class Cart:
     ...     class Settings(Settings):
@@ -218,7 +218,7 @@ class SettingsRegistry(Registry):
         self._adapted: dict[tuple[str, int], tuple[object, type[Settings]]] = {}
 
     def model(self, name: str) -> type[Settings]:
-        """Return the settings model of a thing, by name or by where it is.
+        """Return the settings model of a thing by its name or place.
 
         Raises
         ------
@@ -228,7 +228,7 @@ class SettingsRegistry(Registry):
         return self.adapted(name, self.find(name))
 
     def adapted(self, name: str, thing: object) -> type[Settings]:
-        """Return the settings model that stands for a thing, whose ``kind`` is `name`.
+        """Return the settings model of a thing, with the ``kind`` `name`.
 
         Raises
         ------
@@ -247,7 +247,7 @@ class SettingsRegistry(Registry):
         own = thing if is_model else getattr(thing, "Settings", self._base_of(thing))
         if not (isinstance(own, type) and issubclass(own, self.root)):
             base = f"{self.base.__module__}.{self.base.__qualname__}"
-            raise ValueError(f"is no {self.kind}, whose Settings inherit {base}")
+            raise ValueError(f"is no {self.kind}: its Settings must inherit {base}")
         thing = checked_origin(name, thing, self.kind, self.root)
         has_own = hasattr(thing, "Settings")
         made_by: object = thing
@@ -285,7 +285,7 @@ class SettingsRegistry(Registry):
         Raises
         ------
         ValueError
-            If the class takes other arguments, or raises; one line that says where.
+            If the class takes other arguments, or raises; one line with the place.
         """
         try:
             signature(cls).bind(*given, **named)
@@ -304,7 +304,7 @@ class SettingsRegistry(Registry):
             raise ValueError(f"{raised}{where}") from error
 
     def parsed(self, text: str, /, **table: Any) -> Any:
-        """Return the settings that a name stands for, alone or with what else is in its table.
+        """Return the settings of a name with the other keys of its table.
 
         Raises
         ------
@@ -317,8 +317,7 @@ class SettingsRegistry(Registry):
 def _parameters(thing: object) -> dict[str, Any]:
     """Return type and default of each annotated keyword-only parameter of a function, by name.
 
-    What the section "Parameters" of its docstring, in the form of numpydoc, says of each goes with
-    the type.
+    The descriptions come from the section "Parameters" of its numpydoc docstring.
     """
     if not isfunction(thing):
         return {}
@@ -335,22 +334,22 @@ def _parameters(thing: object) -> dict[str, Any]:
 
 
 def _dump(value: Settings, info: SerializationInfo) -> dict[str, object]:
-    """Write settings as the model that holds them is written."""
+    """Dump settings like the model that holds them."""
     return value.model_dump(mode=info.mode, exclude_none=info.exclude_none)
 
 
 class Plugged(Kinds):
-    """Marks a field that holds the settings of any thing of a registry.
+    """Mark of a field that holds the settings of any thing of a registry.
 
-    A table is validated by the model that its ``kind`` names; a text is what `shorthand` makes of
-    it; settings stand for themselves.
+    A table is validated by the model of its ``kind``, text is converted by `shorthand`, and
+    settings are kept.
 
     Parameters
     ----------
     registry
-        Which things.
+        The registry.
     shorthand
-        What a text stands for; none: a table is needed.
+        Converts text to settings. By default, a table is required.
     """
 
     def __init__(
@@ -370,7 +369,7 @@ class Plugged(Kinds):
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
-        """Return how pydantic validates and writes the field."""
+        """Return the pydantic schema of the field."""
         return core_schema.with_info_plain_validator_function(
             self._validate,
             serialization=core_schema.plain_serializer_function_ser_schema(_dump, info_arg=True),

@@ -1,8 +1,8 @@
-"""What all settings share, the numbers that they hold, and what is said of those that are wrong.
+"""Base classes of settings, and types of their fields.
 
 Settings are the tables of a spec. Each model refuses unknown keys and values outside the stated
-ranges when it is built; every field is documented beside it, with its unit. What is wrong is said
-in the words of the command line rather than pydantic's, see `problems`.
+ranges when it is built. The docstring below a field documents it with its unit. `problems` has the
+messages about mistakes.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
 def names(value: object) -> object:
-    """Return what is named as a tuple of texts, one name or several, of numbers, too."""
+    """Return one or several names as a tuple of text; numbers become text."""
     several = value if isinstance(value, list | tuple) else (value,)
     return tuple(str(one) if isinstance(one, int | np.integer) else one for one in several)
 
 
 Names = Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(names)]
-"""Names, patterns or numbers of something, one or a list."""
+"""One or several names, patterns or numbers."""
 
 
 def mask_of(named: Sequence[str], agents: Sequence[str], key: str) -> BoolArray:
@@ -47,7 +47,7 @@ def mask_of(named: Sequence[str], agents: Sequence[str], key: str) -> BoolArray:
     Raises
     ------
     ValueError
-        If one is named that there is not; the line begins with the key and calls them by it.
+        If a name is unknown; one line that begins with the key.
     """
     mask = np.zeros(len(agents), dtype=bool)
     for name in named:
@@ -65,13 +65,13 @@ def mask_of(named: Sequence[str], agents: Sequence[str], key: str) -> BoolArray:
 
 
 MOST_BYTES = 10**9
-"""What a worker may hold."""
+"""Maximum memory of a worker [bytes]."""
 MOST_SECONDS = 5
-"""What a decision of the whole team may take."""
+"""Maximum time of a decision of the whole team [s]."""
 
 
 def team_size(seconds_per_pair: float, agents: int = 1) -> AfterValidator:
-    """Return what refuses a team that is too large by an estimate, before anything is allocated.
+    """Return a validator that refuses teams that are too large by an estimate.
 
     A worker holds 28 bytes for every pair of agents, and 0.2 GB without them, as measured with
     chains of up to 4,096 agents (``python -m benchmarks.decisions``).
@@ -79,9 +79,9 @@ def team_size(seconds_per_pair: float, agents: int = 1) -> AfterValidator:
     Parameters
     ----------
     seconds_per_pair
-        What a decision is estimated to take, over the square of the number of agents [s].
+        Estimated time of a decision divided by the squared number of agents [s].
     agents
-        How many agents each of those has that are counted.
+        Number of agents for each counted thing.
 
     Examples
     --------
@@ -111,9 +111,9 @@ def check_team(agents: int, seconds_per_pair: float) -> None:
 
 
 def unwritten(default: Any) -> Any:
-    """Return the field of a key that is not written where it has its default.
+    """Return the field of a key that is not written if it has its default.
 
-    So a new key leaves the identities of trials, and what is kept of them, as they were.
+    The identity of a trial therefore does not depend on such a key.
     """
     return Field(exclude_if=lambda value: value == default)
 
@@ -123,7 +123,7 @@ FailureSpan: TypeAlias = tuple[int, int | None]
 
 
 class SettingsError(ValueError):
-    """Settings that cannot be made: one line that names the field, the value, what is allowed.
+    """Invalid settings: one line that names the field, the value and what is allowed.
 
     Attributes
     ----------
@@ -143,10 +143,7 @@ else:
 
 
 class _Made(ModelMetaclass):
-    """What calling a settings class does: errors are one line of ours, not several of pydantic.
-
-    Tables are validated without being called, so nothing changes there.
-    """
+    """Metaclass that turns errors of pydantic into one line when settings are constructed."""
 
     def __call__(cls: Any, *args: Any, **table: Any) -> Any:  # noqa: N805 - of a metaclass
         try:
@@ -172,35 +169,35 @@ class Settings(BaseModel, metaclass=_Made):
 
     @classmethod
     def made(cls, **table: Any) -> Any:
-        """Return the settings that calling the class with keywords makes."""
+        """Return the settings for keywords."""
         return type(BaseModel).__call__(cls, **table)
 
 
 class PartSettings(Settings):
-    """What the settings of all things of a registry inherit."""
+    """Base class of the settings of registered things."""
 
     kind: str = ""
     factory: ClassVar[str] = ""
-    """Where the class is that is built of them, imported when it is wanted."""
+    """Place of the class that is built from the settings, imported on first use."""
     player: ClassVar[str] = ""
-    """Where the module is that plays recordings on a page, see `studies.report.replays`; empty:
-    recordings are drawn as films."""
+    """Module that replays recordings in a report, see `studies.report.replays`; empty if recordings
+    are drawn as films."""
 
     def build(self, *given: Any) -> Any:
-        """Return what these are the settings of, built of them and of what else is given.
+        """Build the thing from the settings and further arguments.
 
         Raises
         ------
         ValueError
-            If there can be none of these settings; one line.
+            If it cannot be built; one line.
         """
         if not self.factory:
-            raise TypeError(f"{type(self).__name__} {self.kind!r} says not how it is built")
+            raise TypeError(f"{type(self).__name__} {self.kind!r} has no factory")
         return resolve_name(self.factory)(self, *given)
 
 
 class PerceptionSettings(Settings):
-    """How some agents perceive a scenario: one of the ``[[scenario.perception]]`` of a spec.
+    """Perception of some agents: one table ``[[scenario.perception]]`` of a spec.
 
     See `nested_agents.scenarios.faults.perception`.
     """
@@ -208,54 +205,58 @@ class PerceptionSettings(Settings):
     agents: Names
     """Agents by name, pattern or number, one or a list."""
     noise: Fraction = 0.0
-    """Standard deviation of what they perceive, of every state variable, as a fraction of its
-    range; drawn anew for every decision."""
+    """Standard deviation of the noise of every state variable, as a fraction of its range; drawn
+    for every decision."""
     delay: Annotated[int, Field(ge=0, le=1000)] = 0
-    """Decisions by which they perceive states late; in the first ones they perceive the first."""
+    """Delay of perceived states in decisions. At first, agents perceive the first state."""
     reach: Annotated[int, Field(ge=0)] | None = None
-    """How many links away bodies are perceived at most, see
-    `nested_agents.scenarios.faults.perception.distances_of`; none: however far."""
+    """Maximum distance in links of perceived bodies, see
+    `nested_agents.scenarios.faults.perception.distances_of`. By default, all bodies."""
     lost: Annotated[tuple[str, ...], BeforeValidator(names)] = ()
-    """Agents by name, pattern or number whose bodies they do not perceive."""
+    """Agents, by name, pattern or number, with bodies that are not perceived."""
 
 
 class ScenarioSettings(PartSettings):
-    """What the settings of all scenarios inherit; a scenario is built of nothing else."""
+    """Base class of the settings of scenarios."""
 
     perception: Annotated[tuple[PerceptionSettings, ...], unwritten(())] = ()
-    """How agents perceive it, each for itself; empty: all know all states, and predict alike."""
+    """Perception of single agents. By default, all agents know all states and predict alike."""
 
     def warnings(self) -> tuple[str, ...]:
-        """Return what looks wrong and is not refused, a line each: a size in another unit."""
+        """Return a line for each suspicious value, such as a size in another unit."""
         return ()
 
     def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
-        """Return what this scenario lays over a preset: its ``learner`` and ``topology`` tables.
+        """Return the ``learner`` and ``topology`` tables that override those of a preset.
 
-        A preset is made for box pushing; what learns best in another scenario may be something
-        else, and depend on the settings. What a spec says itself lies over both. Nothing by
-        default.
+        Presets are tuned for box pushing, and other scenarios may need other values. The spec
+        overrides both. By default, nothing is overridden.
         """
         return {}
 
     @property
     def period(self) -> float | None:
-        """Seconds of a decision, if it has a duration."""
+        """Duration of a decision [s]; None if it has none."""
+        return None
+
+    @property
+    def task_size(self) -> float | None:
+        """Size of the task relative to that of the smallest team; None if it is unknown."""
         return None
 
     @property
     def failure_spans(self) -> tuple[FailureSpan, ...]:
-        """When its ``failures``, if it has any, begin and end."""
+        """Episodes in which failures begin and end."""
         return tuple((f.episode, f.end_episode) for f in dict(self).get("failures", ()))
 
     @property
     def onset(self) -> int | None:
-        """Episode in which the first failure begins, if any does."""
+        """Episode in which the first failure begins; None without failures."""
         return min((begin for begin, _ in self.failure_spans), default=None)
 
 
 def tuples(value: Any) -> Any:
-    """Return `value` with every list in it as a tuple, which strict validation asks for."""
+    """Return `value` with tuples instead of lists, as strict validation requires."""
     if isinstance(value, Mapping):
         return {key: tuples(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):

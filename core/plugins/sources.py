@@ -32,26 +32,26 @@ from .syntax import imported, tree_text
 from .trust import is_trusted, module_text, place_of, sha256, trust
 
 ZIPPED = b"PK"
-"""With what such a file begins."""
+"""First bytes of a zip file."""
 FOLDER = "sources"
-"""Where a study keeps copies, below its own directory."""
+"""Folder of copies in the directory of a study."""
 MOST_BYTES = 1_000_000
-"""Of a file; a larger one is no program."""
+"""Maximum size of a file [bytes]."""
 TEAMS = ".npz"
-"""Suffix of files that hold what a team remembers; as text they are kept in base 64."""
+"""Suffix of files with the state of a team; kept as text in base 64."""
 GRAPHS = (".graphml", ".json", ".toml")
 """Suffixes of files that hold a hierarchy."""
 
 
 class Checkpoints(NamedTuple):
-    """Where trials of a study put down what they have come to, so that a killed one goes on."""
+    """Checkpoints of the trials of a study, from which killed trials resume."""
 
     folder: Path
-    """Of a file for each."""
+    """Folder with one file per trial."""
     seconds: float
-    """How often one does so."""
+    """Interval between checkpoints [s]."""
     code: str
-    """Digest of what its bits depend on: with another one a trial begins anew."""
+    """Digest of the code and libraries. With another digest, a trial starts from the beginning."""
 
     def file(self, identity: str) -> Path:
         """Return the file of a trial."""
@@ -59,25 +59,25 @@ class Checkpoints(NamedTuple):
 
 
 class Sources:
-    """Files by the names under which a spec knows them.
+    """Files of users by their names in a spec.
 
     Parameters
     ----------
     folder
-        Where names are relative to; none: only what `texts` hold is known.
+        Folder of relative names. By default, only `texts` are known.
     texts
-        Files that are known already, by name.
+        Known files by name.
     study
-        Directory of a study, whose copies stand in for files that are not there any more, before
-        those of `folder`, if that is a study too.
+        Directory of a study with copies that replace missing files. Its copies come before those of
+        `folder`.
     brought_by
-        What brought the `texts` along, and names files and modules, if it is not the user's own:
-        these are run only if they are trusted, see `is_trusted`.
+        The study or file of another person that names files and modules. These run only if they are
+        trusted, see `is_trusted`.
 
     Attributes
     ----------
     checkpoints
-        Where trials put down what they have come to; none: nowhere.
+        Checkpoints of trials; None for no checkpoints.
 
     Examples
     --------
@@ -117,20 +117,20 @@ class Sources:
 
     @property
     def texts(self) -> dict[str, str]:
-        """The files that have been asked for so far, by name."""
+        """Files that have been read so far, by name."""
         return dict(self._texts)
 
     @property
     def runs_foreign_code(self) -> bool:
-        """Whether Python files or modules of users have been asked for so far."""
+        """Whether Python files or modules of users have been read so far."""
         return bool(self._modules) or any(name.endswith(".py") for name in self._texts)
 
     def offered_by(self, module: str) -> None:
-        """Note that an installed package offers what is used, by an entry point."""
+        """Record the use of an entry point of an installed package."""
         self._modules.add(module)
 
     def only(self, names: set[str]) -> Sources:
-        """Return the files of some names alone."""
+        """Return a copy with only these names."""
         sources = Sources(None, {name: self.text(name) for name in sorted(names)})
         sources._brought = {name: by for name, by in self._brought.items() if name in names}
         sources._brought_by = self._brought_by
@@ -207,8 +207,8 @@ class Sources:
         text = module_text(module)
         if self._brought_by is not None and not is_trusted(text):
             raise ValueError(
-                f"{module} is a module that {self._brought_by} names and no spec of yours has "
-                "imported: it can do whatever you can; --trust imports it"
+                f"{module}: {self._brought_by} names this module, and none of your specs has "
+                "imported it. It can do whatever you can; --trust imports it"
             )
         if not self._was_sent:
             trust(text)
@@ -250,11 +250,11 @@ class Sources:
         except UnicodeDecodeError:
             raise ValueError(f"{name}: is not UTF-8 text") from None
         for other in imported(text) - {"nested_agents"} if name.endswith(".py") else ():
-            beside = [path.parent / f"{other}.py", path.parent / other / "__init__.py"]
-            if any(map(Path.exists, beside)) and place_of(other) in (None, *map(str, beside)):
+            local = [path.parent / f"{other}.py", path.parent / other / "__init__.py"]
+            if any(map(Path.exists, local)) and place_of(other) in (None, *map(str, local)):
                 raise ValueError(
-                    f"{name}: imports {other}, which stands beside it; a study keeps single files: "
-                    "put both in one, or install what is shared as a package"
+                    f"{name}: imports {other} from its folder, but a study keeps single files: put "
+                    "both in one file, or install the shared part as a package"
                 )
         return text
 
@@ -265,7 +265,7 @@ class Sources:
             return sys.modules[key]
         if name in self._brought and not is_trusted(text):
             raise ValueError(
-                f"{name} came with {self._brought[name]} and was not run from a spec of yours: it "
+                f"{name} came with {self._brought[name]}, and none of your specs has run it. It "
                 "can do whatever you can; --trust runs it"
             )
         if not self._was_sent:

@@ -1,4 +1,4 @@
-"""What Python text means and imports, the same under every version of Python that reads it."""
+"""Syntax trees and imports of Python text, the same under every version of Python."""
 
 import ast
 import gc
@@ -44,7 +44,7 @@ def tree_text(text: str, name: str) -> str:
 
 
 WITH_TYPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-"""What may have parameters of types."""
+"""Syntax nodes that may have type parameters."""
 
 
 def _is_empty(value: ast.expr) -> bool:

@@ -1,11 +1,11 @@
-"""Which code of users may be run: what a spec of the reader's own has run, or --trust has allowed.
+"""Trust in code: code runs if a spec of the user has run it before, or --trust allows it.
 
 A study keeps the files that its spec names, and runs them again when it is explained or continued;
 it may also name modules of installed packages. Of a study that came from somebody else, nothing may
 be run unasked, and no module imported: that code can do whatever the reader can. A digest inside
-the study would protect nobody. So whatever is run from a spec in hand is noted, by a SHA-256, in a
-list outside of all studies: ``$XDG_STATE_HOME/nested-agents/trusted``, by default below
-``~/.local/state``. What a study brings along, or names, is run if the list has it.
+the study would protect no user. Code that runs from a user's own spec is therefore recorded, by a
+SHA-256, in a list outside of all studies: ``$XDG_STATE_HOME/nested-agents/trusted``, by default
+below ``~/.local/state``. Code that a study contains or names runs if it is in the list.
 
 Of a file its text is noted; of a module, its name and where its package is, see `module_text`.
 """
@@ -19,10 +19,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 ENVIRONMENT_KEYS = ("id", "env_id")
-"""Keys whose value is the name of an environment; ``env_id`` is an option of old environments."""
+"""Keys with the name of an environment; ``env_id`` is an option of old environments."""
 
 LIBRARIES = ("gymnasium", "mpe2", "pettingzoo")
-"""Packages whose environments every study may name, because the toolkit offers them."""
+"""Packages with environments that every study may name, because the toolkit offers them."""
 
 _noted: set[str] = set()
 """Digests of what this process trusts, also where no list can be written."""

@@ -118,7 +118,7 @@ class Edges:
         graph = nx.Graph(hierarchy.edges)
         graph.add_nodes_from(range(len(self.agents)))
         related = [
-            j in hierarchy.below(i) or i in hierarchy.below(j)
+            j in hierarchy.searched(i) or i in hierarchy.searched(j)
             for i, one in enumerate(self.agents)
             for j, other in enumerate(self.agents)
             if i < j and one.partition(".")[0] == other.partition(".")[0]

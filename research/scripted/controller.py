@@ -174,7 +174,9 @@ class ScriptedController:
         aside = cos_ * (slots[:, 1] - box[1]) - sin_ * (slots[:, 0] - box[0])
 
         def best(options: IntArray) -> IntArray:
-            after, boxes, gaps = push(robots, box, twists, options, self.seconds, self._model)
+            choices = np.ascontiguousarray(options.T)
+            pushed = push(robots, box, twists, choices, self.seconds, self._model)
+            after, boxes, gaps = (np.moveaxis(each, -1, 0) for each in pushed)
             costs = self._cost(after, boxes, gaps, goal, side, aside)
             costs[[not twists[range(len(o)), o].any() for o in options]] += 1.0  # never rest
             return options[int(costs.argmin())]

@@ -219,9 +219,9 @@ class Crowd:
         """
 
         def best(options: IntArray) -> IntArray:
-            after, boxes, gaps = push(
-                robots, box, twists, options, self._drivers.seconds, self._model
-            )
+            choices = np.ascontiguousarray(options.T)
+            pushed = push(robots, box, twists, choices, self._drivers.seconds, self._model)
+            after, boxes, gaps = (np.moveaxis(each, -1, 0) for each in pushed)
             costs = self._cost(after, boxes, gaps, box, goal, plan)
             best: IntArray = options[int(costs.argmin())]
             return best

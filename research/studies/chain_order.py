@@ -19,12 +19,12 @@ import numpy as np
 from nested_agents import Analysis, Study
 from nested_agents.analysis import (
     LEVEL,
+    ComparisonGroup,
     Figures,
     Friedman,
-    Group,
     Results,
+    compare_conditions,
     compare_with_first,
-    contrasts,
     format_number,
     format_p,
     friedman,
@@ -43,7 +43,7 @@ def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("training")
     if any({"name", "topology"} <= results.columns.get(c, {}).keys() for c in conditions):
-        by_order = contrasts(results, results.main.name, by="topology")
+        by_order = compare_conditions(results, results.main.name, by="topology")
         groups = [group for group in by_order.groups if group.differences]
         equal = map(equivalence, groups) if results.main.is_rate else ()  # `MARGIN` is of rates
         notes = (*equal, *by_order.notes)
@@ -54,7 +54,7 @@ def analyse(results: Results) -> Analysis:
     return replace(compared, notes=notes, cases=tests)
 
 
-def equivalence(group: Group) -> str:
+def equivalence(group: ComparisonGroup) -> str:
     """Return whether the orders of a group are equal but for `MARGIN`, in words."""
     low = min(float(d.estimate.low) for d in group.differences)
     high = max(float(d.estimate.high) for d in group.differences)

@@ -68,7 +68,7 @@ def check(spec: Spec) -> None:
     """Raise `SpecError` unless trained teams are evaluated under other hierarchies."""
     check_evaluated(spec)
     check_rule_bases(spec, "who consider others and are told")
-    check_evaluations(spec, 'silent.topology.told = "none"')
+    check_evaluations(spec, 'silent.topology.communication = "none"')
 
 
 def measure(trial: Trial) -> TrialResult:
@@ -84,7 +84,7 @@ def measure(trial: Trial) -> TrialResult:
     session.run_other_evaluations({name: partial(note, name) for name in deciding})
     numbers = {"robots": float(len(session.world.groups))}
     for name, settings in ((TRAINED, trial.settings), *trial.evaluations):
-        numbers[f"messages.{name}"] = float(settings.arrange(session.world)[1].messages)
+        numbers[f"messages.{name}"] = float(settings.arrange(session.world)[1].n_messages)
     usage = {f"decision.{name}": float(np.median(d)) for name, d in deciding.items()}
     return session.result(numbers, usage)
 

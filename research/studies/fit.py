@@ -45,7 +45,7 @@ def measure(trial: Trial) -> TrialResult:
     session.evaluate()
     hierarchy = trial.settings.arrange(session.world)[1]
     bodies = float(len(session.world.groups))
-    return session.result({"robots": bodies, "messages": float(hierarchy.messages)})
+    return session.result({"robots": bodies, "messages": float(hierarchy.n_messages)})
 
 
 def analyse(results: Results) -> Analysis:

@@ -63,12 +63,12 @@ def measure(trial: Trial) -> TrialResult:
     team = session.team.only(FuzzyAgents)
     hierarchy = team.hierarchy
     n_rules = team.learner.theta.shape[1]
-    tried = 0 if team.evaluator is None else hierarchy.joint_actions(len(team.action_set))
+    tried = 0 if team.evaluator is None else hierarchy.count_joint_actions(len(team.action_set))
     counted = team.counts.rule_evaluations
     numbers = {
         "agents": float(len(hierarchy)),
         "memory": 1e-3 * team.learner.theta.nbytes,
-        "messages": float(hierarchy.messages),
+        "messages": float(hierarchy.n_messages),
         "formula": float(tried * n_rules),
         "counted": counted / len(session.deciding),
     }

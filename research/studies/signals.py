@@ -41,7 +41,7 @@ def measure(trial: Trial) -> TrialResult:
     session.train(trial.episodes)
     session.evaluate()
     hierarchy = session.team.hierarchy
-    numbers = {"robots": float(len(hierarchy)), "messages": float(hierarchy.messages)}
+    numbers = {"robots": float(len(hierarchy)), "messages": float(hierarchy.n_messages)}
     learner = trial.settings.learner
     indifferent = learner.indifferent if isinstance(learner, Bayesian) else "signal"
     scenario = trial.settings.scenario

@@ -1,8 +1,8 @@
-"""Copies of simulators, which are stepped to predict what joint actions lead to.
+"""Copies of simulators, which are stepped to predict the outcome of joint actions.
 
-A simulator of MuJoCo is saved by its ``MjData``, played and brought back: what its environment
-makes of that, observations and rewards, is its own. Others are saved as Python objects, without
-spaces and windows, and made anew of that. Either way a copy has the random numbers of the original.
+A MuJoCo simulator saves its ``MjData``, is stepped itself, and is restored. Others are pickled
+without their spaces and windows. Both kinds of copy continue with the random numbers of the
+original.
 """
 
 from __future__ import annotations
@@ -21,89 +21,76 @@ import gymnasium
 from ...core.plugins.sources import format_error
 from .simulators import Player, Simulator
 
-SHARED = ("pygame", "glfw", "OpenGL", "moderngl")
-"""Packages whose objects a simulator draws with; copies have them in common."""
+SHARED_PACKAGES = ("pygame", "glfw", "OpenGL", "moderngl")
+"""Packages of objects that a simulator and its copies share."""
+SHARED_TYPES = gymnasium.Space, gymnasium.envs.registration.EnvSpec, FunctionType, ModuleType
+"""Types of objects that no step changes, which are shared, too."""
 
 
-class Copies(ABC):
-    """What makes copies of a simulator as it is now, until its next step."""
+class SimulatorCopies(ABC):
+    """A saved state of a simulator, valid until the simulator's next step."""
 
     @abstractmethod
-    def lane(self) -> AbstractContextManager[Simulator]:
-        """Return a copy, to be stepped as long as the context lasts."""
+    def open(self) -> AbstractContextManager[Simulator]:
+        """Return a context with a simulator in the saved state."""
 
 
-def copies_of(simulator: Simulator) -> Copies:
-    """Return what makes copies of a simulator as it is now."""
+def copy_simulator(simulator: Simulator) -> SimulatorCopies:
+    """Save the present state of a simulator."""
     data = getattr(simulator.env.unwrapped, "data", None)
     is_mujoco = type(data).__module__.partition(".")[0] == "mujoco"
-    return SavedMujoco(simulator) if is_mujoco else PickledCopies(simulator)
+    return MujocoCopies(simulator) if is_mujoco else PickledCopies(simulator)
 
 
-class PickledCopies(Copies):
-    """Copies of Python objects.
-
-    Parameters
-    ----------
-    simulator
-        The original.
-    """
+class PickledCopies(SimulatorCopies):
+    """Copies by pickling."""
 
     def __init__(self, simulator: Simulator) -> None:
-        self._layers = list(_layers(simulator))
+        self._layers = _layers(simulator)
         file = BytesIO()
-        saver = _Saver(file, self._layers)
-        # Attribute by attribute: many environments (EzPickle) would be made anew.
-        saver.dump([vars(layer) for layer in self._layers])
-        self._shared = saver.kept
+        pickler = _Pickler(file, self._layers)
+        # By attribute, because environments that inherit EzPickle would be constructed again.
+        pickler.dump([vars(layer) for layer in self._layers])
+        self._shared = pickler.shared
         self._saved = file.getvalue()
 
     @contextmanager
-    def lane(self) -> Iterator[Simulator]:
-        """Return a copy."""
+    def open(self) -> Iterator[Simulator]:
+        """Return a context with a new copy."""
         copies: dict[int, Any] = {id(layer): object.__new__(type(layer)) for layer in self._layers}
-        loader = _Loader(BytesIO(self._saved), self._shared | copies)
-        for layer, attributes in zip(copies.values(), loader.load(), strict=True):
+        unpickler = _Unpickler(BytesIO(self._saved), self._shared | copies)
+        for layer, attributes in zip(copies.values(), unpickler.load(), strict=True):
             vars(layer).update(attributes)
         yield copies[id(self._layers[0])]
 
 
-class _Saver(pickle.Pickler):
-    """Saves, of what copies have in common and of the layers themselves, the identity only."""
+class _Pickler(pickle.Pickler):
+    """Pickles only the identity of the layers themselves and of shared objects."""
 
     def __init__(self, file: BytesIO, layers: Iterable[object]) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
-        self.kept: dict[int, object] = {id(layer): layer for layer in layers}
+        self.shared: dict[int, object] = {id(layer): layer for layer in layers}
 
     def persistent_id(self, value: object, /) -> int | None:
-        """Return the identity of a value of which no copy is made; None of others."""
-        if id(value) not in self.kept:
-            if not _is_shared(value):
-                return None
-            self.kept[id(value)] = value
-        return id(value)
+        """Return the identity of a shared object; None for objects to be pickled."""
+        package = type(value).__module__.partition(".")[0]
+        if isinstance(value, SHARED_TYPES) or package in SHARED_PACKAGES:
+            self.shared[id(value)] = value
+        return id(value) if id(value) in self.shared else None
 
 
-class _Loader(pickle.Unpickler):
-    """Loads what a `_Saver` has saved."""
-
-    def __init__(self, file: BytesIO, kept: Mapping[int, object]) -> None:
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, file: BytesIO, shared: Mapping[int, object]) -> None:
         super().__init__(file)
-        self._kept = kept
+        self._shared = shared
 
     def persistent_load(self, identity: int, /) -> object:
-        """Return the value of an identity."""
-        return self._kept[identity]
+        """Return a shared object."""
+        return self._shared[identity]
 
 
-class SavedMujoco(Copies):
-    """The simulator itself, brought back afterwards.
-
-    Parameters
-    ----------
-    simulator
-        The original, an environment of MuJoCo.
-    """
+class MujocoCopies(SimulatorCopies):
+    """The MuJoCo simulator itself, restored after use."""
 
     def __init__(self, simulator: Simulator) -> None:
         mujoco: Any = import_module("mujoco")
@@ -111,51 +98,47 @@ class SavedMujoco(Copies):
         self._simulator = simulator
         self._env = env
         self._attributes = [(layer, dict(vars(layer))) for layer in _layers(simulator)]
-        self._copy = mujoco.mj_copyData
+        self._copy_data = mujoco.mj_copyData
         self._saved = mujoco.MjData(env.model)
-        self._copy(self._saved, env.model, env.data)
+        self._copy_data(self._saved, env.model, env.data)
 
     @contextmanager
-    def lane(self) -> Iterator[Simulator]:
-        """Return the simulator, which is where it was when the context ends."""
+    def open(self) -> Iterator[Simulator]:
+        """Return a context with the simulator; its end restores the saved state."""
         try:
             yield self._simulator
         finally:
-            self._copy(self._env.data, self._env.model, self._saved)
+            self._copy_data(self._env.data, self._env.model, self._saved)
             for layer, values in self._attributes:
                 vars(layer).update(values)
 
 
-def fault_of_copies(simulator: Simulator, actions: Mapping[Player, object]) -> str:
-    """Return why a simulator cannot be copied, in words; nothing if it can.
+def find_copy_fault(simulator: Simulator, actions: Mapping[Player, object]) -> str:
+    """Return the reason why a simulator cannot be copied; empty if it can.
 
-    It is started and played for some steps. Then two copies and itself must do the same.
+    The simulator is reset and stepped. Two copies and the original must then do the same.
     """
     simulator.reset(0)
     for _ in range(2):
         simulator.step(actions)
-    played = []
+    results = []
     try:
-        copies = copies_of(simulator)
+        copies = copy_simulator(simulator)
         for _ in range(2):
-            with copies.lane() as lane:
-                played.append(pickle.dumps([lane.step(actions) for _ in range(2)]))
-    except Exception as error:  # an environment may be anybody's
+            with copies.open() as copied:
+                results.append(pickle.dumps([copied.step(actions) for _ in range(2)]))
+    except Exception as error:  # raised by the environment
         return format_error(error)
-    played.append(pickle.dumps([simulator.step(actions) for _ in range(2)]))
-    return "" if len(set(played)) == 1 else "a copy does something else than the original"
+    results.append(pickle.dumps([simulator.step(actions) for _ in range(2)]))
+    return "" if len(set(results)) == 1 else "a copy does something else than the original"
 
 
-def _layers(simulator: Simulator) -> Iterator[object]:
-    """Yield a simulator and all that its environment is wrapped in, from the outside in."""
+def _layers(simulator: Simulator) -> list[object]:
+    """Return a simulator, its environment and all that this wraps, from the outside in."""
+    layers: list[object] = []
     layer: object = simulator
     while layer is not None:
-        yield layer
-        inside = vars(layer)
-        layer = inside.get("env", inside.get("aec_env"))
-
-
-def _is_shared(value: object) -> bool:
-    """Return whether no step changes a part of an environment."""
-    fixed = gymnasium.Space, gymnasium.envs.registration.EnvSpec, FunctionType, ModuleType
-    return isinstance(value, fixed) or type(value).__module__.partition(".")[0] in SHARED
+        layers.append(layer)
+        attributes = vars(layer)
+        layer = attributes.get("env", attributes.get("aec_env"))
+    return layers

@@ -1,51 +1,45 @@
-"""The numbers that a player observes: how they are called, between which bounds they lie.
+"""Numbers of which a player's observation consists: their names, bounds and values.
 
-An observation is a list of numbers in the order of its space. Those of a Dict have names by its
-keys; those of discrete parts are 1 for the value observed and 0 for the others.
+The numbers of a Dict are named after its keys. Discrete parts of a Dict are one-hot encoded.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
-from gymnasium.spaces.utils import flatten_space
+from gymnasium.spaces.utils import flatdim, flatten, flatten_space
 
 from ...core.numerics import FloatArray
-from .simulators import MASKS, Player, Space, at, masked, of_player
+from .simulators import MASK_KEYS, Player, Space, describe, mask_error, when
 
-MOST_BOUND = 1e6
-"""A bound of a space beyond it is none."""
+MAX_BOUND = 1e6
+"""A space's bound beyond this is taken as infinite."""
 
 
-class ObservedEntries:
-    """The numbers that a player observes.
-
-    Parameters
-    ----------
-    player
-        Who observes.
-    space
-        Of its observations.
+class ObservationEntries:
+    """The numbers of a player's observations.
 
     Attributes
     ----------
     names
-        Of the numbers, in order.
+        Names of the ``k`` numbers, in order.
     bounds
-        ``(2, k)`` of the numbers, infinite where there are none.
+        ``(2, k)`` lower and upper bounds, infinite where the space has none.
 
     Raises
     ------
     ValueError
-        If these are images or no numbers, two have one name, or say which actions are legal; one
-        line.
+        If the space contains images, text or sequences, has an action mask, or two numbers have
+        the same name.
 
     Examples
     --------
-    >>> entries = ObservedEntries("a", Dict({"height": Box(0.0, 9.0, (1,)), "side": Discrete(2)}))
+    >>> space = Dict({"height": Box(0.0, 9.0, (1,)), "side": Discrete(2)})
+    >>> entries = ObservationEntries("a", space)
     >>> entries.names, entries.bounds[1].tolist()
     (['height', 'side0', 'side1'], [9.0, 1.0, 1.0])
     >>> entries.numbers({"side": 1, "height": np.array([4.5])}, 0).tolist()
@@ -55,114 +49,87 @@ class ObservedEntries:
     def __init__(self, player: Player, space: Space) -> None:
         self.player = player
         self.space = space
-        self._of = of_player("observations", player)
-        self.keys = tuple(space) if isinstance(space, Dict) else ()
-        """Of a Dict, in its order."""
-        for part in space.values() if isinstance(space, Dict) else (space,):
-            _check_part(part, self._of)
-        for key in MASKS:
-            if key in self.keys:
-                raise masked(player, f"observations have {key}")
-        self.names = self._names()
-        repeated = [name for name, count in Counter(self.names).items() if count > 1]
-        if repeated:
-            raise ValueError(f"{self._of}: two numbers are called {repeated[0]}, rename a key")
+        self._name = describe("observation", player)
+        parts = dict(space.spaces) if isinstance(space, Dict) else {"o": space}
+        for key, part in parts.items():
+            if key in MASK_KEYS:
+                raise mask_error(player, f"observation has {key}")
+            _check_part(part, self._name)
+        self.names: list[str] = []
+        for key, part in parts.items():
+            count = 1 if part is space and isinstance(part, Discrete) else flatdim(part)
+            is_single = count == 1 and part is not space
+            self.names += [str(key)] if is_single else [f"{key}{i}" for i in range(count)]
+        for name, count in Counter(self.names).items():
+            if count > 1:
+                raise ValueError(f"{self._name}: {count} numbers are named {name}, rename a key")
         self.bounds = self._bounds()
 
-    def numbers(self, observed: object, step: int) -> FloatArray:
-        """Return the numbers ``(k,)`` of an observation at some step.
+    @property
+    def keys(self) -> list[str]:
+        """Keys of a Dict observation; empty for other spaces."""
+        return list(map(str, self.space)) if isinstance(self.space, Dict) else []
+
+    def _bounds(self) -> FloatArray:
+        if isinstance(self.space, Discrete):
+            first = float(self.space.start)
+            return np.array([[first], [first + float(self.space.n) - 1]])
+        flat: Any = flatten_space(self.space)
+        bounds = np.array([flat.low, flat.high], dtype=np.float64)
+        return np.where(np.abs(bounds) > MAX_BOUND, np.copysign(np.inf, bounds), bounds)
+
+    def numbers(self, observation: object, step: int) -> FloatArray:
+        """Return the numbers ``(k,)`` of an observation.
 
         Raises
         ------
         ValueError
-            If it does not fit the space; one line.
+            If the observation does not fit its space.
         """
-        where = f"{self._of} {at(step)}"
-        if isinstance(self.space, Discrete):
-            numbers = _discrete(observed, where)
-        elif isinstance(self.space, Dict):
-            numbers = np.concatenate(
-                [
-                    _flat(part, _entry(observed, key, where), f"{where}: {key}")
-                    for key, part in self.space.items()
-                ]
-            )
+        name = f"{self._name} {when(step)}"
+        if isinstance(self.space, Dict):
+            if not isinstance(observation, Mapping):
+                observation = {}
+            for key in self.space:
+                if key not in observation:
+                    raise ValueError(f"{name}: key {key!r} is missing")
+            parts = [_flat(p, observation[k], f"{name}: {k}") for k, p in self.space.items()]
+            numbers = np.concatenate(parts)
+        elif isinstance(self.space, Discrete):
+            numbers = np.atleast_1d(_flat(self.space, observation, name).argmax() + self.bounds[0])
         else:
-            numbers = _flat(self.space, observed, where)
+            numbers = _flat(self.space, observation, name)
         if len(numbers) != len(self.names):
-            raise ValueError(f"observed are {len(numbers)} numbers, of {self.space}, {at(step)}")
+            raise ValueError(f"{name}: {len(numbers)} numbers, allowed: {self.space}")
         return numbers
 
-    def _names(self) -> list[str]:
-        if isinstance(self.space, Discrete):
-            return ["o0"]
-        if not isinstance(self.space, Dict):
-            return [f"o{i}" for i in range(_count(self.space))]
-        names = []
-        for key, part in self.space.items():
-            count = _count(part)
-            names += [str(key)] if count == 1 else [f"{key}{i}" for i in range(count)]
-        return names
 
-    def _bounds(self) -> FloatArray:
-        if isinstance(self.space, Discrete):
-            first = self.space.start
-            return np.array([[first], [first + self.space.n - 1]], dtype=np.float64)
-        flat = flatten_space(self.space)
-        assert isinstance(flat, Box)
-        ends = np.array([flat.low, flat.high], dtype=np.float64)
-        return np.where(np.abs(ends) > MOST_BOUND, np.copysign(np.inf, ends), ends)
-
-
-def _check_part(part: Space, of: str) -> None:
-    """Refuse what is no fixed number of numbers."""
+def _check_part(part: Space, name: str) -> None:
+    """Refuse spaces that are not a fixed number of numbers, and images."""
     if not isinstance(part, Box | Discrete | MultiDiscrete | MultiBinary):
-        raise ValueError(f"{of}: {part}, allowed: a fixed number of numbers")
+        raise ValueError(
+            f"{name}: {part}, allowed: Box, Discrete, MultiDiscrete, MultiBinary, Dict"
+        )
     if isinstance(part, Box) and len(part.shape) > 1 and part.dtype == np.uint8:
         raise ValueError(
-            f"{of}: images of shape {part.shape}, allowed: numbers; many environments have "
-            "another id or option whose observations are states"
+            f"{name}: images of shape {part.shape}, allowed: vectors of numbers; many environments "
+            "offer states under another id or option"
         )
 
 
-def _count(part: Space) -> int:
-    """Return of how many numbers a part of an observation consists."""
-    flat = flatten_space(part)
-    assert isinstance(flat, Box)
-    return int(flat.shape[0])
-
-
-def _entry(observed: object, key: str, where: str) -> object:
-    """Return what a table that is observed has under a key."""
-    if not isinstance(observed, Mapping) or key not in observed:
-        raise ValueError(f"{where}: there is no {key!r}, which their space has")
-    return observed[key]
-
-
-def _discrete(observed: object, where: str) -> FloatArray:
-    """Return the one number of a discrete observation."""
-    number = np.asarray(observed)
-    if number.size != 1 or number.dtype.kind not in "biuf":
-        raise ValueError(f"{where}: {observed!r:.40}, allowed: one number")
-    return np.array(number, dtype=np.float64).reshape(1)
-
-
-def _flat(part: Space, observed: object, where: str) -> FloatArray:
-    """Return the numbers of what is observed of a part of a space, in its type."""
-    values = np.asarray(observed)
-    if values.dtype.kind not in "biuf":
-        raise ValueError(f"{where}: {observed!r:.40}, allowed: numbers")
-    if isinstance(part, Discrete | MultiDiscrete):
-        first = np.ravel(part.start)
-        counts = np.ravel(part.n if isinstance(part, Discrete) else part.nvec)
-        values = values.ravel()
-        is_inside = values.size == counts.size and (values >= first) & (values < first + counts)
-        if not np.all(is_inside):
-            raise ValueError(f"{where}: {values.tolist()} is outside of {part}")
-        places = np.cumsum(counts) - counts + (values - first)
-        return np.isin(np.arange(counts.sum()), places).astype(np.float64)
+def _flat(part: Space, value: object, name: str) -> FloatArray:
+    """Return the numbers of a part of an observation; discrete parts are one-hot encoded."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{name}: {value!r:.40}, allowed: numbers")
     with np.errstate(invalid="ignore", over="ignore"):
-        typed = values.astype(part.dtype)
-    if typed.dtype.kind in "biu" and not np.array_equal(typed, values):
-        raise ValueError(f"{where}: {values.ravel().tolist()} are no numbers of {part}")
-    return np.array(typed, dtype=np.float64).ravel()
+        typed = array.astype(part.dtype)
+    if typed.dtype.kind in "biu" and not np.array_equal(typed, array):
+        raise ValueError(f"{name}: {array.ravel().tolist()}, allowed: {part}")
+    if isinstance(part, Box):
+        return typed.ravel().astype(np.float64)
+    if isinstance(part, Discrete) and typed.size == 1:
+        typed = typed.reshape(())
+    if not part.contains(typed):
+        raise ValueError(f"{name}: {typed.ravel().tolist()}, allowed: {part}")
+    return np.asarray(flatten(part, typed), dtype=np.float64)

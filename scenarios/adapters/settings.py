@@ -1,6 +1,6 @@
-"""Settings of worlds of Gymnasium and PettingZoo: what their agents do, perceive and look ahead to.
+"""Settings of Gymnasium and PettingZoo environments: actions, state variables and predictions.
 
-Reading them needs no simulator; it is imported when a world is built.
+Reading settings imports no environment; it is imported when the scenario is built.
 """
 
 from collections.abc import Mapping
@@ -14,9 +14,11 @@ Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends
 Centres = Annotated[tuple[float, ...], Field(min_length=2)]
 Index = Annotated[int, Field(ge=0)]
 Entry = Index | str
-"""Which number of an observation: counted from 0, or by name."""
+"""A number of the observation, by index from 0 or by name."""
 Entries = Entry | Annotated[tuple[Entry, ...], Field(min_length=1)]
-"""Which number of an observation: one for all bodies, or one for each body."""
+"""A number of the observation, the same for all bodies or one for each."""
+Success = Literal["terminated"] | dict[str, float | Range]
+"""Condition for the success of an episode."""
 
 
 def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
@@ -25,25 +27,20 @@ def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
     return ends
 
 
-Success = Literal["terminated"] | dict[str, float | Range]
-"""When an episode is a success."""
-
-
-def _measurable(success: Success) -> Success:
+def _checked_success(success: Success) -> Success:
     for name, ends in success.items() if isinstance(success, dict) else ():
         if isinstance(ends, tuple) == (name == "return"):
-            needed = "a number, the least" if name == "return" else "a range"
-            raise ValueError(f"{name} must be {needed}")
+            raise ValueError(f"{name} must be a {'number' if name == 'return' else 'range'}")
     return success
 
 
 class Direction(Settings):
-    """An angle that an observation tells by its cosine and sine."""
+    """An angle given by its cosine and sine in the observation."""
 
     cos: Entries
-    """Where the cosine is."""
+    """Number that holds the cosine."""
     sin: Entries
-    """Where the sine is."""
+    """Number that holds the sine."""
 
     @model_validator(mode="after")
     def _two(self) -> Self:
@@ -52,91 +49,93 @@ class Direction(Settings):
         return self
 
 
-class AdaptedSettings(ScenarioSettings):
-    """What the worlds of Gymnasium and PettingZoo have in common."""
+class EnvironmentSettings(ScenarioSettings):
+    """Settings that Gymnasium and PettingZoo environments have in common."""
 
-    factory: ClassVar[str] = f"{__package__}.adapted:AdaptedWorld"
+    factory: ClassVar[str] = f"{__package__}.scenario:EnvironmentScenario"
     id: str = ""
-    """Which environment."""
+    """Id of the environment."""
     options: dict[str, Any] = Field(default_factory=dict)
-    """What the environment is made with, by name."""
+    """Keyword arguments with which the environment is made."""
     actions: Annotated[int, Field(ge=2, le=99)] = 5
-    """Levels, evenly spaced over its range, of each dimension of a continuous action; each is an
-    agent. Discrete actions stay as they are; of agents with fewer than others the last are the
-    first again."""
+    """Number of evenly spaced levels of each dimension of a continuous action. Each dimension is an
+    agent. Discrete actions remain as they are; agents with fewer actions than others repeat theirs
+    from the first on."""
     neutral: Index | None = None
-    """The action that an agent is taken to do where nothing is known of it; none: the level nearest
-    to 0, of discrete actions the first."""
+    """Action that an agent is assumed to take while nothing is known about it. By default the level
+    nearest to 0, or the first discrete action."""
     hold: Annotated[int, Field(ge=1, le=10_000)] = 1
-    """Steps of the environment for which a decision is held; their rewards are added."""
+    """Number of environment steps for which a joint action is held. Their rewards are added."""
     predictor: Literal["none", "copy", "learned"] = "none"
-    """What predicts: nothing; copies of the simulator, which are stepped for every joint action
-    that is tried and know it exactly, its random numbers too; or, with the presets ``default`` and
-    ``own-value``, what the team learns, as ``learner.predictor.kind = "learned"`` says."""
+    """Source of predictions. ``copy`` steps a copy of the simulator for every joint action tried,
+    which is exact and includes the random numbers to come. ``learned`` lets the team learn a model,
+    with the presets ``default`` and ``own-value``. ``none`` works only with model-free
+    learners."""
     horizon: Annotated[int, Field(ge=1, le=10_000)] = 1
-    """Decisions that copies look ahead, the joint action being held; the reward predicted is the
-    mean of theirs."""
+    """Number of decisions that copies look ahead while the joint action is held. The predicted
+    reward is the mean over these decisions."""
     variables: dict[str, Entries] = Field(default_factory=dict)
-    """State variables by name: which number of the observation each is, one for all bodies or a
-    list of one for each. None: all that `angles` leaves and that change, called o0, o1 and so on,
-    or those of a Dict by its keys: ``height``, ``position0``, ``position1``."""
+    """State variables by name: a number of the observation, the same for all bodies or a list with
+    one for each. By default all numbers that change and are not used by `angles`. They are named
+    o0, o1 and so on, or after the keys of a Dict: ``height``, ``position0``, ``position1``."""
     angles: dict[str, Entries | Direction] = Field(default_factory=dict)
-    """State variables that are angles [rad], whose ends are the same point: where the observation
-    has them, or their ``cos`` and ``sin``."""
+    """State variables that are angles [rad], given as a number of the observation or as its ``cos``
+    and ``sin``."""
     ranges: dict[str, Range] = Field(default_factory=dict)
-    """Ranges of state variables; of others they are those of the environment, and where it has
-    none, what random episodes meet."""
+    """Ranges of state variables. By default the bounds of the observation space, or what random
+    episodes reach where it has none."""
     centres: Annotated[dict[str, Centres], unwritten({})] = Field(default_factory=dict)
-    """Centres of the membership functions of state variables, increasing: close together where
-    little decides. Of others they are spread evenly, and ``learner.rule_base.memberships`` spreads
-    all evenly."""
+    """Increasing centers of the membership functions of state variables, evenly spaced by default.
+    ``learner.rule_base.memberships`` spaces all of them evenly."""
     rewards: Literal["joint", "own"] = "joint"
-    """Whether all agents receive the mean reward, or those of each body its own."""
-    success: Annotated[Success, AfterValidator(_measurable)] = Field(default_factory=dict)
-    """When an episode is a success: if it ``terminated``, as where a goal ends it; or the least
-    ``return``, and ranges of state variables in which all agents are at the end. None: never."""
+    """Reward of an agent: the mean of all players, or that of its own player."""
+    success: Annotated[Success, AfterValidator(_checked_success)] = Field(default_factory=dict)
+    """Condition for the success of an episode: ``"terminated"``, or a table with the minimum
+    ``return`` and ranges in which state variables of all agents must end. By default no episode is
+    a success, and returns are compared."""
 
     def __hash__(self) -> int:
-        return hash(repr(self))  # tables have no hash of their own
+        return hash(repr(self))  # dicts have no hash
 
     def bodies(self) -> tuple[tuple[int, ...], ...]:
-        """Return the agents of each body of an only player; none: each is its own."""
+        """Return the agents of each body of a single player; empty if each agent is a body."""
         return ()
 
     def warnings(self) -> tuple[str, ...]:
-        """Return that nothing is a success, if it is so."""
-        nothing = "scenario.success: nothing is said to be one, returns are compared"
-        return () if self.success else (nothing,)
+        """Return a warning if no success is defined."""
+        return () if self.success else ("scenario.success is not set: returns are compared",)
 
     def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
-        """Return that predictions are learned, or few joint actions tried where each is played."""
+        """Return defaults of the learner that follow from the predictor."""
         if self.predictor == "learned" and preset in ("default", "own-value"):
             return {"learner": {"predictor": {"kind": "learned"}}}
-        is_slow = self.predictor == "copy" and preset in ("default", "own-value", "frozen")
-        return {"learner": {"decision": {"evaluator": "best-response"}}} if is_slow else {}
+        if self.predictor == "copy" and preset in ("default", "own-value", "frozen"):
+            # Copies are slow: try few joint actions.
+            return {"learner": {"decision": {"evaluator": "best-response"}}}
+        return {}
 
 
-class GymnasiumSettings(AdaptedSettings):
-    """An environment of Gymnasium, each dimension of its action an agent."""
+class GymnasiumSettings(EnvironmentSettings):
+    """A Gymnasium environment. Each dimension of its action is an agent."""
 
     kind: Literal["gymnasium"] = "gymnasium"
     id: str
-    """As ``gymnasium.make`` takes it: ``Pendulum-v1``, or ``module:name``; or ``file.py:Name`` of
-    your own, a class or function that makes an environment."""
+    """Id as in ``gymnasium.make``, such as ``Pendulum-v1`` or ``module:name``, or ``file.py:Name``
+    for a class or function in your file that makes an environment."""
     groups: tuple[tuple[Index, ...], ...] = ()
-    """Numbers of the agents of every body, from 0 on, in order: those who have the same place in
-    their bodies are of one role. None: each is its own body and role."""
+    """Agents of each body, numbered from 0 in order. Agents at the same place of their bodies have
+    the same role. By default each agent is a body with its own role."""
 
     def bodies(self) -> tuple[tuple[int, ...], ...]:
         """Return the agents of each body."""
         return self.groups
 
 
-class PettingZooSettings(AdaptedSettings):
-    """An environment of PettingZoo, each of whose agents is a body."""
+class PettingZooSettings(EnvironmentSettings):
+    """A PettingZoo environment. Each of its agents is a body."""
 
     kind: Literal["pettingzoo"] = "pettingzoo"
     id: str
-    """As ``pettingzoo.make`` takes it: ``sisl/multiwalker-v9``; or its module, such as
-    ``mpe2/simple_spread_v3``, which has ``parallel_env``, or an ``env`` whose agents act in cycles;
-    or ``file.py:name`` of your own, a class or function that makes an environment."""
+    """Id as in ``pettingzoo.make``, such as ``sisl/multiwalker-v9``, a module with
+    ``parallel_env``, such as ``mpe2/simple_spread_v3``, or ``file.py:name`` for a class or function
+    in your file that makes an environment."""

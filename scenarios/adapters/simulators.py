@@ -1,83 +1,70 @@
-"""Environments of Gymnasium and PettingZoo in one form: players that act and observe.
+"""Gymnasium and PettingZoo environments behind one interface.
 
-A player acts and observes: the one of Gymnasium, an agent of PettingZoo. Its identity may be of any
-type that a table can have as a key. Who has left an episode before its end observes what it last
-observed, and is paid nothing. An episode ends when each of those who act has terminated or has been
-truncated, or the key `ALL` of terminations or truncations says so.
+A *player* acts and observes: the single agent of a Gymnasium environment, or an agent of a
+PettingZoo environment. A player that has left an episode keeps its last observation and receives no
+reward. An episode ends when every acting player has terminated or been truncated, or when the key
+``__all__`` of RLlib says so.
 
-What an environment returns is checked here once, step by step, so that nothing is read where it is
-not: who must observe does, a reward is one finite number, an ending is true or false.
+Whatever an environment returns is checked here, so that inner code can trust it.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Collection, Hashable, Iterable, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
-from itertools import product
 from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 from pettingzoo import AECEnv, ParallelEnv
-from pettingzoo.utils.conversions import aec_to_parallel_wrapper
+from pettingzoo.utils.conversions import aec_to_parallel
 
 from ...core.plugins.printing import printable
 
 Player = Hashable
-"""Who acts and observes: `ONLY`, or the id of an agent of PettingZoo."""
+"""Id of a PettingZoo agent, or `SINGLE` for the agent of a Gymnasium environment."""
 Space = gymnasium.Space[Any]
 Environment = Any
-"""Of Gymnasium or PettingZoo, or somebody's that is used alike."""
-Observations = Mapping[Player, object]
-TABLES = ("observations", "rewards", "terminations", "truncations", "infos")
-"""What a step of a parallel environment returns, in order, each by player."""
-MASKS = ("action_mask", "action_masks", "avail_actions", "available_actions", "legal_moves")
-"""Keys under which environments say which actions are legal."""
-
-
+"""A Gymnasium or PettingZoo environment, or an object with the same methods."""
+SINGLE: Player = None
+"""The player of a Gymnasium environment, which has no name."""
+PARTS = ("observations", "rewards", "terminations", "truncations", "infos")
+"""Parts of what ``step`` of a parallel environment returns, in order, each by player."""
+MASK_KEYS = ("action_mask", "action_masks", "avail_actions", "available_actions", "legal_moves")
+"""Keys under which environments give action masks."""
 ALL = "__all__"
-"""Key of terminations and truncations that stands for all agents, a convention of RLlib."""
+"""Key of terminations and truncations that RLlib uses for all agents."""
 
 
-@dataclass(frozen=True)
-class OnlyPlayer:
-    """The player of an environment of Gymnasium, which has no name there."""
-
-    def __str__(self) -> str:
-        return ""
-
-
-ONLY = OnlyPlayer()
-
-
-def of_player(what: str, player: Player) -> str:
-    """Return what a player has, in words.
+def describe(part: str, player: Player) -> str:
+    """Return a part of the environment's interface with its player, for messages.
 
     Examples
     --------
-    >>> of_player("observations", ONLY), of_player("reward", 0), of_player("reward", "")
-    ('observations', 'reward of 0', "reward of ''")
+    >>> describe("observation", SINGLE), describe("reward", 0), describe("reward", "")
+    ('observation', 'reward of 0', "reward of ''")
     """
-    return what if player == ONLY else f"{what} of {printable(str(player)) or repr(player)}"
+    if player is SINGLE:
+        return part
+    return f"{part} of {printable(str(player)) or repr(player)}"
 
 
-def at(step: int) -> str:
-    """Return when in an episode a step is, in words."""
-    return "at the start" if step == 0 else f"at step {step}"
+def when(step: int) -> str:
+    """Return the time of a step for messages; step 0 is the reset."""
+    return "at reset" if step == 0 else f"at step {step}"
 
 
-class Played(NamedTuple):
-    """What an environment told at the start of an episode or after a step, by player."""
+class EnvironmentStep(NamedTuple):
+    """Result of ``reset`` or ``step`` of an environment, by player."""
 
-    observations: Observations
+    observations: Mapping[Player, object]
     rewards: Mapping[Player, float]
-    """Of all players, after a step."""
+    """Rewards of all players; empty after a reset."""
     terminated: bool
     truncated: bool
     step: int
-    """Steps since the start."""
+    """Number of steps since the reset."""
 
     @property
     def is_over(self) -> bool:
@@ -86,333 +73,250 @@ class Played(NamedTuple):
 
 
 class Simulator(ABC):
-    """An environment that players act in.
+    """An environment with players.
 
-    Its methods raise a `ValueError` of one line where an environment returns what none may return.
+    `reset` and `step` raise `ValueError` with a one-line message if the environment returns
+    something that its interface does not allow.
     """
 
     env: Environment
-    """The environment; `reset` and `step` modify it."""
     players: tuple[Player, ...]
-    """All who may act in it."""
     observation_spaces: Mapping[Player, Space]
     action_spaces: Mapping[Player, Space]
 
     @abstractmethod
-    def reset(self, seed: int) -> Played:
+    def reset(self, seed: int) -> EnvironmentStep:
         """Start an episode."""
 
     @abstractmethod
-    def step(self, actions: Mapping[Player, object]) -> Played:
-        """Carry out the actions of those who are still there for one step."""
+    def step(self, actions: Mapping[Player, object]) -> EnvironmentStep:
+        """Execute the actions of the players that are still present."""
 
 
 class GymnasiumSimulator(Simulator):
-    """An environment of Gymnasium, of one player.
-
-    Parameters
-    ----------
-    env
-        The environment; `reset` and `step` modify it.
-    """
+    """A Gymnasium environment with one player."""
 
     def __init__(self, env: Environment) -> None:
         self.env = env
-        self.players = (ONLY,)
-        self.observation_spaces = {ONLY: env.observation_space}
-        self.action_spaces = {ONLY: env.action_space}
-        self._step = 0
+        self.players = (SINGLE,)
+        self.observation_spaces = {SINGLE: env.observation_space}
+        self.action_spaces = {SINGLE: env.action_space}
+        self._steps = 0
 
-    def reset(self, seed: int) -> Played:
+    def reset(self, seed: int) -> EnvironmentStep:
         """Start an episode."""
-        observed, _ = _parts_of_reset(self.env.reset(seed=seed))
-        self._step = 0
-        return Played({ONLY: observed}, {}, False, False, 0)
+        observation, _ = _unpack_reset(self.env.reset(seed=seed))
+        self._steps = 0
+        return EnvironmentStep({SINGLE: observation}, {}, False, False, 0)
 
-    def step(self, actions: Mapping[Player, object]) -> Played:
-        """Carry out an action for one step."""
-        parts = _parts_of_step(self.env.step(actions[ONLY]))
-        observed, reward, terminated, truncated, _ = parts
-        self._step += 1
-        return Played(
-            {ONLY: observed},
-            {ONLY: _number(reward, f"reward {at(self._step)}")},
-            _flag(terminated, f"terminated {at(self._step)}"),
-            _flag(truncated, f"truncated {at(self._step)}"),
-            self._step,
-        )
+    def step(self, actions: Mapping[Player, object]) -> EnvironmentStep:
+        """Execute an action."""
+        observation, reward, *ends, _ = _unpack_step(self.env.step(actions[SINGLE]))
+        self._steps += 1
+        time = when(self._steps)
+        rewards = {SINGLE: _finite_number(reward, f"reward {time}")}
+        terminated = _flag(ends[0], f"terminated {time}")
+        truncated = _flag(ends[1], f"truncated {time}")
+        return EnvironmentStep({SINGLE: observation}, rewards, terminated, truncated, self._steps)
 
 
-class ParallelSimulator(Simulator):
-    """A parallel environment of PettingZoo.
-
-    Parameters
-    ----------
-    env
-        The environment; `reset` and `step` modify it.
+class PettingZooSimulator(Simulator):
+    """A parallel PettingZoo environment.
 
     Raises
     ------
     ValueError
-        If it does not say who may act; one line.
+        If the environment does not declare ``possible_agents``.
     """
 
     def __init__(self, env: Environment) -> None:
         self.env = env
-        self.players = _possible_agents(env)
+        self.players = tuple(getattr(env, "possible_agents", None) or ())
+        if not self.players:
+            raise ValueError(
+                "possible_agents is missing or empty, allowed: all agents that may act"
+            )
         self.observation_spaces = {p: env.observation_space(p) for p in self.players}
         self.action_spaces = {p: env.action_space(p) for p in self.players}
-        self._step = 0
-        # What follows is replaced, never changed: copies of a simulator may share it.
-        self._observed: Observations = {}
+        self._steps = 0
+        # These three are replaced, never modified, because copies of a simulator share them.
+        self._observations: Mapping[Player, object] = {}
         self._terminated: frozenset[Player] = frozenset()
         self._ended: frozenset[Player] = frozenset()
 
-    def reset(self, seed: int) -> Played:
+    def reset(self, seed: int) -> EnvironmentStep:
         """Start an episode."""
-        observed, infos = _parts_of_reset(self.env.reset(seed=seed))
-        observations = _table(observed, "reset returns observations")
-        _refuse_masks(_table(infos, "reset returns infos"))
-        for player in self.players:
-            if player not in observations:
-                raise ValueError(
-                    f"{player!r} observes nothing at the start, allowed: environments in which all "
-                    "possible_agents are there; wrap it so that reset returns what each observes"
-                )
-        self._check_known(observations)
-        self._step = 0
-        self._observed = {player: observations[player] for player in self.players}
+        returned = _unpack_reset(self.env.reset(seed=seed))
+        self._steps = 0
+        observations = self._by_player(returned[0], "observations")
+        _refuse_masks(self._by_player(returned[1], "infos"))
+        self._require(self.players, observations, "observations")
+        self._observations = {player: observations[player] for player in self.players}
         self._terminated = frozenset()
         self._ended = frozenset()
-        return Played(self._observed, {}, False, False, 0)
+        return EnvironmentStep(self._observations, {}, False, False, 0)
 
-    def step(self, actions: Mapping[Player, object]) -> Played:
-        """Carry out the actions of those who are still there for one step."""
-        acting = tuple(self.env.agents)
-        self._check_known(acting)
-        parts = _parts_of_step(self.env.step({player: actions[player] for player in acting}))
-        self._step += 1
+    def step(self, actions: Mapping[Player, object]) -> EnvironmentStep:
+        """Execute the actions of the players that are still present."""
+        acting = list(self.env.agents)
+        self._refuse_unknown(acting, "agents")
+        parts = _unpack_step(self.env.step({player: actions[player] for player in acting}))
+        self._steps += 1
         tables = {
-            name: _table(part, f"step returns {name}")
-            for name, part in zip(TABLES, parts, strict=True)
+            name: self._by_player(part, name) for name, part in zip(PARTS, parts, strict=True)
         }
-        observed = tables["observations"]
-        self._check_known(observed)
         _refuse_masks(tables["infos"])
-        for name in ("terminations", "truncations"):
-            tables[name] = flags_by_agent(tables[name], set(self.players) - self._ended)
+        playing = [player for player in acting if player not in self._ended]
         for name in ("rewards", "terminations", "truncations"):
-            self._check_known(tables[name], f" in {name}")
-        asked = [player for player in acting if player not in self._ended]
-        self._check_told(asked, tables, ("rewards", "terminations", "truncations"))
-        self._terminated |= self._flagged("terminated", tables["terminations"])
-        self._ended |= self._terminated | self._flagged("truncated", tables["truncations"])
-        going_on = [player for player in asked if player not in self._ended]
-        self._check_told(going_on, tables, ("observations",))
-        # What those observed last who have ended is kept as it is now.
-        last = {player: deepcopy(observed[player]) for player in self._ended & observed.keys()}
-        self._observed = {**self._observed, **observed, **last}
-        paid = {player: self._paid(player, tables["rewards"]) for player in self.players}
+            self._require(playing, tables[name], name)
+        self._terminated |= self._flagged(tables["terminations"], "terminated")
+        self._ended |= self._terminated | self._flagged(tables["truncations"], "truncated")
+        observations = tables["observations"]
+        continuing = [player for player in playing if player not in self._ended]
+        self._require(continuing, observations, "observations")
+        # An environment may reuse the array of a player that has left: keep a copy of its last one.
+        last = {p: deepcopy(observations[p]) for p in self._ended & observations.keys()}
+        self._observations = {**self._observations, **observations, **last}
+        rewards = {player: self._reward(player, tables["rewards"]) for player in self.players}
         present = frozenset(self.env.agents)
-        anew = present.difference(acting)  # who enters has not ended
-        self._terminated -= anew
-        self._ended -= anew
+        entered = present.difference(acting)
+        self._terminated -= entered
+        self._ended -= entered
         is_over = self._ended >= present
-        has_terminated = is_over and self._terminated.issuperset(self.players)
-        is_cut = is_over and not has_terminated
-        return Played(self._observed, paid, has_terminated, is_cut, self._step)
+        terminated = is_over and self._terminated.issuperset(self.players)
+        truncated = is_over and not terminated
+        return EnvironmentStep(self._observations, rewards, terminated, truncated, self._steps)
 
-    def _check_known(self, players: Iterable[Player], where: str = "") -> None:
+    def _by_player(self, part: object, name: str) -> Mapping[Player, Any]:
+        """Return a returned table after checking its type and its keys."""
+        if not isinstance(part, Mapping):
+            raise ValueError(f"{name} {when(self._steps)}: {type(part).__name__}, allowed: a dict")
+        if name in ("terminations", "truncations"):
+            part = expand_all(part, set(self.players) - self._ended)
+        if name != "infos":  # RLlib adds keys of its own
+            self._refuse_unknown(part, name)
+        return part
+
+    def _refuse_unknown(self, players: Iterable[Player], name: str) -> None:
         for player in players:
             if player not in self.observation_spaces:
-                raise ValueError(f"{player!r}{where} {at(self._step)} is none of possible_agents")
+                raise ValueError(
+                    f"{name} {when(self._steps)}: {player!r} is not in possible_agents"
+                )
 
-    def _check_told(
-        self,
-        players: Iterable[Player],
-        tables: Mapping[str, Mapping[Player, object]],
-        names: Iterable[str],
+    def _require(
+        self, players: Iterable[Player], table: Mapping[Player, object], name: str
     ) -> None:
-        """Refuse that players who act are missing in some tables of a step."""
-        for player, name in product(players, names):
-            if player not in tables[name]:
-                raise ValueError(f"{player!r} acts, and {name} {at(self._step)} do not have it")
+        for player in players:
+            if player not in table:
+                hint = (
+                    ", allowed: agents that are present from the start" if not self._steps else ""
+                )
+                raise ValueError(f"{name} {when(self._steps)}: {player!r} is missing{hint}")
 
-    def _flagged(self, what: str, flags: Mapping[Player, object]) -> frozenset[Player]:
-        """Return of whom a table of flags says that it is so."""
-        known = (player for player in self.players if player in flags)
-        return frozenset(p for p in known if _flag(flags[p], self._of(what, p)))
+    def _flagged(self, flags: Mapping[Player, object], name: str) -> frozenset[Player]:
+        """Return the players with a true flag."""
+        where = when(self._steps)
+        return frozenset(p for p, flag in flags.items() if _flag(flag, f"{name} of {p} {where}"))
 
-    def _paid(self, player: Player, rewards: Mapping[Player, object]) -> float:
-        if player not in rewards:
-            return 0.0
-        return _number(rewards[player], self._of("reward", player))
-
-    def _of(self, what: str, player: Player) -> str:
-        return f"{of_player(what, player)} {at(self._step)}"
+    def _reward(self, player: Player, rewards: Mapping[Player, object]) -> float:
+        name = f"{describe('reward', player)} {when(self._steps)}"
+        return _finite_number(rewards.get(player, 0.0), name)
 
 
-def flags_by_agent(flags: Mapping[Player, object], agents: Iterable[Player]) -> dict[Player, Any]:
-    """Return terminations or truncations by agent, without the key `ALL`.
+def expand_all(flags: Mapping[Player, Any], agents: Collection[Player]) -> dict[Player, Any]:
+    """Return terminations or truncations without the key ``__all__`` of RLlib.
 
-    Parameters
-    ----------
-    flags
-        By agent. `ALL` may stand beside them, or alone: if it is true, it overrides the flags of
-        all `agents`; if it is false, the agents without a flag go on.
-    agents
-        Those who have not ended before.
+    If its value is true, it replaces the flags of all `agents`. If it is false, agents without a
+    flag continue.
 
     Examples
     --------
-    >>> flags_by_agent({"a": False, "__all__": True}, ["a", "b"])
+    >>> expand_all({"a": False, "__all__": True}, ["a", "b"])
     {'a': True, 'b': True}
     """
-    own = dict(flags)
-    if ALL not in own or ALL in (agents := list(agents)):
-        return own
-    everyone = dict.fromkeys(agents, own.pop(ALL))
+    if ALL not in flags or ALL in agents:
+        return dict(flags)
+    own = {agent: flag for agent, flag in flags.items() if agent != ALL}
+    everyone = dict.fromkeys(agents, flags[ALL])
     return own | everyone if _flag(flags[ALL], ALL) else everyone | own
 
 
-class TurnsAtOnce(aec_to_parallel_wrapper[Any, Any, Any]):
-    """An environment whose agents take turns, in which all act at once; ids are of any type.
-
-    PettingZoo's own conversion takes ids that are text alone.
-    """
-
-    def reset(self, seed: int | None = None, options: object = None) -> tuple[object, object]:
-        """Start an episode; return observations and infos."""
-        env = self.aec_env
-        env.reset(seed=seed, options=options)
-        self.agents = list(env.agents)
-        return {agent: env.observe(agent) for agent in self.agents}, dict(env.infos)
-
-    def step(self, actions: Mapping[Player, object]) -> tuple[object, ...]:
-        """Let each agent take its turn; return what all are told after the last."""
-        env = self.aec_env
-        rewards: dict[Player, float] = {}
-        for agent in list(env.agents):
-            if env.agent_selection != agent:
-                raise ValueError(
-                    f"it is the turn of {env.agent_selection!r} where {agent!r} is next, allowed: "
-                    "agents that act in a cycle and leave at its end"
-                )
-            env.step(actions[agent])
-            for paid in env.agents:
-                rewards[paid] = rewards.get(paid, 0) + env.rewards[paid]
-        terminated = dict(env.terminations)
-        truncated = dict(env.truncations)
-        infos = dict(env.infos)
-        observed = {agent: env.observe(agent) for agent in env.agents}
-        while env.agents and self._has_ended(env.agent_selection):
-            env.step(None)
-        self.agents = list(env.agents)
-        return observed, rewards, terminated, truncated, infos
-
-    def _has_ended(self, agent: Player) -> bool:
-        return bool(self.aec_env.terminations[agent] or self.aec_env.truncations[agent])
-
-
-def simulator_of(env: object) -> Simulator:
-    """Return the simulator of an environment of Gymnasium, or of PettingZoo, parallel or not.
+def make_simulator(env: object) -> Simulator:
+    """Return the simulator of a Gymnasium or PettingZoo environment.
 
     Raises
     ------
     ValueError
-        If it is none, or many at once, or its agents do not act in cycles, as those of board games.
+        If the object is not an environment, is a vector of environments, or has agents that act in
+        turns and cannot be made parallel.
     """
     if isinstance(env, gymnasium.vector.VectorEnv):
-        raise ValueError("is a vector of environments, allowed: one")
+        raise ValueError("is a vector of environments, allowed: a single environment")
     if isinstance(env, AECEnv):
         if not (env.metadata or {}).get("is_parallelizable", False):
-            raise ValueError("its agents act in turns, allowed: those that act at the same time")
-        return ParallelSimulator(TurnsAtOnce(env))
+            raise ValueError("its agents act in turns, allowed: agents that act simultaneously")
+        return PettingZooSimulator(aec_to_parallel(env))
     if isinstance(env, ParallelEnv) or hasattr(env, "possible_agents"):
-        return ParallelSimulator(env)
+        return PettingZooSimulator(env)
     if not (hasattr(env, "observation_space") and hasattr(env, "step")):
-        raise ValueError(f"is {type(env).__name__}, allowed: environments of Gymnasium, PettingZoo")
+        name = type(env).__name__
+        raise ValueError(f"is {name}, allowed: an environment of Gymnasium or PettingZoo")
     return GymnasiumSimulator(env)
 
 
-def _possible_agents(env: object) -> tuple[Player, ...]:
-    """Return who may act in an environment."""
-    players = tuple(getattr(env, "possible_agents", None) or ())
-    if not players:
-        raise ValueError(
-            "possible_agents is missing or empty: let __init__ set it to a list of all agents that "
-            "may ever act"
-        )
-    return players
-
-
-def _parts_of_reset(returned: object) -> tuple[object, object]:
-    """Return what is observed and infos, or refuse what `reset` returned."""
+def _unpack_reset(returned: object) -> tuple[object, object]:
     if isinstance(returned, tuple | list) and len(returned) == 2:
-        observed, infos = returned
-        if isinstance(infos, Mapping):
-            return observed, infos
+        observation, info = returned
+        if isinstance(info, Mapping):
+            return observation, info
     raise ValueError(
-        "reset returns no pair of what is observed and infos: the old interface, before Gymnasium "
-        "0.26 and PettingZoo 1.23; let it return both"
+        "reset must return observation and info (Gymnasium before 0.26 and PettingZoo before 1.23 "
+        "are not supported)"
     )
 
 
-def _parts_of_step(returned: object) -> tuple[object, ...]:
-    """Return what is observed, rewards, whether terminated, truncated, and infos, or refuse."""
+def _unpack_step(returned: object) -> tuple[Any, ...]:
     if isinstance(returned, tuple | list) and len(returned) == 5:
         return tuple(returned)
     count = len(returned) if isinstance(returned, tuple | list) else 1
-    old = ": the old interface, before Gymnasium 0.26 and PettingZoo 1.23" if count == 4 else ""
     raise ValueError(
-        f"step returns {count} values{old}; allowed: 5, what is observed, reward, whether "
-        "terminated, whether truncated, info"
+        f"step returns {count} values, allowed: 5, observation, reward, terminated, truncated, "
+        "info (Gymnasium before 0.26 and PettingZoo before 1.23 are not supported)"
     )
 
 
-def _table(part: object, what: str) -> Mapping[Player, object]:
-    if not isinstance(part, Mapping):
-        raise ValueError(f"{what} as {type(part).__name__}, allowed: a dict by agent")
-    return part
-
-
-def _number(value: object, what: str) -> float:
-    """Return a reward, which may stand in an array of one number.
+def _finite_number(value: object, name: str) -> float:
+    """Return a reward as a float.
 
     Examples
     --------
-    >>> _number(np.array([[2.0]], np.float32), "reward")
+    >>> _finite_number(np.array([[2.0]], np.float32), "reward")
     2.0
     """
     array = np.asarray(value)
-    if array.size != 1 or array.dtype.kind not in "biuf":
-        held = f"of shape {array.shape}" if array.size != 1 else f"= {value!r:.40}"
-        raise ValueError(f"{what} {held}, allowed: one number")
-    number = float(array.item())
-    if not np.isfinite(number):
-        raise ValueError(f"{what} is {number}, allowed: a finite number")
-    return number
+    if array.size != 1 or array.dtype.kind not in "biuf" or not np.isfinite(array).all():
+        raise ValueError(f"{name} = {value!r:.40}, allowed: one finite number")
+    return float(array.item())
 
 
-def _flag(value: object, what: str) -> bool:
+def _flag(value: object, name: str) -> bool:
     array = np.asarray(value)
     if array.size != 1 or array.dtype.kind not in "biuf":
-        raise ValueError(f"{what} = {value!r:.40}, allowed: true or false")
+        raise ValueError(f"{name} = {value!r:.40}, allowed: true or false")
     return bool(array.item())
 
 
 def _refuse_masks(infos: Mapping[Player, object]) -> None:
-    """Refuse that infos say which actions are legal."""
     for player, info in infos.items():
-        keys = [key for key in MASKS if key in info] if isinstance(info, Mapping) else []
-        if keys:
-            raise masked(player, f"infos have {keys[0]}")
+        for key in MASK_KEYS:
+            if isinstance(info, Mapping) and key in info:
+                raise mask_error(player, f"info has {key}")
 
 
-def masked(player: Player, where: str) -> ValueError:
-    """Return the refusal of actions that are not always legal."""
+def mask_error(player: Player, where: str) -> ValueError:
+    """Return the error that action masks are not supported."""
     return ValueError(
-        f"{of_player('actions', player)}: {where}, so that some may be illegal, allowed: actions "
-        "that are always legal; wrap it so that an illegal one does something legal, and leave "
-        "the mask out"
+        f"{describe('actions', player)}: {where}, allowed: environments without action masks; "
+        "wrap yours so that an illegal action does something legal, and drop the mask"
     )

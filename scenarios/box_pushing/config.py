@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from ...core.plugins.settings import Positive, ScenarioSettings, team_size
 from ..state_variables import names_of
 from .prediction.settings import BeliefSettings
-from .states.relational import STATE_VARIABLES
+from .states.variables import STATE_VARIABLES
 from .world.settings import (
     CONTROL_PERIOD,
     BoxSettings,
@@ -44,13 +44,12 @@ WRITTEN = {
     "gap": -0.5,
     "face_bearing": -0.02,
 }
-"""What a person wrote for the preset `hand-written`, worth of a metre or a radian: how far the box
-is from the goal, by how much the push would miss it, how far the robot is from the box, and by how
-much it does not face it."""
+"""Weights of the preset `hand-written`, value per meter or radian: for the distance of the box
+from the goal, the distance by which the push misses it, the gap, and the angle to the face."""
 
 
 class BoxTaskSettings(ScenarioSettings):
-    """Robots, box, task and servo layer: what all scenarios of box pushing have in common."""
+    """Robots, box, task and servo layer, common to all scenarios of box pushing."""
 
     player: ClassVar[str] = f"{__package__}.pictures.rendering"
     robots: Annotated[int, Field(ge=1), team_size(7.5e-7, agents=2)] = 2
@@ -60,7 +59,7 @@ class BoxTaskSettings(ScenarioSettings):
     box: str | BoxSettings = "square"
     """Box by name, or a table that describes one."""
     infrared: InfraredSettings = InfraredSettings()
-    """How the infrared sensors of all robots read."""
+    """Response of the infrared sensors of all robots."""
     start: Literal["easy", "medium", "hard"] = "medium"
     """Distribution of start poses: how far off the course to the goal robots and box begin."""
     scaling: Literal["fixed", "similar"] = "fixed"
@@ -71,7 +70,7 @@ class BoxTaskSettings(ScenarioSettings):
     action_repeat: Periods = 8
     """Control periods of 64 ms for which a decision is held."""
     speed_increment: Annotated[float, Field(gt=0, le=1)] = 0.5
-    """What increase and decrease change, as a fraction of the greatest wheel speed."""
+    """Change of wheel speed by the actions increase and decrease, as a fraction of the maximum."""
     tolerance: Positive = 0.05
     """Distance of the box from the goal that counts as reached [m]."""
     termination_radius: Positive = 1.5
@@ -90,13 +89,20 @@ class BoxTaskSettings(ScenarioSettings):
         return tuple(_warnings(self))
 
     @property
+    def task_size(self) -> float:
+        """Size of the box relative to that of two robots."""
+        from .world.boxes import growth  # shapely takes its time
+
+        return growth(self.box, self.robots)
+
+    @property
     def period(self) -> float:
         """Seconds for which a decision is held."""
         return self.action_repeat * CONTROL_PERIOD
 
     @property
     def drawing(self) -> dict[str, float | str]:
-        """What a recording must tell beside motions, so that it can be drawn."""
+        """Constants that a recording needs, besides the motions, to be drawn."""
         named = {"robot": self.robot, "box": self.box, "infrared": self.infrared}
         return {"dt": self.period} | {name: label(thing) for name, thing in named.items()}
 
@@ -110,15 +116,15 @@ class BoxPushingSettings(BoxTaskSettings):
         Literal["paper", "relational", "pose", "crowd", "wide"] | tuple[str, ...],
         names_of(STATE_VARIABLES),
     ] = "relational"
-    """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
-    name, one's own included."""
+    """Built-in state space by name (``paper`` is Eq. 1), or a list of state variables by name,
+    built in or user-defined."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"
-    """What predictions take the world for: robots that yield to the box, robots that do not
-    (``rigid``), a box that does not move (``static``), or the world itself."""
+    """Model of predictions: robots that yield to the box (``push``), robots that do not
+    (``rigid``), a box that does not move (``static``), or the simulation itself (``exact``)."""
     belief: BeliefSettings = BeliefSettings()
-    """Which constants that robots cannot see the predictor `push` knows."""
+    """Errors of the constants that the predictor `push` assumes and robots cannot observe."""
     reward: RewardSettings = RewardSettings()
-    """The constants of the reward, and whose contact it asks for."""
+    """Constants of the reward; `of` selects whether the team or each robot is rewarded."""
     prediction_horizon: Periods = 24
     """Control periods that predictions look ahead, the decision being held for all of them: so far
     that what agents do shows."""
@@ -130,7 +136,7 @@ class BoxPushingSettings(BoxTaskSettings):
         return self
 
     def scenario_defaults(self, preset: str) -> Mapping[str, object]:
-        """Return what learns best here: with one or two robots, every wheel by weights of its own.
+        """Return the best settings for learning; up to two robots, each wheel has its own weights.
 
         Two robots stand on different sides of the box and need different functions; larger teams
         learn sooner if all left wheels share theirs, and all right wheels. A written value is

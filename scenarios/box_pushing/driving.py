@@ -1,9 +1,9 @@
-"""How a robot gets to a place by itself, around the box and clear of the other robots.
+"""Motion planning of a single robot, around the box and clear of the other robots.
 
 Scripted controllers and options (Sutton, Precup and Singh 1999) are made of this; agents that learn
 do without. A robot searches over short sequences of its own actions. A decision costs at most
-`LONGEST_SEARCH` sequences; those that come to the same wheel speeds are followed once, and of the
-other robots only those within reach count.
+`MAX_SEQUENCES` sequences. Sequences with equal wheel speeds are simulated once, and only the other
+robots within reach count.
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ from .world.settings import RobotSettings
 
 CLEARANCE = 0.006
 """Least gap [m] to box and other robots on the way to a slot."""
-LONGEST_SEARCH = 5000
-"""Action sequences tried per robot and decision, those that come to the same included."""
+MAX_SEQUENCES = 5000
+"""Maximum number of action sequences per robot and decision, duplicates included."""
 
 
 class Drivers:
-    """What each robot of a team can do by itself.
+    """Motion planners of all robots of a team.
 
     Parameters
     ----------
     scenario
-        What is in the world, and what robots can do in a decision period.
+        The robots, the box and the decision period.
 
     Attributes
     ----------
     model
-        What is believed of the world.
+        Model of robots and box.
     seconds
         The decision period [s].
     choices
         ``(k, w)`` the robot actions, the same of every robot.
     wheels
-        Per robot: where its wheels stand among those of all.
+        Slice of each robot's wheels among all wheels.
     """
 
     def __init__(self, scenario: BoxPushing) -> None:
@@ -87,7 +87,7 @@ class Drivers:
         wheels.
         """
         now = speeds[self.wheels[robot]][None]
-        depth = int(log(LONGEST_SEARCH) / log(len(self.choices)))
+        depth = int(log(MAX_SEQUENCES) / log(len(self.choices)))
         span = self.robot.radius + self.robot.radius + CLEARANCE
         within = span + depth * self.seconds * self.robot.max_speed
         near = np.hypot(*(robots[:, :2] - robots[robot, :2]).T) < within

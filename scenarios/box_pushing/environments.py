@@ -1,4 +1,4 @@
-"""Box pushing for other people's learners: PettingZoo and Gymnasium environments.
+"""Box pushing for external learners: PettingZoo and Gymnasium environments.
 
 Three views of one scenario: `WheelsEnv` (every wheel an agent), `RobotsEnv` (every robot an agent)
 and `BoxPushingEnv` (one agent for all); see `nested_agents.scenarios.environments`, of which these
@@ -25,7 +25,7 @@ RENDER_MODES = ["rgb_array"]
 
 
 class _Boxes(Environment):
-    """What the environments of box pushing have in common; see `Environment`.
+    """Base class of the environments of box pushing; see `Environment`.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class _Boxes(Environment):
     by_wheel
         Whether an agent observes the state of every wheel in a row of its own.
     **keys
-        Of the ``[scenario]`` table, beside those of `settings`: ``robots=4``, ``failures=[...]``.
+        Further keys of the ``[scenario]`` table: ``robots=4``, ``failures=[...]``.
 
     Raises
     ------
@@ -76,7 +76,7 @@ class _Boxes(Environment):
 
 
 class WheelsEnv(_Boxes, AgentsEnv):
-    """Box pushing as a PettingZoo environment whose agents are the wheels; see `Environment`.
+    """PettingZoo environment with one agent per wheel; see `Environment`.
 
     Examples
     --------
@@ -95,7 +95,7 @@ class WheelsEnv(_Boxes, AgentsEnv):
 
 
 class RobotsEnv(WheelsEnv):
-    """Box pushing as a PettingZoo environment whose agents are the robots; see `Environment`.
+    """PettingZoo environment with one agent per robot; see `Environment`.
 
     Examples
     --------
@@ -111,7 +111,7 @@ class RobotsEnv(WheelsEnv):
 
 
 class BoxPushingEnv(_Boxes, JointEnv):
-    """Box pushing as a Gymnasium environment: one agent drives all wheels; see `Environment`.
+    """Gymnasium environment in which one agent drives all wheels; see `Environment`.
 
     Examples
     --------

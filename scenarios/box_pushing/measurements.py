@@ -1,4 +1,4 @@
-"""What is measured of a step and of an episode of box pushing."""
+"""Measures of an episode of box pushing, and measurements of a state."""
 
 from typing import NotRequired, TypedDict
 
@@ -33,8 +33,8 @@ MEASURES = (
         greatest=1.0,
     ),
 )
-"""What is measured of an episode: whether the box came within the tolerance of the goal at whatever
-speed, whether it was there once the robots had stopped, ..."""
+"""Measures of an episode. It is a success if the box comes within the tolerance of the goal at any
+speed, and stopped at the goal if it is there after the robots have stopped."""
 
 
 class Measurements(TypedDict):
@@ -53,17 +53,17 @@ class Measurements(TypedDict):
     contact_time: FloatArray
     """``(M,)`` for which fraction of the last decision period each did."""
     contact_fraction: float
-    """The mean of it."""
+    """Mean of `contact_time`."""
     failed: BoolArray
     """``(n,)`` wheels under a failure."""
     distance_m: float
-    """Of the box from the goal."""
+    """Distance of the box from the goal [m]."""
     orientation_rad: float
-    """Of the box from the goal pose."""
+    """Angle of the box relative to the goal pose [rad]."""
     orientation_error_rad: float
-    """The size of it."""
+    """Absolute value of `orientation_rad`."""
     stopped_at_goal: bool
     """Whether the box stayed at the goal once the wheels had stopped: known after the step that
     ends the episode."""
     seconds: NotRequired[dict[str, float]]
-    """What physics and sensors took in a step."""
+    """Time that physics and sensors took in a step [s]."""

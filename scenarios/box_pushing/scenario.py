@@ -23,12 +23,13 @@ from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES, Measurements
-from .prediction.prediction import BoxPrediction, Premises, Situation, mean_twists
+from .prediction.prediction import BoxPrediction, Premises, PresentState, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.settings import BeliefSettings
-from .states.relational import View
+from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
+from .states.variables import progress_of
 from .world.boxes import box_for, growth
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD, Task, reward
@@ -44,7 +45,7 @@ SENSING = 2**32 - 1
 
 
 class BoxPushing(Scenario, Embodiment):
-    """A box, a goal, and robots whose wheels are the agents.
+    """Box pushing: the agents are the wheels of robots, which push a box to a goal.
 
     It can be drawn, calibrated and predicted exactly.
 
@@ -119,16 +120,16 @@ class BoxPushing(Scenario, Embodiment):
             self._limits,
             self.task,
             settings.infrared,
-            self.box.outline,
+            self.box.shape,
             settings.period,
             settings.prediction_horizon * CONTROL_PERIOD,
         )
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        # Whether the robots fit is better known now than in the middle of a study.
+        # Robots that do not fit around the box are refused now, not in the middle of a study.
         BoxPushing.reset(self, 0)
 
     def partners(self) -> tuple[int, ...]:
-        """Return for every wheel the one opposite on its robot, or itself if it is in the middle.
+        """Return the opposite wheel of every wheel, or itself if it is in the middle.
 
         Raises
         ------
@@ -167,30 +168,29 @@ class BoxPushing(Scenario, Embodiment):
         return self.action_set.apply(speeds, joint_actions, self._unit_speeds, self._limits)
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Command the wheels, let the world go on for one decision period, observe and reward."""
+        """Command the wheels, simulate one decision period, observe and reward."""
         self._speeds = self.commanded(self._speeds, joint_action)
         before = self.world.poses
         begin = perf_counter()
         self._advance(self._speeds)
         moved = perf_counter()
-        view = self._view(before[0])
-        states = self.states_at(view, self._speeds[None])[0]
+        present = self._present(before[0])
+        states = self.states_at(present, self._speeds[None])[0]
         readings = self.world.infrared()[0]
         if self._is_noisy:
             readings = self.settings.infrared.noisy(readings, self._sensing)
-        distance = view.distance
+        distance, approach, turn = progress_of(present)
         contact = self.world.contact[None]
         strongest = np.maximum.reduce(readings, axis=1)[None]
-        way = distance - view.before
-        gained = reward(self.task, distance, way, view.turn, contact, strongest)[0]
+        gained = reward(self.task, distance, -approach, turn, contact, strongest)[0]
         received = gained[self.body] if self._pays_robots else float(gained[0])
         away = float(distance[0])
-        measured = self._measured(away, float(view.turn[0]))
-        terminated = bool(self.task.reached(distance, view.turn)[0])
+        measured = self._measured(away, float(turn[0]))
+        terminated = bool(self.task.reached(distance, turn)[0])
         sensed = perf_counter()
         twists = partial(_twists, before, self.world.poses, self._period, self.robot.radius)
         if terminated:
-            # Does the box come to rest within the tolerance when all wheels stop?
+            # The wheels stop; the box may leave the tolerance before it comes to rest.
             self._advance(np.zeros(len(self.agents)))
             measured["stopped_at_goal"] = self._reached()
         self._step += 1
@@ -200,7 +200,7 @@ class BoxPushing(Scenario, Embodiment):
         return Transition(states, received, terminated, truncated, measured, twists)
 
     def environments(self, count: int) -> BoxEnvironments | None:
-        """Return many such worlds in one call; None where something fails, is noisy or a user's."""
+        """Return a batch of environments; None with failures, noise or user-defined variables."""
         settings = self.settings
         is_noisy = settings.failures or settings.infrared.noise or self._playground is not None
         if is_noisy or not self.space.is_built_in or step_address() is None:
@@ -208,18 +208,18 @@ class BoxPushing(Scenario, Embodiment):
         return BoxEnvironments(self, count)
 
     def embodiment(self) -> Embodiment:
-        """Return itself: its robots are open to self-models."""
+        """Return itself: self-models can be learned for its robots."""
         return self
 
     def predict(self) -> BoxPrediction:
-        """Predict from the present state, every robot taken as nominal."""
+        """Predict from the current state; all robots are assumed to be nominal."""
         return self.predict_with(self.nominal_effects)
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> BoxPrediction:
-        """Predict, believing in these effects of the wheels and constants of the push."""
-        situation = Situation(
+        """Predict with the given effects of the wheels and constants of the push."""
+        situation = PresentState(
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),
             self._goal,
@@ -236,13 +236,13 @@ class BoxPushing(Scenario, Embodiment):
         return ExactPrediction(situation, model, self._premises, future)
 
     def with_exact_prediction(self) -> BoxPushing:
-        """Return a scenario alike that predicts one decision period by playing it."""
+        """Return an equal scenario that predicts one decision period by simulation."""
         exactly = {"predictor": "exact", "prediction_horizon": self.settings.action_repeat}
         exactly |= {"belief": BeliefSettings()}
         return type(self)(self.settings.model_copy(update=exactly))
 
     def constants_of_episode(self) -> dict[str, object]:
-        """Return the goal pose of the episode, and what is drawn."""
+        """Return the goal pose of the episode and the constants of drawing."""
         return {"goal_pose": self._goal, **self.settings.drawing}
 
     def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
@@ -251,17 +251,26 @@ class BoxPushing(Scenario, Embodiment):
 
         animate(recording, path)
 
+    def draw(self, path: Path) -> None:
+        """Draw the current state, after `reset` the start of an episode, to a picture file."""
+        from .pictures.rendering import snapshot
+
+        state = dict(self.measure())
+        recording = {name: np.asarray(state[name])[None] for name in self.recorded}
+        constants = {name: np.asarray(it) for name, it in self.constants_of_episode().items()}
+        snapshot(recording | constants, 0, path)
+
     def show_policy(
         self,
         choose: Callable[[Prediction], IntArray],
         predict: Callable[[], Prediction | None],
     ) -> BoxPolicyMap:
-        """Return what those do around the box who choose so; the scenario begins another episode.
+        """Return the policy map of a team; the scenario is reset.
 
         Raises
         ------
         ValueError
-            If its predictions cannot begin anywhere.
+            If predictions can start from the current state of the simulation only.
         """
         from .pictures.policy import policy_of
 
@@ -295,7 +304,7 @@ class BoxPushing(Scenario, Embodiment):
         }
 
     def _advance(self, commands: FloatArray) -> None:
-        """Let the world go on for one decision period, the wheels being commanded `commands`."""
+        """Simulate one decision period with the given wheel speeds."""
         self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
 
     def _distance(self) -> float:
@@ -314,28 +323,40 @@ class BoxPushing(Scenario, Embodiment):
 
         `origin` is the pose ``(3,)`` of the box one decision period ago.
         """
-        return self.states_at(self._view(origin), self._speeds[None])[0]
+        return self.states_at(self._present(origin), self._speeds[None])[0]
 
-    def _view(self, origin: FloatArray) -> View:
+    def _present(self, origin: FloatArray) -> SituationBatch:
         world = self.world
-        return self.view_of(world.robot_poses[None], world.box_pose[None], world.gaps[None], origin)
+        poses, gaps = world.poses[None], world.gaps[None]
+        return self.situations(poses, gaps, origin[None])
 
-    def view_of(
-        self, robots: FloatArray, box: FloatArray, gaps: FloatArray, origin: FloatArray
-    ) -> View:
-        """Return m situations a decision period after the box was at `origin`, see `View`."""
-        outline = self.box.outline
-        return View(robots, box, gaps, self._goal, origin, 1.0, outline, self.box.friction_radius)
+    def situations(
+        self, poses: FloatArray, gaps: FloatArray, origins: FloatArray
+    ) -> SituationBatch:
+        """Return ``m`` situations one decision period after the box was at its origin.
 
-    def states_at(self, view: View, speeds: FloatArray) -> FloatArray:
+        Parameters
+        ----------
+        poses
+            ``(m, M + 1, 3)`` of the box and the robots.
+        gaps
+            ``(m, M)`` between robots and box [m].
+        origins
+            ``(m, 3)`` former poses of the box.
+        """
+        last = np.ascontiguousarray(poses.transpose(1, 2, 0))
+        apart, before = np.ascontiguousarray(gaps.T), np.ascontiguousarray(origins.T)
+        return SituationBatch(last[1:], last[0], apart, self._goal, before, 1.0, self.box.shape)
+
+    def states_at(self, batch: SituationBatch, speeds: FloatArray) -> FloatArray:
         """Return the states ``(m, n, d)`` of all agents in m situations.
 
         `speeds` are those commanded ``(m, n)`` [m/s].
         """
-        shared = self.space.observe(view)
+        shared = self.space.shared(batch, range(len(self.groups))).swapaxes(0, 1)
         m, n_robots, _ = shared.shape
         n_own = self.state_space.n_own
-        poses = view.robots
+        poses = batch.robots.transpose(2, 0, 1)
         if self.space.own_needs_pose:
             poses = poses[:, self.body]
         states = np.empty((m, n_robots, len(self.groups[0]), self.state_space.n_variables))
@@ -346,12 +367,11 @@ class BoxPushing(Scenario, Embodiment):
 
 
 class BoxEnvironments(StackedEnvironments[BoxPushing]):
-    """Many worlds of as many robots, without failures and without noise of sensors.
+    """Batch of environments without failures and without sensor noise.
 
-    Their physics is one compiled call. What each has is, bit by bit, what it has by itself.
-
-    Box2D keeps the bodies of a world where it likes, so that every place has a `World` of its own:
-    that in which the scenario has begun the episode.
+    Their physics is one compiled call, with the bits of each environment alone. Box2D decides where
+    bodies lie in memory; therefore each environment keeps the `World` in which the scenario started
+    its episode.
     """
 
     def allocate(self, scenario: BoxPushing, count: int) -> None:
@@ -366,31 +386,30 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
         self._boxes: FloatArray = np.zeros((count, 3))
 
     def store(self, index: int, scenario: BoxPushing) -> None:
-        """Swap the world of the scenario, whose episode starts, with that of an environment."""
-        begun = scenario.world
+        """Swap the worlds of the scenario, which has just been reset, and of an environment."""
+        world = scenario.world
         scenario.world = self._worlds[index]
-        self._worlds[index] = begun
-        self._addresses[index] = begun.addresses
+        self._worlds[index] = world
+        self._addresses[index] = world.addresses
         self._last[index] = 0.0
         self._wrenches[index] = 0.0
         self._speeds[index] = 0.0
-        self._boxes[index] = begun.box_pose
+        self._boxes[index] = world.box_pose
 
     def step(self, joint_actions: IntArray) -> Transitions:
-        """Command the wheels of all worlds for one decision period, observe and reward."""
+        """Command the wheels in all environments, simulate one decision period, and reward."""
         one = self.scenario
         before = self._boxes
         self._speeds = one.commanded(self._speeds, joint_actions)
         poses, gaps, readings = one.world.advance_many(
             self._addresses, self._speeds, one.settings.action_repeat, self._last, self._wrenches
         )
-        boxes = np.ascontiguousarray(poses[:, 0])
-        self._boxes = boxes
-        view = one.view_of(poses[:, 1:], boxes, gaps, before)
-        states = one.states_at(view, self._speeds)
-        away = view.distance
-        reached = one.task.reached(away, view.turn)
-        paid = reward(one.task, away, away - view.before, view.turn, gaps < TOUCHING, readings)
+        batch = one.situations(poses, gaps, before)
+        self._boxes = np.ascontiguousarray(poses[:, 0])
+        states = one.states_at(batch, self._speeds)
+        away, approach, turn = progress_of(batch)
+        reached = one.task.reached(away, turn)
+        paid = reward(one.task, away, -approach, turn, gaps < TOUCHING, readings)
         if one.settings.reward.of == "robot":
             paid = paid[:, one.body]
         rewards = np.broadcast_to(paid, joint_actions.shape)
@@ -400,7 +419,7 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
 def _twists(before: FloatArray, after: FloatArray, seconds: float, radius: float) -> FloatArray:
     """Return the mean twists of robots between poses ``(M + 1, 3)``, the box's standing first.
 
-    Without the box's where two robots were close: what it does tells nothing of the push then.
+    If two robots were close, the twist of the box is left out: they may have pushed each other.
     """
     twists = mean_twists(before, after, seconds)
     close = min(least_gap(before[1:], radius), least_gap(after[1:], radius)) <= APART

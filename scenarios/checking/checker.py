@@ -1,15 +1,11 @@
-"""A check that a scenario keeps the promises on which learning and its measurement rest.
+"""Contract test of scenarios: the properties on which learning and its measurement rely.
 
-Whole episodes of random actions are played and compared to the last bit: states, reward, end of the
-episode, twists and measurements of every step. Not compared are the measured times, ``seconds``.
-What is said of variables is held against what is met (see `sensing`). Predictions are held against
-each other (see `predictions`), and, of scenarios that can be predicted exactly, against what is
-then sensed; of others it is shown by how much they are off. A further check is one function in
-`promises` and one line in `CHECKS`. What a scenario raises is what is wrong with it.
+A check is a function in `checks` that yields faults, and one line in `CHECKS`. Episodes of random
+actions are compared bit for bit, except for measured times (``seconds``). Predictions that should
+be exact are compared with the states that follow; the errors of other predictions are reported.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import product
 from math import isnan
 from numbers import Integral
 from pathlib import Path
@@ -20,80 +16,68 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.plugins.words import expect, expect_each, show
-from .frames import Examination
-from .promises import (
-    check_form,
-    check_global_numbers,
-    check_looking,
-    check_measures,
-    check_predictions,
-    check_repetition,
-    check_returned_arrays,
-    check_sensing,
-    check_two_instances,
-    check_values,
-    check_variety,
-)
-from .sensing import MetVariable, met_variables, predicted_steps
+from . import checks
+from .episodes import CheckPlan
+from .sensing import VariableSummary, predicted_steps, summarize_variables
 
-CHECKS: dict[str, Callable[[Examination], Iterator[str]]] = {
-    "form": check_form,
-    "measures": check_measures,
-    "values": check_values,
-    "equal seeds": check_repetition,
-    "different seeds": check_variety,
-    "two instances": check_two_instances,
-    "predicting": check_looking,
-    "predictions": check_predictions,
-    "sensed and predicted": check_sensing,
-    "returned arrays": check_returned_arrays,
-    "global random numbers": check_global_numbers,
+CHECKS: dict[str, Callable[[CheckPlan], Iterator[str]]] = {
+    "form": checks.check_form,
+    "measures": checks.check_measures,
+    "values": checks.check_values,
+    "equal seeds": checks.check_equal_seeds,
+    "different seeds": checks.check_different_seeds,
+    "two instances": checks.check_two_instances,
+    "predicting": checks.check_predicting_changes_nothing,
+    "predictions": checks.check_predictions,
+    "sensed and predicted": checks.check_sensed_and_predicted,
+    "returned arrays": checks.check_returned_arrays,
+    "global random numbers": checks.check_global_random_numbers,
 }
-"""The checks by name, in their order: later ones rely on earlier ones."""
+"""Checks by name, in order: later ones rely on earlier ones."""
 
-SMALL = 0.02
-"""Error of prediction, in ranges of the variable, of which no word is lost."""
-FAR = 10
-"""Ranges beyond its own at which a variable looks as if it were in another unit."""
-LEAST_STEPS = 2
-"""Steps of the shortest episodes by which equal and different seeds can be distinguished."""
+MIN_ERROR = 0.02
+"""Errors of predictions below this fraction of the variable's range are not reported."""
+MAX_EXCESS = 10
+"""Number of ranges beyond its own at which a variable looks as if its unit were wrong."""
+MIN_STEPS = 2
+"""Minimum number of steps to distinguish equal from different seeds."""
 
 
-class Findings(NamedTuple):
-    """What came of a check that found no fault."""
+class CheckReport(NamedTuple):
+    """Result of a check without faults."""
 
     passed: tuple[str, ...]
-    """Names of the checks that were passed."""
-    unchecked: Mapping[str, str]
-    """Why something was not checked, by its name."""
-    variables: tuple[MetVariable, ...]
-    """What was met of every variable and of the reward."""
+    """Names of the passed checks."""
+    skipped: Mapping[str, str]
+    """Reasons why something was not checked, by name."""
+    variables: tuple[VariableSummary, ...]
+    """Observed values of each variable and of the reward."""
 
     def warnings(self) -> Iterator[str]:
-        """Yield what is allowed and looks wrong, a line each."""
+        """Yield warnings about allowed but suspicious behavior."""
         for v in self.variables:
-            width = v.greatest - v.least if isnan(v.low) else v.high - v.low
-            if v.error >= max(v.persistence, SMALL * width) > 0:
-                yield f"{v.name} is predicted no better than if it stayed as it is"
-            if max(v.low - v.least, v.greatest - v.high) > FAR * width:
-                yield f"{v.name} goes more than {FAR} times its range beyond it"
+            width = v.max - v.min if isnan(v.low) else v.high - v.low
+            if v.error >= max(v.persistence, MIN_ERROR * width) > 0:
+                yield f"{v.name} is predicted no better than by persistence"
+            if max(v.low - v.min, v.max - v.high) > MAX_EXCESS * width:
+                yield f"{v.name} exceeds its range by more than {MAX_EXCESS} times its width"
 
     def remarks(self) -> Iterator[tuple[str, str]]:
-        """Yield what came of it in words, each after its kind: passed, not checked, warning."""
+        """Yield kind and text of each line: passed, not checked, warning."""
         yield "passed", ", ".join(self.passed)
-        for name, reason in self.unchecked.items():
+        for name, reason in self.skipped.items():
             yield "not checked", f"{name}: {reason}"
         for warning in self.warnings():
             yield "warning", warning
 
     def __str__(self) -> str:
-        """Return them as the command ``check`` prints them."""
+        """Return the lines as the command ``check`` prints them."""
         lines = (f"{kind}  {text}" for kind, text in self.remarks())
         return "\n".join(fill(line, 80, subsequent_indent=" " * 8) for line in lines)
 
 
 class ScenarioError(ValueError):
-    """What is wrong with a scenario: one line."""
+    """A fault of a scenario, in one line."""
 
 
 def check_scenario(
@@ -102,65 +86,64 @@ def check_scenario(
     steps: int = 40,
     seeds: Sequence[int] = (0, 1),
     episodes: Sequence[int] = (0, 1),
-) -> Findings:
-    """Check a scenario and return what it passed, what could not be checked, and what was met.
+) -> CheckReport:
+    """Check that a scenario keeps its contract.
 
     Parameters
     ----------
     factory
         Makes a new instance of the scenario, the same each time.
     steps
-        Most steps of the episodes played, about twenty of them.
+        Maximum number of steps of the episodes, about twenty of which are played.
     seeds
-        Seeds of worlds, at least two.
+        At least two seeds.
     episodes
-        Numbers of the episodes played.
+        Numbers of the episodes.
 
     Raises
     ------
     ScenarioError
-        If it breaks a promise, or raises; the message is one line.
+        If the scenario breaks its contract or raises an exception.
 
     Examples
     --------
     >>> from nested_agents.scenarios.line_up import LineUpSettings
-    >>> findings = check_scenario(LineUpSettings(carts=2).build)
-    >>> findings.passed == tuple(CHECKS), list(findings.unchecked)
+    >>> report = check_scenario(LineUpSettings(carts=2).build)
+    >>> report.passed == tuple(CHECKS), list(report.skipped)
     (True, ['roles'])
-    >>> [(v.name, v.low, v.high) for v in findings.variables]
+    >>> [(v.name, v.low, v.high) for v in report.variables]
     [('distance', -1.0, 1.0), ('lead', -0.8, 0.8), ('reward', nan, nan)]
     """
     if not callable(factory):
-        raise ValueError(f"factory = {show(factory)}, allowed: what makes a scenario")
+        raise ValueError(f"factory = {show(factory)}, allowed: a function that makes a scenario")
     expect("whole numbers", Integral, steps=steps)
     expect("lists of whole numbers", Sequence, seeds=seeds, episodes=episodes)
     expect_each("whole numbers", Integral, seeds=seeds, episodes=episodes)
-    if steps < LEAST_STEPS:
-        raise ValueError(f"steps = {steps}: must be at least {LEAST_STEPS}")
-    for name, numbers, least in (("seeds", seeds, 2), ("episodes", episodes, 1)):
-        if len(numbers) < least:
-            raise ValueError(f"{name} = {list(numbers)}: must hold at least {least}")
-    examination = Examination(factory, steps, tuple(seeds), tuple(episodes))
+    if steps < MIN_STEPS:
+        raise ValueError(f"steps = {steps}: must be at least {MIN_STEPS}")
+    for name, numbers, minimum in (("seeds", seeds, 2), ("episodes", episodes, 1)):
+        if len(numbers) < minimum:
+            raise ValueError(f"{name} = {list(numbers)}: must hold at least {minimum}")
+    plan = CheckPlan(factory, steps, tuple(seeds), tuple(episodes))
     for name, check in CHECKS.items():
         try:
-            fault = next(check(examination), None)
-        except (Exception, SystemExit) as error:
-            fault = _raised(error)
+            fault = next(check(plan), None)
+        except (Exception, SystemExit) as error:  # raised by the scenario
+            fault = _describe(error)
         if fault is not None:
             raise ScenarioError(f"{name}: {fault}")
-    scenario = examination.factory()
-    unchecked = examination.unchecked
-    actions = examination.actions(scenario, seeds[0])
+    scenario = plan.make()
+    actions = plan.actions(scenario, seeds[0])
     played = [
         predicted_steps(scenario, seed, episode, actions, scenario.horizon)
-        for seed, episode in product(seeds, episodes)
+        for seed, episode in plan.runs
     ]
-    passed = tuple(name for name in CHECKS if name not in unchecked)
-    return Findings(passed, unchecked, met_variables(scenario, np.concatenate(played)))
+    passed = tuple(name for name in CHECKS if name not in plan.skipped)
+    return CheckReport(passed, plan.skipped, summarize_variables(scenario, np.concatenate(played)))
 
 
-def _raised(error: BaseException) -> str:
-    """Return in one line what was raised, and where."""
-    where = extract_tb(error.__traceback__)[-1]
-    place = f"{where.name}, {Path(where.filename).name}:{where.lineno}"
+def _describe(error: BaseException) -> str:
+    """Return type, place and message of an exception in one line."""
+    frame = extract_tb(error.__traceback__)[-1]
+    place = f"{frame.name}, {Path(frame.filename).name}:{frame.lineno}"
     return f"{type(error).__name__} in {place}: {' '.join(str(error).split())}"

@@ -1,11 +1,8 @@
-"""Whether a prediction has the right shapes, keeps its promises, and has tables that agree with it.
+"""Checks of a prediction: shapes, shared and own variables, and tables of all joint actions.
 
-Agents share the variables that they are said to share, and what is said to be an agent's own does
-not change with what others do.
-
-Where few agents are free, decisions are not made by `Prediction.states` and `rewards`, but by its
-tables over all joint actions, `blocks` and `reward_table`. Compiled kernels read them without
-looking at their sizes: a row too few is read from somewhere else in memory.
+Shared variables must be equal for all agents that share them, and own variables must not depend on
+the actions of other agents. Compiled kernels read the tables of a prediction without checking their
+sizes, so a missing row would be read from elsewhere in memory.
 """
 
 from collections.abc import Iterator
@@ -16,27 +13,27 @@ from ...core.interface.prediction import Blocks, Prediction, Tables, states_by_g
 from ...core.interface.scenario import Scenario
 from ...core.numerics import BoolArray, FloatArray, IntArray
 
-MOST_JOINT_ACTIONS = 4**8
-"""Joint actions beyond which no tables are asked for: they might not fit into memory."""
-SAMPLED = 1024
-"""Joint actions that are compared, at most; if there are more they are drawn."""
-CLOSE = 1e-9
-"""Difference of predicted numbers, relative to 1 or to their size, that rounding may make."""
+MAX_JOINT_ACTIONS = 4**8
+"""Maximum number of joint actions for which tables are requested, to limit memory."""
+MAX_COMPARED = 1024
+"""Maximum number of joint actions that are compared; of more a sample is drawn."""
+TOLERANCE = 1e-9
+"""Allowed difference of predicted numbers, relative to the larger of 1 and their size."""
 
 
 def faults_of_prediction(
     scenario: Scenario, joint_actions: IntArray, rng: np.random.Generator
 ) -> Iterator[str]:
-    """Yield what is wrong with what a scenario predicts from its present state.
+    """Yield the faults of a scenario's prediction from its present state.
 
     Parameters
     ----------
     scenario
-        Asked to predict.
+        The scenario.
     joint_actions
-        ``(m, n)`` what to predict.
+        ``(m, n)`` joint actions to predict.
     rng
-        Draws the joint actions for which tables are compared, where there are many.
+        Draws the joint actions for which large tables are compared.
     """
     prediction = scenario.predict()
     if prediction is None:
@@ -59,16 +56,16 @@ def faults_of_prediction(
         yield from _own_variable_moved(scenario, prediction, unchanged, rng)
 
 
-def too_many(scenario: Scenario) -> str:
-    """Return that a scenario has more joint actions than tables are asked for, if it has."""
+def too_many_joint_actions(scenario: Scenario) -> str:
+    """Return why the tables of a scenario are not checked; empty if they are."""
     count = len(scenario.action_set) ** len(scenario.agents)
-    return f"more than {MOST_JOINT_ACTIONS:,} joint actions" if count > MOST_JOINT_ACTIONS else ""
+    return f"more than {MAX_JOINT_ACTIONS:,} joint actions" if count > MAX_JOINT_ACTIONS else ""
 
 
 def _misformed(
     scenario: Scenario, prediction: Prediction, joint_actions: IntArray
 ) -> Iterator[str]:
-    """Yield what is predicted in a wrong shape, or is not finite."""
+    """Yield predictions with a wrong shape, or that are not finite."""
     n = len(scenario.agents)
     m = len(joint_actions)
     d = scenario.state_space.n_variables
@@ -93,7 +90,7 @@ def _misformed(
 def _wrong_groups(
     scenario: Scenario, prediction: Prediction, joint_actions: IntArray, states: FloatArray
 ) -> Iterator[str]:
-    """Yield where the prediction of all agents at once differs from that of each."""
+    """Yield differences between the predictions of all agents and of each agent."""
     groups = scenario.groups
     own, shared = states_by_group(prediction, joint_actions, groups, scenario.state_space.n_own)
     body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
@@ -106,13 +103,13 @@ def _wrong_groups(
 def _wrong_tables(
     scenario: Scenario, prediction: Prediction, tables: Tables, rng: np.random.Generator
 ) -> Iterator[str]:
-    """Yield where the tables differ from the prediction, whose states are taken to be right."""
+    """Yield differences between the tables and the predicted states."""
     n = len(scenario.agents)
     n_actions = len(scenario.action_set)
     count = n_actions**n
-    if too_many(scenario):
+    if too_many_joint_actions(scenario):
         return
-    indices = np.sort(rng.choice(count, min(count, SAMPLED), replace=False))
+    indices = np.sort(rng.choice(count, min(count, MAX_COMPARED), replace=False))
     joint_actions = np.stack(np.unravel_index(indices, (n_actions,) * n), axis=-1)
     for group in scenario.groups:
         divisor = n_actions ** (n - 1 - group[-1])
@@ -138,7 +135,7 @@ def _wrong_tables(
 
 
 def _misshapen(blocks: Blocks, n_own_rows: int, count: int, scenario: Scenario) -> Iterator[str]:
-    """Yield what would have a kernel read the wrong row, or none."""
+    """Yield wrong shapes of blocks, which would make a kernel read a wrong row."""
     n_own = scenario.state_space.n_own
     d = scenario.state_space.n_variables
     for name, table, rows, width, n_rows in (
@@ -181,8 +178,8 @@ def _wrong_rewards(
         )
 
 
-def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:
-    """Return the difference of states ``(..., d)``, of periodic variables the shorter way round."""
+def state_differences(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:
+    """Return differences of states ``(..., d)``; those of periodic variables are wrapped."""
     differences = states - others
     for j, variable in enumerate(scenario.state_space.variables):
         if variable.periodic:
@@ -192,20 +189,20 @@ def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatAr
 
 
 def is_close(differences: FloatArray, expected: FloatArray) -> BoolArray:
-    """Return which differences from what is expected rounding may make."""
-    close: BoolArray = np.abs(differences) <= CLOSE * np.maximum(1.0, np.abs(expected))
+    """Return whether differences from expected values are within rounding."""
+    close: BoolArray = np.abs(differences) <= TOLERANCE * np.maximum(1.0, np.abs(expected))
     return close
 
 
 def differs(scenario: Scenario, states: FloatArray, expected: FloatArray) -> BoolArray:
-    """Return which numbers of states ``(..., d)`` differ beyond rounding."""
-    return ~is_close(apart(scenario, np.asarray(states), expected), expected)
+    """Return whether states ``(..., d)`` differ by more than rounding."""
+    return ~is_close(state_differences(scenario, np.asarray(states), expected), expected)
 
 
 def faults_of_sharing(scenario: Scenario, states: FloatArray) -> Iterator[str]:
-    """Yield which variable agents are said to share and do not, in states ``(n, ..., d)``.
+    """Yield shared variables that differ between agents in states ``(n, ..., d)``.
 
-    Agents of a group share all that is not their own, and all agents what is ``common``.
+    Agents of a group share all variables except their own; all agents share ``common`` ones.
     """
     space = scenario.state_space
     names = [variable.name for variable in space.variables]
@@ -226,9 +223,9 @@ def faults_of_sharing(scenario: Scenario, states: FloatArray) -> Iterator[str]:
 def _own_variable_moved(
     scenario: Scenario, prediction: Prediction, joint_actions: IntArray, rng: np.random.Generator
 ) -> Iterator[str]:
-    """Yield which own variable is predicted to change by what other groups do.
+    """Yield own variables of which predictions depend on the actions of other groups.
 
-    Predicted are joint actions ``(m, n)``, and then the same with other actions of the others.
+    Joint actions ``(m, n)`` are predicted twice, with different actions of the other groups.
     """
     space = scenario.state_space
     drawn = rng.integers(len(scenario.action_set), size=joint_actions.shape)

@@ -1,15 +1,13 @@
-"""Agents that perceive a scenario each for itself, so that what they predict differs.
+"""Imperfect sensors: each agent perceives the scenario with its own delay, noise and losses.
 
-What is perceived is described by the ``[[scenario.perception]]`` of a spec, of every scenario, see
-`nested_agents.core.plugins.settings.PerceptionSettings`. An agent i that perceives late or with
-noise takes itself to be where it is not, and predicts from there: with x the state and f what is
-predicted,
+The ``[[scenario.perception]]`` tables of a spec describe the sensors of any scenario, see
+`nested_agents.core.plugins.settings.PerceptionSettings`. With states x, predictions f, delay k_i
+and normal noise r_i, drawn for every decision, agent i perceives and predicts
 
     x_i(t) = x(t - k_i) + r_i(t) * (high - low),    f_i(u) = f(u) + x_i(t) - x(t)
 
-r_i being normal noise that is drawn anew for every decision. So its sensors are wrong, and its
-model of what an action changes is right. The agents of a body that it does not perceive are taken
-to do nothing: they maintain. Learning is from what is perceived, too.
+Its sensors are wrong, while its model of the effect of actions is right. It assumes that agents of
+bodies that it does not perceive take the neutral action. Agents also learn from perceived states.
 """
 
 from __future__ import annotations
@@ -30,34 +28,34 @@ from ...core.numerics import BoolArray, FloatArray, IntArray, nx, stream_of
 from ...core.plugins.settings import PerceptionSettings, mask_of
 
 STREAM = 2**32 - 6
-"""Key of the stream from which noise of perception is drawn, under the seed of an episode."""
+"""Key of the random stream of sensor noise under the seed of an episode."""
 
 
 def perceived(scenario: Scenario, settings: Sequence[PerceptionSettings]) -> Scenario:
-    """Return a scenario as its agents perceive it; as it is, if nothing is said of that.
+    """Return a scenario with the sensors of the settings; unchanged if there are none.
 
     Raises
     ------
     ValueError
-        If an agent or a body is named that there is not; one line.
+        If the settings name an unknown agent or body.
     """
     return PerceivedScenario(scenario, settings) if settings else scenario
 
 
 class PerceivedScenario(Scenario):
-    """A scenario that agents perceive each for itself.
+    """A scenario that each agent perceives with its own sensors.
 
     Parameters
     ----------
     scenario
-        As it is.
+        The true scenario.
     settings
-        How it is perceived; of several that name an agent, noise and delay are the greatest, reach
-        the least, and lost is what any of them loses.
+        The sensors. If several name the same agent, the maximum noise and delay, the minimum reach
+        and all losses apply.
 
     Examples
     --------
-    The second of three carts perceives what was a decision ago.
+    The second of three carts perceives the state one decision late.
 
     >>> from nested_agents.scenarios.line_up import LineUpSettings
     >>> carts = LineUpSettings(carts=3).build()
@@ -101,8 +99,10 @@ class PerceivedScenario(Scenario):
         self._body = np.zeros(n, dtype=np.int64)
         for body, group in enumerate(scenario.groups):
             self._body[list(group)] = body
-        # Whom each agent takes to do nothing.
-        self._idle = [np.flatnonzero(~(own | self.perceived)[i][self._body]) for i in range(n)]
+        # Agents that each agent assumes to take the neutral action
+        self._unperceived = [
+            np.flatnonzero(~(own | self.perceived)[i][self._body]) for i in range(n)
+        ]
         self._low, width = self.state_space.ranges
         self._scale = self._noise[:, None] * width
         self._width = width
@@ -112,7 +112,7 @@ class PerceivedScenario(Scenario):
 
     @cached_property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The agents by body."""
+        """Agents of each body."""
         return self.scenario.groups
 
     @cached_property
@@ -122,41 +122,41 @@ class PerceivedScenario(Scenario):
 
     @property
     def predicts(self) -> bool:
-        """Whether it predicts."""
+        """Whether the scenario predicts."""
         return self.scenario.predicts
 
     @property
     def lacks_prediction(self) -> str:
-        """Why it predicts nothing."""
+        """Reason why there is no prediction."""
         return self.scenario.lacks_prediction
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
-        """Start an episode and return the states that agents perceive."""
+        """Start an episode and return the perceived states."""
         self._rng = stream_of(seed, STREAM)
         states = self.scenario.reset(seed, episode)
         self._past = []
         return self._perceive(states)
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Carry out a joint action; return the states that agents perceive."""
+        """Execute a joint action; the transition has the perceived states."""
         transition = self.scenario.step(joint_action)
         return replace(transition, states=self._perceive(transition.states))
 
     def predict(self) -> Prediction | None:
-        """Return the prediction, which every agent makes for itself."""
+        """Return the predictions of the agents."""
         prediction = as_prediction(self.scenario.predict())
         return None if prediction is None else PerceivedPrediction(prediction, self)
 
     def partners(self) -> Sequence[int] | None:
-        """Return for every agent the one in whose place it stands in the mirror."""
+        """Return the mirror image of every agent."""
         return self.scenario.partners()
 
     def measure(self) -> Mapping[str, Any]:
-        """Return the measurements of the present state, as it is."""
+        """Return the measurements of the true state."""
         return self.scenario.measure()
 
     def constants_of_episode(self) -> Mapping[str, Any]:
-        """Return what is kept once an episode."""
+        """Return the constants of the episode."""
         return self.scenario.constants_of_episode()
 
     @property
@@ -165,44 +165,44 @@ class PerceivedScenario(Scenario):
         return self.scenario.draws
 
     def animate(self, recording: Mapping[str, Any], path: Path) -> None:
-        """Draw a recording."""
+        """Write a recording as an animation."""
         self.scenario.animate(recording, path)
 
-    def idle(self, agent: int) -> IntArray:
-        """Return whom an agent does not perceive, and takes to do nothing ``(k,)``."""
-        return self._idle[agent]
+    def unperceived(self, agent: int) -> IntArray:
+        """Return the agents that an agent does not perceive ``(k,)``."""
+        return self._unperceived[agent]
 
     def offsets(self, agent: int) -> FloatArray:
-        """Return by how much the states of all ``(n, d)`` are off, as an agent perceives them."""
-        late = self._past[-1 - min(int(self._delays[agent]), len(self._past) - 1)]
-        offsets: FloatArray = late - self._past[-1] + self._drawn[agent]
+        """Return the errors ``(n, d)`` of the states of all agents as one agent perceives them."""
+        delayed = self._past[-1 - min(int(self._delays[agent]), len(self._past) - 1)]
+        offsets: FloatArray = delayed - self._past[-1] + self._drawn[agent]
         return offsets
 
     def within(self, states: FloatArray) -> FloatArray:
-        """Return states with periodic variables within their period."""
-        turned = self._low + (states - self._low) % self._width
-        return np.where(self._periodic, turned, states)
+        """Return states with periodic variables wrapped into their range."""
+        wrapped = self._low + (states - self._low) % self._width
+        return np.where(self._periodic, wrapped, states)
 
     def _perceive(self, states: FloatArray) -> FloatArray:
-        """Return what each agent takes for its state, and remember the states."""
+        """Return the state that each agent perceives of itself, and store the true states."""
         self._past = [*self._past[-int(self._delays.max()) :], states.copy()]
         if not self._delays.any():
             self._past = self._past[-1:]
-        # As many numbers whoever has noise: agents stay paired.
+        # The count of draws does not depend on the settings, so that runs stay paired.
         self._drawn = self._rng.standard_normal(states.shape) * self._scale
         own = [self._past[-1][i] + self.offsets(i)[i] for i in range(len(states))]
         return self.within(np.array(own))
 
 
 class PerceivedPrediction(Prediction):
-    """A prediction that every agent makes for itself; not asked as that of one, each of its own.
+    """The predictions of all agents, each from the states that it perceives.
 
     Parameters
     ----------
     prediction
-        From where the agents are.
+        Prediction from the true state.
     scenario
-        Who perceives.
+        Scenario with the sensors.
     """
 
     def __init__(self, prediction: Prediction, scenario: PerceivedScenario) -> None:
@@ -210,22 +210,22 @@ class PerceivedPrediction(Prediction):
         self._scenario = scenario
 
     def of(self, agent: int) -> Prediction:
-        """Return what an agent predicts itself."""
+        """Return the prediction of one agent."""
         return OwnPrediction(self._prediction, self._scenario, agent)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next states of an agent, as it predicts them itself."""
+        """Return the next states of an agent as it predicts them."""
         return self.of(agent).states(agent, joint_actions)
 
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
-        """Return the rewards, which nobody here is wrong about."""
+        """Return the rewards predicted from the true state."""
         return self._prediction.rewards(joint_actions)
 
 
 class OwnPrediction(Prediction):
-    """What one agent predicts, by what it perceives.
+    """Prediction of one agent from the states that it perceives.
 
-    Rewards are predicted from where agents are: only whom it does not perceive makes them wrong.
+    Rewards are predicted from the true state; only unperceived agents make them wrong.
     """
 
     def __init__(self, prediction: Prediction, scenario: PerceivedScenario, agent: int) -> None:
@@ -236,27 +236,25 @@ class OwnPrediction(Prediction):
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of any agent."""
-        states = self._prediction.states(agent, self._taken(joint_actions))
+        states = self._prediction.states(agent, self._assumed(joint_actions))
         return self._scenario.within(states + self._offsets[agent])
 
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
         """Return the rewards ``(m,)``, if they are predicted."""
-        return self._prediction.rewards(self._taken(joint_actions))
+        return self._prediction.rewards(self._assumed(joint_actions))
 
-    def _taken(self, joint_actions: IntArray) -> IntArray:
-        """Return joint actions in which whom it does not perceive does nothing."""
-        idle = self._scenario.idle(self._agent)
-        if not len(idle):
-            return joint_actions
-        taken = joint_actions.copy()
-        taken[:, idle] = self._scenario.action_set.neutral
-        return taken
+    def _assumed(self, joint_actions: IntArray) -> IntArray:
+        """Return joint actions in which unperceived agents take the neutral action."""
+        unperceived = self._scenario.unperceived(self._agent)
+        assumed = joint_actions.copy()
+        assumed[:, unperceived] = self._scenario.action_set.neutral
+        return assumed
 
 
 def distances_of(scenario: Scenario) -> FloatArray:
-    """Return how far bodies are from agents ``(n, G)``, in links; infinite where none lead there.
+    """Return the distances of bodies from agents ``(n, G)`` in links, infinite if unconnected.
 
-    Links are the interactions that the scenario declares, else each body has the next in order.
+    Links are the interactions of the scenario; by default each body is linked to the next.
 
     Examples
     --------

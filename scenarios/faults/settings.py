@@ -1,8 +1,8 @@
-"""What fails, how, and from when to when, as it stands in the ``[[scenario.failures]]`` of a spec.
+"""Failures of actuators: their kinds, settings and schedule.
 
-The kinds of failure, `KINDS`, know nothing of what fails. A scenario says under which key its
-actuators are named, ``wheels`` or ``joints``, in a model that inherits `FailureSettings`, and
-`build_kinds` joins it with the kinds that can befall them::
+The `KINDS` of failure do not depend on the scenario. A scenario names its actuators (``wheels``,
+``joints``) in a model that inherits `FailureSettings`, and `build_kinds` combines that model with
+the kinds it supports::
 
     class WheelFailure(FailureSettings):
         part = "wheels"
@@ -10,12 +10,9 @@ actuators are named, ``wheels`` or ``joints``, in a model that inherits `Failure
 
     Failure = Annotated[Union[*build_kinds(WheelFailure, **KINDS).values()], DISCRIMINATOR]
 
-A failure lies between the command that an actuator gets and the speed that its servo holds, see
-`FailureSettings.held`; the agents see the commands, and the failure only in how their bodies move.
-
-`Failures` schedules what an actuator does instead of its command. Of several failures of an
-actuator delays act first, then the others in the order of the spec, each on what the one before it
-holds, see `FailureSettings.held`. A world without failures never comes here.
+A failure changes the speed that the servo of an actuator holds for a command, see
+`FailureSettings.held`. Agents observe their commands, not the failure. If an actuator has several
+failures, delays act first, then the others in the order of the spec.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,19 +27,19 @@ from ...core.numerics import BoolArray, FloatArray, stream_of
 
 
 class FailureSettings(Scheduled):
-    """How an actuator fails, and when; see `nested_agents.scenarios.faults.settings`."""
+    """Settings that all kinds of failure share: a schedule, and a change of held speeds."""
 
     def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
-        """Return the speeds ``(periods, k)`` that the servos of what fails hold.
+        """Return the speeds ``(periods, k)`` that the servos of failed actuators hold.
 
         Parameters
         ----------
         commands
             ``(periods, k)`` commanded speeds.
         limits
-            ``(k,)`` their greatest speeds.
+            ``(k,)`` maximum speeds.
         rng
-            For noise, drawn anew every control period.
+            Generator of the noise in every control period.
         """
         return commands
 
@@ -56,7 +53,7 @@ class Seized(FailureSettings):
 
 
 class Free(FailureSettings):
-    """It has no drive and gives way; what that does is the scenario's own business."""
+    """It has no drive and gives way; the scenario implements this."""
 
 
 class Weak(FailureSettings):
@@ -79,31 +76,31 @@ class Reversed(FailureSettings):
 
 
 class Stuck(FailureSettings):
-    """It moves at one speed whatever its command."""
+    """It moves at a fixed speed for all commands."""
 
     speed: Annotated[float, Field(ge=-1, le=1)] = 0.5
-    """Speed at which it moves, as a fraction of the greatest."""
+    """Speed at which it moves, as a fraction of the maximum."""
 
     def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
-        """Return the one speed."""
+        """Return the fixed speed."""
         return np.broadcast_to(self.speed * limits, commands.shape)
 
 
 class Delayed(FailureSettings):
-    """It carries out its commands too late; `Failures` remembers them."""
+    """It executes its commands too late; `Failures` stores them."""
 
     periods: Annotated[int, Field(ge=1, le=1000)] = 8
-    """Control periods by which commands are late."""
+    """Delay of commands in control periods."""
 
 
 class Noisy(FailureSettings):
     """It moves at its command plus noise."""
 
     deviation: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """Standard deviation of the noise, as a fraction of the greatest speed."""
+    """Standard deviation of the noise, as a fraction of the maximum speed."""
 
     def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
-        """Return the command plus noise, cut to the greatest speed either way."""
+        """Return the command plus noise, clipped to the maximum speed."""
         noise = self.deviation * limits * rng.standard_normal(commands.shape)
         return np.clip(commands + noise, -limits, limits)
 
@@ -113,15 +110,16 @@ KINDS: Mapping[str, type[FailureSettings]] = {
 }
 """The kinds of failure by name."""
 DISCRIMINATOR = Field(discriminator="kind")
-"""Of a field that holds failures of any of several kinds."""
+"""Pydantic field for failures of several kinds."""
 
 
 def build_kinds(
     naming: type[FailureSettings], **kinds: type[FailureSettings]
 ) -> dict[str, type[Any]]:
-    """Return the settings of failures that befall what `naming` names, by their ``kind``.
+    """Return models of failures of the actuators that `naming` names, by ``kind``.
 
-    Each inherits its kind and `naming`, and is an attribute of `naming`, by which pickles find it.
+    Each model inherits its kind and `naming`, and is an attribute of `naming` so that it can be
+    pickled.
 
     Examples
     --------
@@ -153,7 +151,7 @@ FailureT = TypeVar("FailureT", bound=FailureSettings)
 
 
 class Failures(Generic[FailureT]):
-    """The failures that a spec schedules, and the actuators under them.
+    """Scheduled failures of a set of actuators.
 
     Parameters
     ----------
@@ -162,14 +160,14 @@ class Failures(Generic[FailureT]):
     agents
         Names of the ``n`` actuators.
     limits
-        ``(n,)`` greatest speed of every actuator, in units of its speed.
+        ``(n,)`` maximum speed of every actuator.
     key
-        What the failures are called in complaints.
+        Name of the failures in error messages.
 
     Raises
     ------
     ValueError
-        If a failure names an actuator that there is not.
+        If a failure names an unknown actuator.
 
     Examples
     --------
@@ -198,20 +196,20 @@ class Failures(Generic[FailureT]):
         )
         self._limits = limits
         self._masks = [failure.mask(agents, f"{key}[{i}]") for i, failure in enumerate(settings)]
-        self._memory = max((f.periods for f in settings if isinstance(f, Delayed)), default=0)
+        self._max_delay = max((f.periods for f in settings if isinstance(f, Delayed)), default=0)
         self.begin(0, 0)
 
     def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:
-        """Start an episode; its noise follows from `seed`, a stream to every failure."""
+        """Start an episode; each failure draws its noise from its own stream of `seed`."""
         self._streams = [stream_of(seed, i) for i in range(len(self._settings))]
         self._episode = episode
-        # Commands of the last control periods, the oldest first.
-        self._commands = np.zeros((self._memory, len(self._limits)))
+        # Commands of the last control periods, oldest first
+        self._commands = np.zeros((self._max_delay, len(self._limits)))
         self._active: tuple[int, ...] = ()
         self.strike(0)
 
     def strike(self, step: int) -> bool:
-        """Let begin and end what is due at a step; return whether anything changed."""
+        """Start and end the failures that are due at a step; return whether any changed."""
         former = self._active
         self._active = tuple(
             i for i in self._delays_first if self._settings[i].lasts(self._episode, step)
@@ -226,31 +224,31 @@ class Failures(Generic[FailureT]):
         commands
             ``(n,)`` commanded speeds, held for all periods.
         periods
-            Control periods; they are remembered as past.
+            Number of control periods; their commands are stored for delays.
         """
         speeds = np.tile(commands, (periods, 1))
-        remembered = np.vstack([self._commands, speeds])
+        history = np.vstack([self._commands, speeds])
         for i in self._active:
             mask = self._masks[i]
             failure = self._settings[i]
             if isinstance(failure, Delayed):
-                first = self._memory - failure.periods
-                speeds[:, mask] = remembered[first : first + periods, mask]
+                first = self._max_delay - failure.periods
+                speeds[:, mask] = history[first : first + periods, mask]
             else:
                 limits = self._limits[mask]
                 stream = self._streams[i]
                 speeds[:, mask] = failure.held(speeds[:, mask], limits, stream)
-        self._commands = remembered[len(remembered) - self._memory :]
+        self._commands = history[len(history) - self._max_delay :]
         return speeds
 
     def active(self) -> Iterator[tuple[FailureT, BoolArray]]:
-        """Yield the failures that are on, each with the mask ``(n,)`` of what it has befallen."""
+        """Yield the active failures, each with the mask ``(n,)`` of its actuators."""
         for i in self._active:
             yield self._settings[i], self._masks[i]
 
     @property
     def failed(self) -> BoolArray:
-        """Whether each actuator is under a failure now, ``(n,)``."""
+        """Whether each actuator has failed ``(n,)``."""
         failed = np.zeros(len(self._limits), dtype=bool)
         for _, mask in self.active():
             failed |= mask

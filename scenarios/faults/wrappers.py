@@ -1,23 +1,22 @@
-"""Faults of the actuators of any Gymnasium environment and any PettingZoo parallel one.
+"""Faults of actuators for any Gymnasium environment and any parallel PettingZoo environment.
 
-The kinds are those of `nested_agents.scenarios.faults.settings`; what is added is the field that
-names actuators. A fault names them by pattern, ``"0"``, ``"walker_0.*"``, or by number. The policy
-is not informed of it.
+A fault is a kind, an onset and an end, as for the wheels of robots, see
+`nested_agents.scenarios.faults.settings`, and names actuators by pattern or number: ``"0"``,
+``"walker_0.*"``. The policy is not informed of it.
 
-What an action commands decides what a fault can do to it. An *effort*, such as a torque, is zero at
-a free actuator, but none holds a joint; a *velocity* is zero at a seized one, but none lets it
-coast; a *position* is held by a seized one, and none gives way. What an action cannot express is
-left to a `Mechanism`, or refused.
+What an action commands determines which faults it can express. A free actuator has zero *effort*,
+such as torque, but no effort holds a seized joint. A seized actuator has zero *velocity*, or holds
+its *position*, but neither lets a free joint move. Faults that an action cannot express need a
+`Mechanism`.
 
-Actions of any Box or Discrete space are numbers along a scale. Each entry of a Box is an actuator,
-whose scale is that of the action. Each discrete choice is one, too: its actions are taken to be in
-order along a scale, as left, none, right are, with rest in the middle. What a fault makes of them
-may lie between two actions; then one of these is drawn, with the probabilities whose mean is the
-place between.
+Each entry of a Box is an actuator. Each discrete choice is an actuator, too; its actions are taken
+as ordered along a scale with rest in the middle, such as left, none, right. If a fault places a
+command between two discrete actions, one of them is drawn with the probabilities that preserve the
+mean.
 
 Examples
 --------
-From episode 3 on, the motor of a pendulum does a third of what it is commanded.
+From episode 3 on, the motor of a pendulum executes a third of its command.
 
 >>> import numpy as np
 >>> from nested_agents.scenarios.faults.wrappers import Weak
@@ -44,14 +43,14 @@ from .settings import Failures, FailureSettings, build_kinds
 
 
 class ActuatorFault(FailureSettings):
-    """From when to when actuators are faulty, see `nested_agents.scenarios.faults.settings`."""
+    """A fault of actuators with its schedule, see `nested_agents.scenarios.faults.settings`."""
 
     part: ClassVar[str] = "actuators"
 
     actuators: Names
-    """Actuators by name, pattern or number, one or a list."""
+    """Names, patterns or numbers of actuators."""
     kind: str = ""
-    """What is wrong with them."""
+    """Kind of the fault."""
 
 
 KINDS = build_kinds(ActuatorFault, **settings.KINDS)
@@ -59,13 +58,13 @@ KINDS = build_kinds(ActuatorFault, **settings.KINDS)
 Seized, Free, Weak, Reversed, Stuck, Delayed, Noisy = KINDS.values()
 
 
-def limits_of(space: gymnasium.Space[Any], name: str) -> tuple[FloatArray, FloatArray]:
-    """Return the least and greatest value ``(k,)`` of each entry of a space's actions.
+def action_bounds(space: gymnasium.Space[Any], name: str) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper bounds ``(k,)`` of the entries of an action.
 
     Raises
     ------
     ValueError
-        If the space, called by its name, is of another kind or is not bounded; one line.
+        If the space is of another kind or is not bounded.
     """
     if isinstance(space, Box) and space.is_bounded():
         return space.low.ravel(), space.high.ravel()
@@ -73,32 +72,32 @@ def limits_of(space: gymnasium.Space[Any], name: str) -> tuple[FloatArray, Float
         counts = space.n if isinstance(space, Discrete) else space.nvec
         return np.ravel(space.start), np.ravel(space.start) + np.ravel(counts) - 1
     raise ValueError(
-        f"{name}: {space}, allowed: Box, Discrete or MultiDiscrete, of finite bounds; where it has "
-        "none, wrap it in RescaleAction or ClipAction"
+        f"{name}: {space}, allowed: Discrete, MultiDiscrete, or Box with finite bounds; "
+        "otherwise wrap it in RescaleAction or ClipAction"
     )
 
 
 class ActionScale:
-    """The actuators that an action space has, each with its scale.
+    """The actuators of an action space, as deviations from rest.
 
     Parameters
     ----------
     space
         The action space: a bounded Box, Discrete or MultiDiscrete.
     rest
-        The action in which actuators rest; None: 0 where a Box has it, else the middle.
+        Action at rest. By default 0 if a Box contains it, else the middle.
     name
-        What the space is called in complaints.
+        Name of the space in error messages.
 
     Attributes
     ----------
     limits
-        ``(k,)`` how far from rest each scale reaches.
+        ``(k,)`` maximum deviations from rest.
 
     Raises
     ------
     ValueError
-        If the space is of another kind, is not bounded or does not hold `rest`; one line.
+        If the space is of another kind or unbounded, or does not contain `rest`.
 
     Examples
     --------
@@ -113,7 +112,7 @@ class ActionScale:
         self, space: gymnasium.Space[Any], rest: ArrayLike | None = None, name: str = "action space"
     ) -> None:
         self.space = space
-        self._low, self._high = (ends.astype(float) for ends in limits_of(space, name))
+        self._low, self._high = (ends.astype(float) for ends in action_bounds(space, name))
         if rest is None:
             has_zero = isinstance(space, Box) & (self._low <= 0) & (self._high >= 0)
             self._rest = np.where(has_zero, 0.0, (self._low + self._high) / 2)
@@ -124,24 +123,24 @@ class ActionScale:
         self.limits: FloatArray = np.maximum(self._high - self._rest, self._rest - self._low)
 
     def place(self, action: ArrayLike) -> FloatArray:
-        """Return where an action lies from rest, ``(k,)``."""
+        """Return the deviations of an action from rest ``(k,)``."""
         return np.ravel(action).astype(float) - self._rest
 
     def action(
         self, place: FloatArray, chosen: object, changed: BoolArray, drawn: FloatArray
     ) -> Any:
-        """Return the action at a place.
+        """Return the action with given deviations from rest.
 
         Parameters
         ----------
         place
-            ``(k,)`` from rest; what is out of bounds is cut.
+            ``(k,)`` deviations, clipped to the bounds.
         chosen
-            The action that was chosen; of its entries remain those that are not `changed`.
+            The chosen action, from which unchanged entries are taken.
         changed
-            ``(k,)`` which do not.
+            ``(k,)`` mask of the entries that a fault changes.
         drawn
-            ``(k,)`` uniform random numbers for what lies between two actions.
+            ``(k,)`` uniform random numbers that decide between two discrete actions.
         """
         if not changed.any():
             return chosen
@@ -153,24 +152,24 @@ class ActionScale:
             values = np.rint(values)
         action = np.array(chosen, dtype=self.space.dtype)
         action.ravel()[changed] = values[changed].astype(action.dtype)
-        return action[()]  # a number, not an array, of Discrete
+        return action[()]  # Discrete actions are numbers, not arrays
 
 
 Commands = Literal["effort", "velocity", "position"]
-"""What actions command."""
+"""Physical meaning of actions."""
 Mechanism = Callable[[Any, dict[str, str]], None]
-"""Is called before every step with the environment beneath and the faults that no action expresses,
-kinds by actuator, as long as there are some, and once more when there are none."""
+"""Function that applies the faults that no action can express. It is called before each step with
+the wrapped environment and the kinds of these faults by actuator, and once when the last ends."""
 
 INEXPRESSIBLE: Mapping[Commands, str] = {"effort": "seized", "velocity": "free", "position": "free"}
-"""What no action expresses, by what actions command."""
+"""Kind of fault that no action can express, by the meaning of actions."""
 
 
 class _Faulty(ABC):
-    """An environment under a schedule of faults; inherited beside a library's wrapper.
+    """Base class of the wrappers: an environment with scheduled faults.
 
-    Its actuators are those of one or more action spaces, by the prefix of their names. Noise and
-    draws follow from `seed`, the seed of the environment, and the number of the episode.
+    Names of actuators begin with the prefix of their action space. Random numbers follow from
+    `seed`, the seed of the environment, and the number of the episode.
 
     Raises
     ------
@@ -179,7 +178,7 @@ class _Faulty(ABC):
     """
 
     env: Any
-    """The environment beneath."""
+    """The wrapped environment."""
 
     def __init__(
         self,
@@ -198,8 +197,8 @@ class _Faulty(ABC):
         for i, fault in enumerate(faults):
             if fault.kind == INEXPRESSIBLE[commands] and mechanism is None:
                 raise ValueError(
-                    f"faults[{i}]: no {commands} makes an actuator {fault.kind}; give a "
-                    f"mechanism that does, or say what else actions command"
+                    f"faults[{i}].kind = {fault.kind!r}: no {commands} can express it; give "
+                    "a mechanism, or other commands"
                 )
         self._parts: dict[str, tuple[ActionScale, slice]] = {}
         names: list[str] = []
@@ -219,16 +218,16 @@ class _Faulty(ABC):
 
     @abstractmethod
     def _wrap(self, env: Any) -> None:
-        """Let the library's wrapper begin."""
+        """Initialize the base class of the library."""
 
     @abstractmethod
     def _scales(self, env: Any, rest: Any) -> dict[str, ActionScale]:
-        """Return the scales of an environment's action spaces by the prefix of their actuators."""
+        """Return the scales of the action spaces by the prefix of their actuators."""
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> Any:
-        """Start an episode of the environment beneath; a seed starts their count afresh.
+        """Start an episode; a seed resets the episode count.
 
-        The option ``fault_episode`` sets the number of the episode, by which faults are scheduled.
+        The option ``fault_episode`` sets the number of the episode, which schedules faults.
         """
         left = dict(options or {})
         if seed is not None:
@@ -247,17 +246,15 @@ class _Faulty(ABC):
         self._held = np.zeros(len(self.actuators))
 
     def _carry(self, actions: Mapping[str, ArrayLike]) -> dict[str, Any]:
-        """Return what is carried out of the actions of one step, by prefix.
-
-        Spaces whose action is missing rest.
-        """
+        """Return the executed actions of one step by prefix; missing actions are at rest."""
         self._failures.strike(self._step)
         self._step += 1
         places = np.zeros(len(self.actuators))
         for prefix, action in actions.items():
             scale, span = self._parts[prefix]
             places[span] = scale.place(action)
-        drawn = self._rng.random(len(places))  # as many whatever fails: runs stay paired
+        # The count of draws does not depend on faults, so that runs stay paired.
+        drawn = self._rng.random(len(places))
         driven = self._failures.driven(places, 1)[0]
         changed = self._failures.failed
         for fault, mask in self._failures.active():
@@ -278,7 +275,7 @@ class _Faulty(ABC):
         return carried
 
     def _now(self) -> dict[str, str]:
-        """Return the kind of the fault of every actuator that has one; of several, the last."""
+        """Return the kind of fault of every failed actuator; the last one of several."""
         return {
             self.actuators[i]: fault.kind
             for fault, mask in self._failures.active()
@@ -287,42 +284,41 @@ class _Faulty(ABC):
 
 
 class FaultyEnv(_Faulty, gymnasium.Wrapper):
-    """A Gymnasium environment whose actuators fail as scheduled, without the policy being informed.
+    """Wrapper of a Gymnasium environment with scheduled faults of its actuators.
 
-    Its worlds are those of the environment beneath, seed by seed, whatever fails. Steps and
-    episodes are counted from 0; `reset` with a seed counts episodes afresh, and its option
-    ``fault_episode`` sets their number.
+    Faults do not change the initial states that a seed gives. Steps and episodes are counted from
+    0; `reset` with a seed resets the episode count, and its option ``fault_episode`` sets it.
 
     Parameters
     ----------
     env
-        With bounded Box, Discrete or MultiDiscrete actions. Its actuators are called ``0``, ``1``
-        and so on.
+        Environment with bounded Box, Discrete or MultiDiscrete actions. Its actuators are named
+        ``0``, ``1`` and so on.
     faults
-        When which actuator fails, and how.
+        The faults and their schedule.
     seed
-        Of the noise of faults, beside the seed of the environment.
+        Seed of the noise of faults, in addition to that of the environment.
     commands
-        What actions command; see `Commands`.
+        Physical meaning of actions, see `Commands`.
     rest
-        The action in which actuators rest; None: 0 where they can, else the middle of their range.
+        Action at rest. By default 0 where possible, else the middle of the range.
     mechanism
-        What does to the environment what no action can.
+        Function that applies the faults that no action can express.
     inform
-        Whether ``info`` has the kinds of fault by actuator under ``faults``, and what was done
-        under ``carried``.
+        Whether ``info`` has the kinds of fault by actuator under ``faults``, and the executed
+        action under ``carried``.
 
     Attributes
     ----------
     actuators
         Names of the actuators.
     carried
-        The last action that was done.
+        The last executed action.
 
     Raises
     ------
     ValueError
-        If a fault names no actuator or cannot be expressed, or the actions are of another kind.
+        If a fault names no actuator or cannot be expressed, or the action space is not supported.
     """
 
     def _wrap(self, env: Any) -> None:
@@ -332,7 +328,7 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
         return {"": ActionScale(env.action_space, rest)}
 
     def step(self, action: ArrayLike) -> tuple[Any, Any, bool, bool, dict[str, object]]:
-        """Do what faulty actuators make of an action."""
+        """Execute an action with faulty actuators."""
         self.carried = self._carry({"": action})[""]
         seen, reward, terminated, truncated, info = self.env.step(self.carried)
         if self._inform:
@@ -341,23 +337,24 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
 
 
 class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
-    """A PettingZoo parallel environment whose actuators fail as scheduled; see `FaultyEnv`.
+    """Wrapper of a parallel PettingZoo environment with scheduled faults, see `FaultyEnv`.
 
     Parameters
     ----------
     env
-        Its actuators are called ``AGENT.0``, ``AGENT.1`` and so on; ``AGENT.*`` names all of one.
+        Environment. Its actuators are named ``AGENT.0``, ``AGENT.1`` and so on; ``AGENT.*`` matches
+        all actuators of an agent.
     faults, seed, commands, mechanism, inform
-        As of `FaultyEnv`; an agent's ``info`` has its own alone.
+        As in `FaultyEnv`; the ``info`` of an agent has only its own faults.
     rest
-        By agent, the action in which its actuators rest.
+        Actions at rest, by agent.
 
     Attributes
     ----------
     actuators
         Names of the actuators.
     carried
-        The last actions that were done, by agent.
+        The last executed actions, by agent.
     """
 
     def _wrap(self, env: Any) -> None:
@@ -371,7 +368,7 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
         }
 
     def step(self, actions: Mapping[str, ArrayLike]) -> tuple[dict[str, Any], ...]:
-        """Do what faulty actuators make of the agents' actions."""
+        """Execute the agents' actions with faulty actuators."""
         self.carried = self._carry(actions)
         *given, infos = self.env.step(self.carried)
         if self._inform:

@@ -1,1 +1,1 @@
-"""A planar arm whose joints are agents: they bring its tip to a goal."""
+"""Planar arm with one agent per joint, which brings its tip to a goal."""

@@ -1,4 +1,4 @@
-"""The settings of the kinematic chain, as they stand in the ``[scenario]`` table of a spec."""
+"""Settings of the kinematic chain."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Union
@@ -18,43 +18,43 @@ from ..state_variables import names_of
 from .variables import CHAIN_VARIABLES
 
 PERIOD = 0.1
-"""Time between two decisions [s]."""
+"""Decision period [s]."""
 REACH = 1.0
-"""Length of the whole arm [m]."""
+"""Length of the arm [m]."""
 RIDGE = 0.1
-"""Ridge of a joint's regression that learns best, for every joint that shares its weights."""
+"""Best ridge of the regression, per joint that shares its weights."""
 SIMPLE = ("bearing", "distance", "approach")
-"""State variables of which `kinematic_chain.responses` knows how they change."""
+"""State variables that `kinematic_chain.responses` supports."""
 DISCOUNT = 0.8
-"""Discount that learns best: a goal is some twenty decisions away."""
+"""Best discount; a goal is about twenty decisions away."""
 
 
 class ReachingRewardSettings(Settings):
-    """The constants of the reward, in the spirit of Eq. 15-17; distances in metres.
+    """Constants of the joint reward, similar to Eq. 15-17, with distances in meters.
 
-    It is paid to all agents alike. Coming nearer must pay far less than being there: an arm that
-    is paid for approaching alone learns to circle round the goal.
+    The reward for approaching is much smaller than that at the goal, because an arm that is
+    rewarded for approaching alone learns to circle around the goal.
     """
 
     c1: NonNegative = 0.01
     """Reward at the goal."""
     c2: NonNegative = 0.003
-    """Reward for coming nearer, times ``exp(-r2 distance)``."""
+    """Reward for approaching, multiplied by ``exp(-r2 distance)``."""
     r2: NonNegative = 1.5
-    """Decay of that reward per metre of the tip's distance from the goal."""
+    """Decay of the approach reward with the distance of the tip from the goal [1/m]."""
     least_approach: NonNegative = 0.001
-    """By how much the tip must have come nearer in a decision for that [m]."""
+    """Minimum decrease of the distance per decision for the approach reward [m]."""
     receding: float = -0.005
-    """Reward if the tip did not come nearer."""
+    """Reward if the tip does not approach the goal."""
 
 
 class JointFailure(FailureSettings):
-    """Joints that fail."""
+    """Failure of joints."""
 
     part: ClassVar[str] = "joints"
 
     joints: Names
-    """Joints by agent name or pattern: ``joint2``, ``joint*``; one or a list."""
+    """Names or patterns of joints, such as ``joint2`` or ``joint*``."""
 
 
 if TYPE_CHECKING:
@@ -63,44 +63,44 @@ else:
     _ALIKE = {kind: KINDS[kind] for kind in ("weak", "reversed", "stuck")}
     _KINDS = build_kinds(JointFailure, locked=KINDS["seized"], **_ALIKE)
     Failure = Annotated[Union[*_KINDS.values()], DISCRIMINATOR]
-"""Any failure's settings, distinguished by `kind`."""
+"""Settings of a failure of any `kind`."""
 
 
 class KinematicChainSettings(ScenarioSettings):
-    """A planar arm of ``joints`` links of equal length, 1 m in all, its base at the origin."""
+    """A planar arm of ``joints`` equal links, 1 m in total, with its base at the origin."""
 
     kind: Literal["kinematic-chain"] = "kinematic-chain"
     factory: ClassVar[str] = f"{__package__}.scenario:KinematicChain"
     joints: Annotated[int, Field(ge=2), team_size(1e-8)] = 4
-    """Number of joints, an agent each, as many as memory and time allow by estimate."""
+    """Number of joints, one agent each. The maximum follows from estimated memory and time."""
     joint_limit: Annotated[float, Field(gt=0, le=3.141592653589793)] | None = None
-    """Greatest angle of every joint but the base, either way [rad]; none: links pass each other."""
+    """Maximum angle of every joint except the base [rad]. By default unlimited; links can cross."""
     failures: tuple[Failure, ...] = ()
-    """Failures of joints, as ``[[scenario.failures]]`` tables."""
+    """Failures of joints."""
     predictor: Literal["nominal", "informed"] = "nominal"
-    """Whether predictions take every joint for what it was built as, or know of failures."""
+    """``nominal`` predictions assume that all joints work; ``informed`` ones include failures."""
     state_space: Annotated[tuple[str, ...], names_of(CHAIN_VARIABLES)] = SIMPLE
-    """State variables beside the speed of the own joint, by name, one's own included; see
+    """State variables in addition to the speed of the joint, by name; see
     `kinematic_chain.variables`."""
     reward: ReachingRewardSettings = ReachingRewardSettings()
-    """The constants of the reward."""
+    """Constants of the reward."""
     speed: Positive = 0.6
-    """Greatest speed of a joint [rad/s], in arms of few joints; in others 5 rad/s divided by
+    """Maximum speed of a joint [rad/s]; in arms of many joints it is `speed_of_all` divided by
     their number."""
     speed_of_all: Positive = 5.0
-    """Greatest speed of all joints added up [rad/s]."""
+    """Maximum sum of the speeds of all joints [rad/s]."""
     speed_increment: Annotated[float, Field(gt=0, le=1)] = 0.5
-    """What increase and decrease change, as a fraction of the greatest speed."""
+    """Change of the commanded speed by one action, as a fraction of the maximum speed."""
     tolerance: Positive = 0.02
-    """Distance of the tip from the goal that counts as reached [m]."""
+    """Distance of the tip from the goal at which the goal is reached [m]."""
     most_decisions: Annotated[int, Field(ge=1, le=1_000_000)] = 150
-    """Decisions after which an episode is broken off."""
+    """Maximum number of decisions of an episode."""
 
     def scenario_defaults(self, preset: str) -> Mapping[str, object]:
-        """Return what learns best here: little regularisation, and little foresight.
+        """Return defaults of the learner: weak regularization and a low discount.
 
-        The ridge weighs against the squared errors of all joints that share weights, so that it
-        grows with their number. A written value is the distance of the tip from the goal.
+        The ridge grows with the number of joints that share weights, because it is compared with
+        the sum of their squared errors. A hand-written value is the distance from the goal.
         """
         if preset == "hand-written":
             return {"learner": {"value": {"distance": -1.0}}}
@@ -112,13 +112,18 @@ class KinematicChainSettings(ScenarioSettings):
         return {"learner": {"ridge": RIDGE * sharing[preset], "discount": DISCOUNT}}
 
     @property
+    def task_size(self) -> float:
+        """Length of the arm [m], for any number of joints."""
+        return 1.0
+
+    @property
     def period(self) -> float:
-        """Seconds for which a decision is held."""
+        """Decision period [s]."""
         return PERIOD
 
     @property
     def top_speed(self) -> float:
-        """Greatest speed of a joint [rad/s]: the more joints, the slower each.
+        """Maximum speed of a joint [rad/s], which decreases with the number of joints.
 
         >>> KinematicChainSettings(joints=4).top_speed, KinematicChainSettings(joints=50).top_speed
         (0.6, 0.1)

@@ -1,12 +1,12 @@
-"""Pictures of the kinematic chain, drawn from recordings: an episode as GIF or MP4.
+"""Animations of the kinematic chain from recordings.
 
 A recording is a mapping of arrays: ``angles (T + 1, n)`` [rad], ``speeds (T + 1, n)`` [rad/s],
-``failed (T + 1, n)``, ``goal (2,)`` [m], and constants of no dimension: ``reach`` and ``tolerance``
-[m], ``top_speed`` [rad/s], ``dt`` [s].
+``failed (T + 1, n)``, ``goal (2,)`` [m], and scalars ``reach`` and ``tolerance`` [m], ``top_speed``
+[rad/s], ``dt`` [s].
 
-Links are drawn from the base, a black square, to the tip, an orange dot with the trail of where it
-has been. Joints are the darker the faster their command; failed ones are crossed out. The
-dashed ring is the goal, as wide as the tolerance; the pale circle is the reach of the arm.
+The base is a black square, and the tip an orange dot with its trail. Joints with faster commands
+are darker, failed joints are crossed out. The dashed ring is the goal with the radius of the
+tolerance, the pale circle the reach of the arm.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from matplotlib.patches import Circle
 
 from ...core.numerics import FloatArray
 from ..movies import Scene, film
-from .variables import postures_of
+from .variables import forward_kinematics
 
 Recording = Mapping[str, FloatArray]
 
@@ -31,14 +31,15 @@ FAILED = "#B00020"
 
 
 class _ChainScene(Scene):
-    """A figure on which any moment of a recording can be drawn."""
+    """A figure that shows any step of a recording."""
 
     def __init__(self, recording: Recording) -> None:
         super().__init__((SIDE, SIDE), (0.15, 0.1, 0.83, 0.83))
         self.recording = recording
         angles = recording["angles"]
         reach = float(recording["reach"])
-        self.places = postures_of(angles, reach / angles.shape[1])
+        places = forward_kinematics(angles.T, reach / angles.shape[1])
+        self.places = places.transpose(1, 0, 2)
         ends = -1.05 * reach, 1.05 * reach
         self.axes.set(xlim=ends, ylim=ends)
         self.axes.add_patch(Circle((0, 0), reach, fill=False, ec="#dddddd", lw=1))

@@ -1,9 +1,8 @@
-"""The kinematic chain: joints of a planar arm that learn to bring its tip to a goal.
+"""Kinematic chain: the joints of a planar arm learn to bring its tip to a goal.
 
-An agent for every degree of freedom is the earlier application of the paper's method ([28, 29]).
-The scenario joins the arm, the task (goal, reward, end of an episode), the sensing (states) and the
-servo layer, which turns actions into speeds of joints. Joints are servo-driven and have no mass:
-they turn at the commanded speed, unless they fail or reach their limit.
+One agent per degree of freedom is the earlier application of the paper's method ([28, 29]). Joints
+are servo-driven and have no mass: they turn at the commanded speed unless they fail or reach their
+limit.
 """
 
 from __future__ import annotations
@@ -24,27 +23,26 @@ from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.words import expect
-from ...core.rules.rule_base import RuleBase
+from ...core.values.rule_base import RuleBase
 from ..faults.settings import Failures
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
 from .responses import Options, respond
-from .variables import ChainStates, ChainView, ends_of, postures_of
-from .worlds import observe_worlds
+from .variables import ChainStates, ChainView, forward_kinematics
 
 MEASURES = (
     SUCCESS,
     Measure("final_distance_m", "final distance", "m", "distance_m", better="lower", least=0.0),
 )
-LEAST_WAY = 0.25
-"""Distance of the tip from the goal at the start, at least [m]."""
+MIN_START_DISTANCE = 0.25
+"""Minimum distance of the tip from the goal at the start [m]."""
 GOAL_RADII = (0.15, 0.95)
-"""Least and greatest distance of the goal from the base [m]."""
-MOST_BEND = 2.5
-"""Greatest angle of a joint behind the base at the start [rad]."""
+"""Minimum and maximum distance of the goal from the base [m]."""
+MAX_BEND = 2.5
+"""Maximum start angle of a joint other than the base [rad]."""
 
 
 class KinematicChain(Scenario, Embodiment):
-    """A planar arm. It can be drawn, is predicted exactly, and is open to self-models.
+    """A planar arm with exact predictions and support for self-models.
 
     Parameters
     ----------
@@ -54,7 +52,7 @@ class KinematicChain(Scenario, Embodiment):
     Raises
     ------
     ValueError
-        If a state variable is unknown, or a failure names a joint that there is not.
+        If a state variable is unknown, or a failure names an unknown joint.
 
     Examples
     --------
@@ -75,30 +73,29 @@ class KinematicChain(Scenario, Embodiment):
         self.action_set = ActionSet()
         self.length = REACH / n
         self._limits = np.full(n, settings.top_speed)
-        self._most = np.full(n, settings.joint_limit or np.inf)
-        self._most[0] = np.inf
+        self._max_angles = np.full(n, settings.joint_limit or np.inf)
+        self._max_angles[0] = np.inf
         self._states = ChainStates(settings.state_space)
         self.state_space = self._states.space
         self.nominal_effects = (np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),) * n
-        """Per joint the ``(3, 2)`` effect of its speed: as a body it can but turn."""
+        """Effect of a joint's speed on its twist ``(3, 2)``: it only turns."""
         self._failures = Failures(settings.failures, self.agents, self._limits)
-        # What an informed prediction knows of the next step, while the others tell of the last.
+        # Failures of the coming step, for informed predictions; the others are of the last step.
         self._known = Failures(settings.failures, self.agents, self._limits)
         KinematicChain.reset(self, 0)
 
     def partners(self) -> tuple[int, ...]:
-        """Return for every joint the one in whose place it stands in the mirror: itself."""
+        """Return the mirror image of every joint, which is the joint itself."""
         return tuple(range(len(self.agents)))
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
-        """Bend the arm at random, and put the goal within its reach; return states ``(n, d)``.
+        """Bend the arm at random, draw a goal within reach, and return states ``(n, d)``.
 
-        Goals are spread evenly over the area. Failures are scheduled by the number of the
-        `episode`.
+        Goals are uniform over the area. Failures are scheduled by the number of the `episode`.
         """
         rng = np.random.default_rng(seed)
         n = len(self.agents)
-        bend = min(MOST_BEND, 3.0 * np.sqrt(2.0 / n), self.settings.joint_limit or np.inf)
+        bend = min(MAX_BEND, 3.0 * np.sqrt(2.0 / n), self.settings.joint_limit or np.inf)
         self._angles = np.append(rng.uniform(-np.pi, np.pi), rng.uniform(-bend, bend, n - 1))
         self._speeds: FloatArray = np.zeros(n)
         self._step = 0
@@ -107,14 +104,14 @@ class KinematicChain(Scenario, Embodiment):
             radius = np.sqrt(rng.uniform(GOAL_RADII[0] ** 2, GOAL_RADII[1] ** 2))
             course = rng.uniform(-np.pi, np.pi)
             self._goal = radius * np.array([np.cos(course), np.sin(course)])
-            if np.hypot(*(self._goal - tip)) >= LEAST_WAY:
+            if np.hypot(*(self._goal - tip)) >= MIN_START_DISTANCE:
                 break
         for failures in (self._failures, self._known):
             failures.begin(seed, episode)
         return self._observe(self._distance())
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Turn the joints for one decision period, observe and reward."""
+        """Turn the joints for one decision period."""
         begin = perf_counter()
         before = self._distance()
         angles = self._angles
@@ -122,42 +119,41 @@ class KinematicChain(Scenario, Embodiment):
         unit = self.settings.speed_increment * self._limits
         self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
         held = self._failures.driven(self._speeds, periods=1)[0]
-        self._angles = np.clip(angles + PERIOD * held, -self._most, self._most)
+        self._angles = np.clip(angles + PERIOD * held, -self._max_angles, self._max_angles)
         self._step += 1
         moved = perf_counter()
         states = self._observe(before)
-        measured = self.measure()
-        away = np.array([measured["distance_m"]])
-        terminated = bool(away[0] < self.settings.tolerance)
+        info = self.measure()
+        distance = np.array([info["distance_m"]])
+        terminated = bool(distance[0] < self.settings.tolerance)
         truncated = not terminated and self._step >= self.settings.most_decisions
         twists = np.zeros((len(angles), 3))
         twists[:, 2] = (self._angles - angles) / PERIOD
-        received = float(self._reward(away, before - away)[0])
-        measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
-        return Transition(states, received, terminated, truncated, measured, twists)
+        reward = float(self._reward(distance, before - distance)[0])
+        info["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
+        return Transition(states, reward, terminated, truncated, info, twists)
 
     def environments(self, count: int) -> ChainEnvironments | None:
-        """Return many such arms, stepped in one call; None: some fail, or have other variables."""
-        is_plain = self._states.is_compiled and not self.settings.failures
-        return ChainEnvironments(self, count) if is_plain else None
+        """Return many arms that are stepped in one call; None if joints fail."""
+        return None if self.settings.failures else ChainEnvironments(self, count)
 
     def embodiment(self) -> Embodiment:
-        """Return itself: its joints are open to self-models."""
+        """Return the arm itself, because its joints support self-models."""
         return self
 
     def predict(self) -> ChainPrediction:
-        """Predict from the present state, by joints as built or, failures known, as they are."""
+        """Predict from the present state, with failures if the settings say `informed`."""
         nominal = self.settings.predictor == "nominal"
         return self.predict_with(self.nominal_effects if nominal else self._actual_effects())
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> ChainPrediction:
-        """Predict from the present state, believing in these effects ``(3, 2)`` of the joints."""
+        """Predict from the present state, given the effects ``(3, 2)`` of the joints."""
         return ChainPrediction(self, effects, self._angles, self._speeds, self._distance())
 
     def _actual_effects(self) -> tuple[FloatArray, ...]:
-        """Return the effects of the joints in the coming step: all failures are linear."""
+        """Return the effects of the joints in the coming step; all failures are linear."""
         self._known.strike(self._step)
         offsets = self._known.driven(np.zeros(len(self.agents)), periods=1)[0]
         effects = np.zeros((len(offsets), 3, 2))
@@ -166,13 +162,14 @@ class KinematicChain(Scenario, Embodiment):
         return tuple(effects)
 
     def with_exact_prediction(self) -> KinematicChain:
-        """Return an arm alike whose predictions know of failures: all else is exact."""
+        """Return an equal arm with predictions that include failures."""
         return type(self)(self.settings.model_copy(update={"predictor": "informed"}))
 
     def measure(self) -> dict[str, object]:
-        """Return posture ``angles`` (n,) [rad], ``speeds`` (n,) as commanded [rad/s] and more.
+        """Return the measurements of the present state.
 
-        ``tip`` and ``goal`` (2,), ``distance_m`` between them, ``failed`` (n,) joints.
+        They are ``angles`` (n,) [rad], commanded ``speeds`` (n,) [rad/s], ``failed`` joints (n,),
+        ``tip`` and ``goal`` (2,) [m], and ``distance_m`` between them.
         """
         return {
             "angles": self._angles.copy(),
@@ -184,7 +181,7 @@ class KinematicChain(Scenario, Embodiment):
         }
 
     def constants_of_episode(self) -> Mapping[str, object]:
-        """Return the goal of the episode, and what is drawn."""
+        """Return the goal of the episode and constants for drawing."""
         return {
             "goal": self._goal,
             "dt": PERIOD,
@@ -194,33 +191,34 @@ class KinematicChain(Scenario, Embodiment):
         }
 
     def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
-        """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""
+        """Write a recorded episode as GIF or MP4, by the suffix of `path`."""
         from .drawing import animate
 
         animate(recording, path)
 
     def _reward(self, distance: FloatArray, approach: FloatArray) -> FloatArray:
-        """Return the reward ``(m,)``, given distance and how much nearer the tip has come [m]."""
+        """Return the reward ``(m,)`` for distance and approach [m]."""
         s = self.settings.reward
-        nearer = np.where(approach > s.least_approach, s.c2 * np.exp(-s.r2 * distance), s.receding)
-        return np.where(distance < self.settings.tolerance, s.c1, nearer)
+        moving = np.where(approach > s.least_approach, s.c2 * np.exp(-s.r2 * distance), s.receding)
+        return np.where(distance < self.settings.tolerance, s.c1, moving)
 
     def _places(self) -> FloatArray:
         """Return joints and tip ``(n + 1, 2)`` [m]."""
-        return postures_of(self._angles[None], self.length)[0]
+        return forward_kinematics(self._angles, self.length)
 
     def _distance(self) -> float:
         return float(np.hypot(*(self._goal - self._places()[-1])))
 
     def _observe(self, before: float) -> FloatArray:
-        """Return the states ``(n, d)`` of all agents: the error observation layer."""
-        fractions = self._speeds[None] / self.settings.top_speed
-        view = ChainView(self._places()[None], self._angles[None], fractions, self._goal, before)
+        """Return the states ``(n, d)`` of all agents."""
+        fractions = self._speeds[:, None] / self.settings.top_speed
+        places = self._places()[:, None]
+        view = ChainView(places, self._angles[:, None], fractions, self._goal, before)
         return self._states.of_joints(view, 0, len(self.agents))[:, 0]
 
 
 class ChainEnvironments(StackedEnvironments[KinematicChain]):
-    """Many arms of as many joints, none of which fails."""
+    """Many arms with the same number of joints and without failures."""
 
     def allocate(self, scenario: KinematicChain, count: int) -> None:
         """Allocate the state of all environments."""
@@ -228,16 +226,16 @@ class ChainEnvironments(StackedEnvironments[KinematicChain]):
         self._angles: FloatArray = np.zeros((count, n))
         self._speeds: FloatArray = np.zeros((count, n))
         self._goals: FloatArray = np.zeros((count, 2))
-        self._before: FloatArray = np.zeros(count)
-        self._done = np.zeros(count, dtype=np.int64)
+        self._distance: FloatArray = np.zeros(count)
+        self._steps = np.zeros(count, dtype=np.int64)
 
     def store(self, index: int, scenario: KinematicChain) -> None:
         """Copy an arm and its goal into an environment."""
         self._angles[index] = scenario._angles
         self._speeds[index] = 0.0
         self._goals[index] = scenario._goal
-        self._before[index] = scenario._distance()
-        self._done[index] = 0
+        self._distance[index] = scenario._distance()
+        self._steps[index] = 0
 
     def step(self, joint_actions: IntArray) -> Transitions:
         """Turn all joints of all arms for one decision period."""
@@ -246,45 +244,47 @@ class ChainEnvironments(StackedEnvironments[KinematicChain]):
         unit = settings.speed_increment * arm._limits
         self._speeds = arm.action_set.apply(self._speeds, joint_actions, unit, arm._limits)
         turned = self._angles + PERIOD * self._speeds
-        self._angles = np.clip(turned, -arm._most, arm._most)
-        self._done += 1
-        places = postures_of(self._angles, arm.length)
-        fractions = self._speeds / settings.top_speed
-        rows = arm._states.rows
-        states = observe_worlds(places, self._angles, fractions, self._goals, self._before, rows)
-        away = np.hypot(*(self._goals - places[:, -1]).T)
-        rewards = arm._reward(away, self._before - away)
-        self._before = away
-        reached = away < settings.tolerance
-        late = ~reached & (self._done >= settings.most_decisions)
-        paid = np.broadcast_to(rewards[:, None], joint_actions.shape)
-        return Transitions(states, paid, reached, late)
+        self._angles = np.clip(turned, -arm._max_angles, arm._max_angles)
+        self._steps += 1
+        view = ChainView(
+            places=forward_kinematics(self._angles.T, arm.length),
+            angles=self._angles.T,
+            speeds=self._speeds.T / settings.top_speed,
+            goal=self._goals,
+            previous_distance=self._distance,
+        )
+        states = arm._states.of_joints(view, 0, self._angles.shape[1]).transpose(1, 0, 2)
+        rewards = arm._reward(view.distance, view.approach)
+        self._distance = view.distance.copy()
+        terminated = view.distance < settings.tolerance
+        truncated = ~terminated & (self._steps >= settings.most_decisions)
+        rewards_by_agent = np.broadcast_to(rewards[:, None], joint_actions.shape)
+        return Transitions(np.ascontiguousarray(states), rewards_by_agent, terminated, truncated)
 
 
 class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
-    """What joint actions lead to: exactly if joints do what they are believed to do.
+    """Outcomes of joint actions, exact if the assumed effects of the joints are.
 
-    A decision turns every joint by its speed times the period, or up to its limit. What each of
-    its actions would turn it by is computed once; a joint action is then one posture. The
-    prediction knows rewards and serves self-models, every joint being a body.
+    A decision turns each joint by its speed times the period, or up to its limit. The turn of each
+    action of each joint is computed once; a joint action is then one posture.
 
     Parameters
     ----------
     arm
-        Whose joints turn.
+        The arm.
     effects
-        Per joint the ``(3, 2)`` effect of its speed that is believed in.
+        Assumed effect ``(3, 2)`` of the speed of each joint.
     angles, speeds
-        ``(n,)`` the posture [rad] and the commanded speeds [rad/s] from which it is predicted.
+        ``(n,)`` present posture [rad] and commanded speeds [rad/s].
     before
-        Distance of the tip from the goal in that posture [m].
+        Present distance of the tip from the goal [m].
 
     Attributes
     ----------
     speeds
         ``(n, A)`` speed that each action of each joint commands [rad/s].
     turns
-        ``(n, A)`` by how much it turns the joint [rad].
+        ``(n, A)`` turn of the joint by that action [rad].
     """
 
     def __init__(
@@ -306,16 +306,19 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         every = np.arange(len(arm.action_set))[:, None].repeat(len(angles), axis=1)
         unit = arm.settings.speed_increment * arm._limits
         commanded = arm.action_set.apply(speeds, every, unit, arm._limits)
-        after = np.clip(angles + PERIOD * (gains * commanded + offsets), -arm._most, arm._most)
+        after = np.clip(
+            angles + PERIOD * (gains * commanded + offsets), -arm._max_angles, arm._max_angles
+        )
         self.speeds = np.ascontiguousarray(commanded.T)
         self.turns = np.ascontiguousarray((after - angles).T)
         self._fractions = self.speeds / arm.settings.top_speed
 
     def view_after(self, joint_actions: IntArray) -> ChainView:
-        """Return the situations after joint actions ``(m, n)``."""
-        angles = self.angles + self.turns[self._joints, joint_actions]
-        places = postures_of(angles, self.arm.length)
-        speeds = self._fractions[self._joints, joint_actions]
+        """Return the arm after joint actions ``(m, n)``."""
+        actions = joint_actions.T
+        angles = self.angles[:, None] + np.take_along_axis(self.turns, actions, axis=1)
+        places = forward_kinematics(angles, self.arm.length)
+        speeds = np.take_along_axis(self._fractions, actions, axis=1)
         return ChainView(places, angles, speeds, self.goal, self.before)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -333,15 +336,15 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         return self.arm._reward(view.distance, view.approach)
 
     def after(self, joint_action: IntArray) -> ChainPrediction:
-        """Return the prediction from where a joint action ``(n,)`` leads in one decision."""
-        reached = self.view_after(joint_action[None])
+        """Return the prediction from the state after a joint action ``(n,)``."""
+        view = self.view_after(joint_action[None])
         speeds = self.commands(joint_action)
-        before = float(reached.distance[0])
-        return ChainPrediction(self.arm, self.effects, reached.angles[0], speeds, before)
+        before = float(view.distance[0])
+        return ChainPrediction(self.arm, self.effects, view.angles[:, 0], speeds, before)
 
     @cached_property
     def alike(self) -> IntArray:
-        """The first action of each joint that comes to the same ``(n, A)``."""
+        """First action of each joint with the same effect ``(n, A)``."""
         return first_alike(self.speeds)
 
     def best_responses(self, rules: RuleBase) -> Responses | None:
@@ -349,13 +352,13 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
 
         None if values are no sums over the default variables.
         """
-        simple = self.arm.settings.state_space == SIMPLE and rules.compact
+        simple = self.arm.settings.state_space == SIMPLE and rules.is_triangular
         alone = len(rules.terms) == len(rules.partitions)
         alone = alone and all(len(term) == 1 for term in rules.terms)
         return partial(self._respond, rules) if simple and alone else None
 
     def _respond(self, rules: RuleBase, search: Search) -> IntArray:
-        plan = search.begun()
+        plan = search.initial_joint_action()
         speed, *others = rules.partitions
         cuts = np.cumsum(rules.sizes)[:-1]
         of_speed, of_bearing, *common = np.split(search.pooled.weights[0], cuts, axis=1)
@@ -372,7 +375,7 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
             distances,
             approaches,
         )
-        places = ends_of(self.angles + self.turns[self._joints, plan], self.arm.length)
+        places = forward_kinematics(self.angles + self.turns[self._joints, plan], self.arm.length)
         order, exploring, rng = search.order, search.exploring, search.rng
         return respond(places, self.goal, self.before, plan, order, options, exploring, rng)
 
@@ -381,5 +384,5 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         return self.speeds[self._joints, joint_action]
 
     def slips(self, joint_action: IntArray) -> FloatArray:
-        """Return by how much contact changes the joints' motion ``(n, 3)``: not at all."""
+        """Return the change of the joints' motion by contact ``(n, 3)``, which is zero."""
         return np.zeros((len(self.angles), 3))

@@ -1,18 +1,17 @@
-"""Scripted controllers of a kinematic chain: what robotics would do, as controls of learning.
+"""Scripted controllers of a kinematic chain, as baselines from robotics.
 
-Both are evaluators, so that a spec can name them; they know the kinematics and the goal, and learn
-nothing::
+They are evaluators that a spec can name. They know the kinematics and the goal, and do not learn::
 
     [learner]
     kind = "frozen"
     decision.evaluator = "nested_agents.scenarios.kinematic_chain.scripted:DampedLeastSquares"
 
-Joints decide in the order of the hierarchy. Each finds by how much it should turn, given what those
-above it have decided, and takes the action that comes nearest to it.
+Joints decide in the order of the hierarchy. Each computes a turn, given the decisions of the joints
+above, and takes the action with the nearest turn.
 
 - `DampedLeastSquares` (Nakamura and Hanafusa 1986; Wampler 1986): with J the ``(2, k)`` Jacobian of
-  the k joints that are free and e what is left of the tip's error, the turns are
-  ``J' (J J' + damping^2)^-1 e``, slowed down until the fastest joint can follow.
+  the k free joints and e the remaining error of the tip, the turns are
+  ``J' (J J' + damping^2)^-1 e``, scaled down to the speed limit of the fastest joint.
 - `CyclicCoordinateDescent` (Wang and Chen 1991): each joint turns until the tip lies on the line
   from the joint to the goal.
 """
@@ -28,11 +27,11 @@ from ...core.evaluators.evaluator import DecisionProblem, Deliberation
 from ...core.interface.agents import Counts
 from ...core.numerics import FloatArray
 from .scenario import ChainPrediction
-from .variables import ends_of, jacobian_of
+from .variables import forward_kinematics, jacobian
 
 
 class _Scripted(ABC):
-    """What the two share: the action whose turn is nearest to the one that is wanted."""
+    """Base class: the action with the turn nearest to the desired one."""
 
     def __init__(self, settings: EvaluatorSettings, problem: DecisionProblem) -> None:
         self.settings = settings
@@ -40,30 +39,30 @@ class _Scripted(ABC):
         self.counts = Counts()
 
     def values(self, deliberation: Deliberation) -> FloatArray:
-        """Return the value ``(A,)`` of each action: how near its turn comes, negative.
+        """Return the value ``(A,)`` of each action, the negative distance from the desired turn.
 
         Raises
         ------
         ValueError
-            If the scenario is no kinematic chain.
+            If the scenario is not a kinematic chain.
         """
         prediction = deliberation.prediction
         agent = deliberation.agent
         if not isinstance(prediction, ChainPrediction):
             raise ValueError(
-                f"learner.decision.evaluator: {type(self).__name__} moves a kinematic-chain only"
+                f"learner.decision.evaluator: {type(self).__name__} needs a kinematic-chain"
             )
-        above = list(self.problem.hierarchy.above(agent))
+        above = list(self.problem.hierarchy.senders(agent))
         turns = np.zeros(len(prediction.angles))
         turns[above] = prediction.turns[above, deliberation.joint_action[above]]
-        places = ends_of(prediction.angles + turns, prediction.arm.length)
-        return -np.abs(prediction.turns[agent] - self._wanted(prediction, agent, places))
+        places = forward_kinematics(prediction.angles + turns, prediction.arm.length)
+        return -np.abs(prediction.turns[agent] - self._desired_turn(prediction, agent, places))
 
     @abstractmethod
-    def _wanted(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
-        """Return the turn that is wanted of a joint [rad].
+    def _desired_turn(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
+        """Return the desired turn of a joint [rad].
 
-        `places` are the joints and the tip ``(n + 1, 2)`` once those above have turned.
+        `places` are the joints and the tip ``(n + 1, 2)`` after the turns of the joints above.
         """
 
 
@@ -74,19 +73,19 @@ class DampedLeastSquares(_Scripted):
         """The settings of the controller."""
 
         damping: Annotated[float, Field(gt=0)] = 0.05
-        """In metres per radian: large where the arm is stretched and joints would race."""
+        """Damping [m/rad], which limits turns of a stretched arm."""
 
     settings: Settings
 
-    def _wanted(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
-        above = list(self.problem.hierarchy.above(agent))
+    def _desired_turn(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
+        above = list(self.problem.hierarchy.senders(agent))
         least = prediction.turns.min(axis=1)
         most = prediction.turns.max(axis=1)
         free = most > least
         free[above] = False
         if not free[agent]:
             return 0.0
-        moves = jacobian_of(places)
+        moves = jacobian(places)
         drift = np.where(free, 0.0, prediction.turns.mean(axis=1))
         drift[above] = 0.0
         error = prediction.goal - places[-1] - drift @ moves
@@ -99,12 +98,12 @@ class DampedLeastSquares(_Scripted):
 
 
 class CyclicCoordinateDescent(_Scripted):
-    """Turns one joint after the other towards the goal, as if the others stood still."""
+    """Turns one joint after another so that the tip points at the goal."""
 
     class Settings(EvaluatorSettings):
-        """The settings of the controller: there is nothing to set."""
+        """The settings of the controller, which has none."""
 
-    def _wanted(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
+    def _desired_turn(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
         x, y = places[-1] - places[agent]
         ahead, aside = prediction.goal - places[agent]
         return float(np.arctan2(x * aside - y * ahead, x * ahead + y * aside))

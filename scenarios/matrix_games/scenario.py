@@ -1,26 +1,25 @@
-"""Matrix games: a step is a play, and nothing but the joint action matters.
+"""Repeated matrix games, in which a step is one play.
 
-An agent's state is what it knows of the last play: the actions of all agents, its
-own alone, or its own and those of the agents listed before it. Membership functions stand at the
-actions, so that a rule base of full order is a table with one value for each of these combinations.
-
-Plays are independent: payoff and next state depend on the joint action alone.
+The payoff and the next state depend on the joint action only. The state of an agent holds the last
+actions of all agents, its own action, or its own and those of the agents listed before it.
+Membership functions are centered at the actions, so that a rule base of full order is a table with
+one value for each combination of actions.
 
 The games are those of Claus and Boutilier (1998) and of Kapetanakis and Kudenko (2002). All agents
-receive the same payoff, and must find the joint action of the greatest expected one. Actions are
-called a, b, c. Rows are the first agent's actions, columns the second one's::
+receive the same payoff and must find the joint action with the maximum expected payoff. Rows are
+the actions of the first agent, columns those of the second::
 
     climbing    a    b    c        penalty     a    b    c
            a   11  -30    0               a   10    0    k
            b  -30    7    6               b    0    2    0
            c    0    0    5               c    k    0   10
 
-Climbing punishes him who plays his part of the optimum, (a, a), while the other does not yet. The
-penalty game has two optima, which must not be mixed up. In the stochastic games a joint action pays
-one of two amounts, with equal probability; their means are those of climbing.
+Climbing punishes an agent that plays its part of the optimum (a, a) alone. The penalty game has two
+optima, which must not be mixed. In the stochastic games, a joint action pays one of two amounts
+with equal probability, with the same means as in climbing.
 
-For three agents there is no game in these papers. Ours pays the least of what each pair of agents,
-in their order, would be paid in climbing: 11 if all play a, 7 if all play b, 5 if all play c.
+The game for three agents is not from these papers. It pays the minimum of climbing over all pairs
+of agents: 11 if all play a, 7 if all play b, 5 if all play c.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.words import closest
 
-OF_OPTIMA = (
+OPTIMALITY = (
     Measure(SUCCESS.name, SUCCESS.title, source="optimal", better="higher", is_rate=True),
     Measure(
         "optimal_plays",
@@ -55,7 +54,7 @@ OF_OPTIMA = (
         greatest=1.0,
     ),
 )
-"""What is measured of any game: success is that the last play of an episode was optimal."""
+"""Measures of every game. An episode is a success if its last play is optimal."""
 CLIMBING = ((11, -30, 0), (-30, 7, 6), (0, 0, 5))
 PARTIALLY_STOCHASTIC = ((11, -30, 0), (-30, (14, 0), 6), (0, 0, 5))
 STOCHASTIC = (
@@ -69,12 +68,12 @@ def payoffs_of(game: str) -> FloatArray:
     Parameters
     ----------
     game
-        A name in `GAMES`; ``"penalty:k"`` with a number k.
+        A name in `GAMES`, or ``"penalty:k"`` with a number k.
 
     Raises
     ------
     ValueError
-        If there is no such game, or k is no finite number; one line.
+        If the game is unknown, or k is not a finite number.
 
     Examples
     --------
@@ -89,10 +88,10 @@ def payoffs_of(game: str) -> FloatArray:
     return GAMES[name](argument)
 
 
-def of_two(table: Sequence[Sequence[float | tuple[float, float]]]) -> FloatArray:
-    """Return the payoffs ``(2, A, A)`` of a table whose entries are a number, or two.
+def payoff_pairs(table: Sequence[Sequence[float | tuple[float, float]]]) -> FloatArray:
+    """Return the payoffs ``(2, A, A)`` of a table of numbers, or of pairs of numbers.
 
-    >>> of_two([[1, (0, 4)], [0, 3]]).mean(axis=0).tolist()
+    >>> payoff_pairs([[1, (0, 4)], [0, 3]]).mean(axis=0).tolist()
     [[1.0, 2.0], [0.0, 3.0]]
     """
     pairs = [[e if isinstance(e, tuple) else (e, e) for e in row] for row in table]
@@ -100,7 +99,7 @@ def of_two(table: Sequence[Sequence[float | tuple[float, float]]]) -> FloatArray
 
 
 def optimal(payoffs: FloatArray) -> FloatArray:
-    """Return which joint actions ``(A, ..., A)`` have the greatest expected payoff, as 0 or 1."""
+    """Return 1 for joint actions ``(A, ..., A)`` with the maximum expected payoff, else 0."""
     expected = payoffs.mean(axis=0)
     return (expected == expected.max()).astype(float)
 
@@ -112,7 +111,7 @@ def _penalty(argument: str) -> FloatArray:
         raise ValueError(f"K = {argument!r}: must be a number") from None
     if not isfinite(k):
         raise ValueError(f"K = {argument}: must be finite")
-    return of_two([[10, 0, k], [0, 2, 0], [k, 0, 10]])
+    return payoff_pairs([[10, 0, k], [0, 2, 0], [k, 0, 10]])
 
 
 def _three(argument: str) -> FloatArray:
@@ -123,17 +122,17 @@ def _three(argument: str) -> FloatArray:
 
 
 GAMES: dict[str, Callable[[str], FloatArray]] = {
-    "climbing": lambda _: of_two(CLIMBING),
+    "climbing": lambda _: payoff_pairs(CLIMBING),
     "penalty": _penalty,
-    "partially-stochastic-climbing": lambda _: of_two(PARTIALLY_STOCHASTIC),
-    "stochastic-climbing": lambda _: of_two(STOCHASTIC),
+    "partially-stochastic-climbing": lambda _: payoff_pairs(PARTIALLY_STOCHASTIC),
+    "stochastic-climbing": lambda _: payoff_pairs(STOCHASTIC),
     "three-agents": _three,
 }
-"""Payoffs by name, given what follows the name."""
+"""Functions that return the payoffs, given the text after the colon, by name."""
 
 
-MOST_ACTIONS = 26
-"""Actions of an agent, which are called by letters."""
+MAX_ACTIONS = 26
+"""Maximum number of actions, which are named by letters."""
 
 
 def _known(game: str) -> str:
@@ -141,27 +140,27 @@ def _known(game: str) -> str:
     return game
 
 
-Row = Annotated[tuple[float, ...], Field(min_length=2, max_length=MOST_ACTIONS)]
+Row = Annotated[tuple[float, ...], Field(min_length=2, max_length=MAX_ACTIONS)]
 
 
 class MatrixGameSettings(ScenarioSettings):
-    """A matrix game, played again and again."""
+    """A repeated matrix game."""
 
     kind: Literal["matrix-game"] = "matrix-game"
     game: Annotated[str, AfterValidator(_known)] = "climbing"
     """``climbing``, ``penalty:K`` with a number K, ``partially-stochastic-climbing``,
     ``stochastic-climbing`` or ``three-agents``."""
-    payoffs: Annotated[tuple[Row, ...], Field(min_length=2, max_length=MOST_ACTIONS)] | None = None
-    """A game of one's own for two agents, in place of `game`: a square table of payoffs."""
+    payoffs: Annotated[tuple[Row, ...], Field(min_length=2, max_length=MAX_ACTIONS)] | None = None
+    """Square table of payoffs of another game for two agents, instead of `game`."""
     observed: Literal["joint", "own", "above"] = "joint"
-    """Whose actions an agent's state holds: those of all, its own, or its own and those of agents
-    listed before it."""
+    """Actions in the state of an agent: those of all agents, its own, or its own and those of the
+    agents listed before it."""
 
     factory: ClassVar[str] = f"{__name__}:MatrixGame"
 
 
 class MatrixGame(Scenario, Prediction):
-    """A matrix game, and its own prediction.
+    """A matrix game, which is also its own prediction.
 
     Parameters
     ----------
@@ -171,7 +170,7 @@ class MatrixGame(Scenario, Prediction):
     Raises
     ------
     ValueError
-        If a table of payoffs is not square.
+        If the table of payoffs is not square.
 
     Examples
     --------
@@ -181,7 +180,7 @@ class MatrixGame(Scenario, Prediction):
     (11.0, -30.0)
     """
 
-    measures = (*OF_OPTIMA, Measure("payoff", "mean payoff", gathering="mean", better="higher"))
+    measures = (*OPTIMALITY, Measure("payoff", "mean payoff", gathering="mean", better="higher"))
 
     def __init__(self, settings: MatrixGameSettings) -> None:
         table = settings.payoffs
@@ -190,8 +189,8 @@ class MatrixGame(Scenario, Prediction):
             raise ValueError(
                 f"scenario.payoffs: {len(table)} rows of {lengths} numbers, must be square"
             )
-        self.payoffs = payoffs_of(settings.game) if table is None else of_two(table)
-        """``(2, A, ..., A)`` two equally probable payoffs of every joint action."""
+        self.payoffs = payoffs_of(settings.game) if table is None else payoff_pairs(table)
+        """Two equally probable payoffs of every joint action ``(2, A, ..., A)``."""
         self.optimal = optimal(self.payoffs)
         self.is_stochastic = bool((self.payoffs[0] != self.payoffs[1]).any())
         n = self.payoffs.ndim - 1
@@ -202,10 +201,10 @@ class MatrixGame(Scenario, Prediction):
         self.observed = settings.observed
         self.state_space = _state_space(self.agents, names, settings.observed)
         self.rng = np.random.default_rng(0)
-        """What a play pays is drawn from it."""
+        """Generator of the payoffs."""
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
-        """Begin after a random joint action."""
+        """Start an episode after a random joint action."""
         self.rng = np.random.default_rng(seed)
         before = self.rng.integers(0, len(self.action_set), size=len(self.agents))
         return self.states_after(before)
@@ -218,7 +217,7 @@ class MatrixGame(Scenario, Prediction):
         return Transition(self.states_after(joint_action), payoff, False, False, info)
 
     def predict(self) -> MatrixGame:
-        """Return this game: what joint actions lead to is the same at every play."""
+        """Return this game, because predictions are the same in every play."""
         return self
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -226,15 +225,15 @@ class MatrixGame(Scenario, Prediction):
         return self.states_after(joint_actions)[:, agent]
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
-        """Return the expected payoffs ``(m,)`` of joint actions ``(m, n)``; for planners."""
+        """Return the expected payoffs ``(m,)`` of joint actions ``(m, n)``."""
         return self.payoffs.mean(axis=0)[tuple(joint_actions.T)]
 
     def with_exact_prediction(self) -> MatrixGame:
-        """Return this game: its predictions are exact."""
+        """Return this game, because its predictions are exact."""
         return self
 
     def environments(self, count: int) -> MatrixGameEnvironments:
-        """Return many environments, stepped in one call."""
+        """Return many environments that are stepped in one call."""
         return MatrixGameEnvironments(self, count)
 
     def states_after(self, joint_actions: IntArray) -> FloatArray:
@@ -258,7 +257,7 @@ class MatrixGameEnvironments(StackedEnvironments[MatrixGame]):
         self._generators = [scenario.rng] * count
 
     def store(self, index: int, scenario: MatrixGame) -> None:
-        """Keep the generator that draws the payoffs of an environment."""
+        """Store the generator of the payoffs of an environment."""
         self._generators[index] = scenario.rng
 
     def step(self, joint_actions: IntArray) -> Transitions:
@@ -268,8 +267,8 @@ class MatrixGameEnvironments(StackedEnvironments[MatrixGame]):
             drawn[:] = [generator.integers(0, 2) for generator in self._generators]
         payoffs = self.scenario.payoffs[(drawn, *joint_actions.T)]
         never = np.zeros(self.count, dtype=bool)
-        paid = np.broadcast_to(payoffs[:, None], joint_actions.shape)
-        return Transitions(self.scenario.states_after(joint_actions), paid, never, never)
+        rewards = np.broadcast_to(payoffs[:, None], joint_actions.shape)
+        return Transitions(self.scenario.states_after(joint_actions), rewards, never, never)
 
 
 def _state_space(

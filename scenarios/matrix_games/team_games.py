@@ -1,18 +1,15 @@
-"""Games of many agents: a step is a play, for which all are paid alike.
+"""Repeated games of many agents with a joint payoff, in which a step is one play.
 
-There are three:
+- *polymatrix*: agents are nodes of a graph. The payoff of an edge depends on the actions of its two
+  agents and is drawn uniformly from 0 to 1; the joint payoff is the mean over edges. Variable
+  elimination finds the optimum.
+- *permutation* (Fu et al. 2022): n agents have n actions, and receive 1 if all actions differ.
+- *landmarks*: n agents and n landmarks have random positions in a square, new in every play. Each
+  agent chooses a landmark. The payoff is the fraction of chosen landmarks minus `distance_cost`
+  times the mean distance. An agent observes its distances from the landmarks only.
 
-- *polymatrix*: agents stand in a graph, and every edge pays by the actions of its two agents; all
-  are paid the mean. The payoffs of an edge are drawn evenly from 0 to 1. The best joint action is
-  found by variable elimination.
-- *permutation* (Fu et al. 2022): n agents have n actions, and are paid 1 if no two do the same.
-- *landmarks*: n agents and n landmarks are at random places of a square, new at every play. All
-  choose a landmark, and are paid for the share of landmarks that somebody has chosen, less
-  `distance_cost` times the mean distance. An agent sees how far it is from every landmark, and
-  nothing of the others.
-
-Of polymatrix and permutation an agent sees nothing, or which one it is. Agents are of one role, so
-that those who share weights can act differently only by what they see and are told.
+In polymatrix and permutation games an agent observes nothing, or its number. All agents have the
+same role, so agents that share weights can act differently only by observation and communication.
 """
 
 from __future__ import annotations
@@ -32,50 +29,50 @@ from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings
-from .scenario import OF_OPTIMA
+from .scenario import OPTIMALITY
 
 SHARE_OF_BEST = Measure(
     "share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0
 )
 Entropy = int | Sequence[int] | None
-"""Of a seed."""
+"""Entropy of a seed."""
 PLAY = Variable("play", "1", 0.0, 1.0, centres=(0.0, 1.0))
-"""What those see who see nothing: 0 always."""
+"""Constant observation of agents that observe nothing."""
 
 
 class TeamGameSettings(ScenarioSettings):
-    """A game of many agents who are paid alike, played again and again."""
+    """A repeated game of many agents with a joint payoff."""
 
     kind: Literal["team-game"] = "team-game"
     factory: ClassVar[str] = f"{__name__}:TeamGame"
     game: Literal["polymatrix", "permutation", "landmarks"] = "polymatrix"
-    """Which game is played, see `nested_agents.scenarios.matrix_games.team_games`."""
+    """The game, see `nested_agents.scenarios.matrix_games.team_games`."""
     players: Annotated[int, Field(ge=2, le=64)] = 8
     """Number of agents."""
     actions: Annotated[int, Field(ge=2, le=26)] = 3
-    """Actions of an agent in a polymatrix game; in others there are as many as agents."""
+    """Number of actions in a polymatrix game; in others it is the number of agents."""
     shape: Shape = "ring"
-    """Who plays with whom in a polymatrix game, as of the topology ``coordination-graph``."""
+    """Graph of a polymatrix game, as in the topology ``coordination-graph``."""
     seed: Annotated[int, Field(ge=0)] | None = None
-    """Of what a polymatrix game pays; none: that of the trial, so that every seed of a study plays
-    a game of its own."""
+    """Seed of the payoffs of a polymatrix game. By default that of the trial, so that every seed
+    of a study plays another game."""
     numbered: bool = False
-    """Whether agents see which one they are."""
+    """Whether agents observe their number."""
     distance_cost: NonNegative = 0.5
-    """What a landmark at a distance of 1, the side of the square, costs."""
+    """Cost of a distance of 1, the side of the square."""
 
 
 class Game(ABC):
-    """What is paid for a joint action, and what it could be at best.
+    """Payoffs of joint actions, and the maximum payoff.
 
     Parameters
     ----------
     states
-        What the agents see ``(n, d)``.
+        Observations of the agents ``(n, d)``.
     """
 
     best = 1.0
-    """The greatest payoff."""
+    """Maximum payoff."""
 
     def __init__(self, states: FloatArray) -> None:
         self.states = states
@@ -84,20 +81,20 @@ class Game(ABC):
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
         """Return the payoffs ``(m,)`` of joint actions ``(m, n)``."""
 
-    def payoffs_of_worlds(self, states: FloatArray, joint_actions: IntArray) -> FloatArray:
-        """Return the payoffs ``(W,)`` of joint actions ``(W, n)`` in worlds of these states."""
+    def payoffs_in(self, states: FloatArray, joint_actions: IntArray) -> FloatArray:
+        """Return the payoffs ``(W,)`` of joint actions ``(W, n)`` in environments with states."""
         return self.payoffs(joint_actions)
 
     def is_optimal(self, joint_action: IntArray) -> bool:
-        """Return whether nothing pays more, but for rounding."""
+        """Return whether a joint action has the maximum payoff, except for rounding."""
         return bool(self.payoffs(joint_action[None])[0] >= self.best - 1e-12)
 
     def advance(self, rng: np.random.Generator) -> None:  # noqa: B027 - most games do not change
-        """Go on to the next play, which is the same game."""
+        """Prepare the next play."""
 
 
 class Polymatrix(Game):
-    """A sum of tables, one for each edge of a graph.
+    """Mean of payoff tables, one for each edge of a graph.
 
     Examples
     --------
@@ -115,14 +112,14 @@ class Polymatrix(Game):
         self.best = float(self.payoffs(optimum[None])[0])
 
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
-        """Return the mean over the edges."""
+        """Return the mean payoff over the edges."""
         edges = np.arange(len(self._tables))
         both = joint_actions[:, self._first], joint_actions[:, self._second]
         return self._tables[edges, *both].mean(axis=1)
 
 
 class Permutation(Game):
-    """A game that pays 1 if no two agents do the same."""
+    """Game that pays 1 if all actions differ."""
 
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
         """Return 1 or 0."""
@@ -130,10 +127,10 @@ class Permutation(Game):
 
 
 class Landmarks(Game):
-    """A game that pays for landmarks that are taken, and less for far ones.
+    """Game that pays for chosen landmarks and charges for distances.
 
-    Two agents at one landmark leave another free, which costs more than any way to it as long as
-    `cost` times the diagonal is below 1: then the best is a permutation.
+    While `cost` times the diagonal is below 1, a free landmark costs more than any distance, so
+    that the optimum is a permutation.
     """
 
     def __init__(self, players: int, cost: float) -> None:
@@ -141,10 +138,10 @@ class Landmarks(Game):
         self._cost = cost
 
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
-        """Return the share of landmarks that are taken, less the cost of the mean distance."""
-        return self.payoffs_of_worlds(self.states[None], joint_actions)
+        """Return the fraction of chosen landmarks minus the cost of the mean distance."""
+        return self.payoffs_in(self.states[None], joint_actions)
 
-    def payoffs_of_worlds(self, states: FloatArray, joint_actions: IntArray) -> FloatArray:
+    def payoffs_in(self, states: FloatArray, joint_actions: IntArray) -> FloatArray:
         """Return the payoffs ``(W,)`` of joint actions ``(W, n)`` by distances ``(W, n, ...)``."""
         n = joint_actions.shape[1]
         rows = np.arange(len(states))[:, None]
@@ -152,24 +149,24 @@ class Landmarks(Game):
         return distinct(joint_actions) / n - self._cost * far
 
     def is_optimal(self, joint_action: IntArray) -> bool:
-        """Return whether every landmark is taken, by whomever."""
+        """Return whether every landmark is chosen."""
         return len(set(joint_action.tolist())) == len(joint_action)
 
     def advance(self, rng: np.random.Generator) -> None:
-        """Draw other places, and find the assignment of least distance."""
+        """Draw new positions, and find the assignment with the minimum distance."""
         self.states = self.drawn([rng.random((2, len(self.states), 2))])[0]
         assigned = optimize.linear_sum_assignment(self.states)[1]
         self.best = float(self.payoffs(assigned[None])[0])
 
     @staticmethod
     def drawn(draws: Sequence[FloatArray]) -> FloatArray:
-        """Return the distances ``(W, n, n)`` of agents from landmarks at places ``(2, n, 2)``."""
+        """Return distances ``(W, n, n)`` of agents from landmarks for positions ``(2, n, 2)``."""
         agents, landmarks = np.moveaxis(np.stack(draws), 1, 0)
         return np.linalg.norm(agents[:, :, None] - landmarks[:, None], axis=3)
 
 
 def distinct(joint_actions: IntArray) -> IntArray:
-    """Return how many different actions there are in each joint action, ``(m,)``.
+    """Return the number of different actions in each joint action ``(m,)``.
 
     >>> distinct(np.array([[0, 1, 2], [1, 1, 0]])).tolist()
     [3, 2]
@@ -178,7 +175,7 @@ def distinct(joint_actions: IntArray) -> IntArray:
 
 
 class TeamGame(Scenario):
-    """A game of many agents, which is not predicted.
+    """A game of many agents without predictions.
 
     Parameters
     ----------
@@ -193,7 +190,7 @@ class TeamGame(Scenario):
     (1.0, 0.0)
     """
 
-    measures = (*OF_OPTIMA, SHARE_OF_BEST)
+    measures = (*OPTIMALITY, SHARE_OF_BEST)
 
     def __init__(self, settings: TeamGameSettings) -> None:
         self.settings = settings
@@ -203,11 +200,11 @@ class TeamGame(Scenario):
         k = settings.actions if settings.game == "polymatrix" else n
         names = tuple(f"a{action + 1}" for action in range(k))
         self.action_set = ActionSet(names, (0.0,) * k, (0.0,) * k, neutral=0)
-        seen: tuple[Variable, ...] = (PLAY,)
+        observed: tuple[Variable, ...] = (PLAY,)
         if settings.game == "landmarks":
-            seen = tuple(Variable(f"distance{j + 1}", "1", 0.0, 1.0) for j in range(n))
+            observed = tuple(Variable(f"distance{j + 1}", "1", 0.0, 1.0) for j in range(n))
         number = (choice("number", self.agents),) if settings.numbered else ()
-        self.state_space = StateSpace(settings.game, (*seen, *number))
+        self.state_space = StateSpace(settings.game, (*observed, *number))
         is_sparse = settings.game == "polymatrix"
         edges = build_shape(settings.shape, n) if is_sparse else nx.complete_graph(n)
         self._edges: list[tuple[int, int]] = sorted(tuple(sorted(edge)) for edge in edges.edges)
@@ -217,7 +214,7 @@ class TeamGame(Scenario):
         TeamGame.reset(self, 0)
 
     def _of_seed(self, seed: Entropy) -> Game:
-        """Return the game that is played; only a polymatrix game depends on the seed."""
+        """Return the game of a seed, on which only polymatrix games depend."""
         s = self.settings
         if s.game == "permutation":
             return Permutation(np.zeros((s.players, 1)))
@@ -228,7 +225,7 @@ class TeamGame(Scenario):
         return Polymatrix(edges, rng.random((len(edges), s.actions, s.actions)))
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
-        """Begin with the first play."""
+        """Start an episode."""
         entropy = seed.entropy if isinstance(seed, np.random.SeedSequence) else seed
         if entropy != self._drawn:
             self.game = self._of_seed(entropy)
@@ -248,7 +245,7 @@ class TeamGame(Scenario):
         return Transition(self._states(), payoff, False, False, info)
 
     def environments(self, count: int) -> TeamGameEnvironments:
-        """Return many environments, stepped in one call."""
+        """Return many environments that are stepped in one call."""
         return TeamGameEnvironments(self, count)
 
     def _states(self) -> FloatArray:
@@ -256,7 +253,7 @@ class TeamGame(Scenario):
 
 
 class TeamGameEnvironments(StackedEnvironments[TeamGame]):
-    """Many environments of one game; all seeds that begin their episodes are of one trial."""
+    """Many environments of one game, within one trial."""
 
     def allocate(self, scenario: TeamGame, count: int) -> None:
         """Allocate the state of all environments."""
@@ -264,18 +261,18 @@ class TeamGameEnvironments(StackedEnvironments[TeamGame]):
         self._states = np.stack([scenario._states()] * count)
 
     def store(self, index: int, scenario: TeamGame) -> None:
-        """Keep the generator of an environment and its first states."""
+        """Store the generator and the initial states of an environment."""
         self._generators[index] = scenario._rng
         self._states[index] = scenario._states()
 
     def step(self, joint_actions: IntArray) -> Transitions:
         """Play once in every environment."""
         game = self.scenario.game
-        payoffs = game.payoffs_of_worlds(self._states, joint_actions)
+        payoffs = game.payoffs_in(self._states, joint_actions)
         if isinstance(game, Landmarks):
             n = joint_actions.shape[1]
             self._states = self._states.copy()
             self._states[:, :, :n] = game.drawn([g.random((2, n, 2)) for g in self._generators])
         never = np.zeros(self.count, dtype=bool)
-        paid = np.broadcast_to(payoffs[:, None], joint_actions.shape)
-        return Transitions(self._states, paid, never, never)
+        rewards = np.broadcast_to(payoffs[:, None], joint_actions.shape)
+        return Transitions(self._states, rewards, never, never)

@@ -1,1 +1,1 @@
-"""What Python users hold: a study that is run or loaded, asked, drawn, reported and planned."""
+"""Python interface: running, loading, analyzing, drawing, reporting and planning studies."""

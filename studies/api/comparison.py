@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.aggregates import Aggregates, aggregate
-from ..results.analysis import Difference
-from ..results.contrasts import Contrasts
+from ..results.comparison import ComparisonTable
+from ..results.differences import Difference
 from ..store import durable
 
 if TYPE_CHECKING:
@@ -23,25 +23,25 @@ if TYPE_CHECKING:
 class Comparison:
     """Conditions compared by one measure; printed or shown by a notebook, table and verdicts."""
 
-    contrasts: Contrasts
+    analysis: ComparisonTable
     """The analysis."""
     remarks: tuple[str, ...] = ()
-    """What must be said of the conditions, in lines."""
+    """Remarks on the conditions, line by line."""
 
     @cached_property
     def table(self) -> SummaryTable:
         """Estimates and differences, in all forms."""
-        return tabulate(self.contrasts.table)
+        return tabulate(self.analysis.table)
 
     @property
     def differences(self) -> tuple[Difference, ...]:
         """Every difference with its interval, and p raw and adjusted."""
-        return self.contrasts.differences
+        return self.analysis.differences
 
     @property
     def verdicts(self) -> tuple[str, ...]:
-        """What was found, and what could have been detected, line by line."""
-        return (*self.contrasts.notes, *self.remarks)
+        """Results and their power, line by line."""
+        return (*self.analysis.notes, *self.remarks)
 
     @cached_property
     def statistics(self) -> Aggregates:
@@ -52,7 +52,7 @@ class Comparison:
         SpecError
             If no two conditions have two seeds each.
         """
-        return aggregate(self.contrasts)
+        return aggregate(self.analysis)
 
     @cached_property
     def aggregated(self) -> SummaryTable:
@@ -86,10 +86,10 @@ class Comparison:
         check_path(file)
         notes = [*self.verdicts]
         figures: dict[str, Figure] = {}
-        if any(len(runs) > 1 for group in self.contrasts.groups for runs in group.values.values()):
+        if any(len(runs) > 1 for group in self.analysis.groups for runs in group.values.values()):
             notes += ["", str(self.aggregated), "", *self.statistics.notes]
             figures["runs"] = self.figure()
-        title = self.contrasts.title
+        title = self.analysis.title
         durable.write(file, comparison_page(title, sources, notes, self.table, figures).encode())
         return file
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..explain import team
 from ..explain.team import Explanation
-from ..explain.text import MOST_AGENTS, draw, text
+from ..explain.text import draw, summarize, text
 from ..store.store import Store
 from ..trials.keeping import finished_trial
 
@@ -19,25 +19,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TeamExplanation:
-    """What is known of a trained team; printed, as the command ``explain`` says it."""
+    """Explanation of a trained team; printed, it is the summary of the command ``explain``."""
 
     explanation: Explanation = field(repr=False)
-    """Its parts, as numbers."""
+    """The explanation as numbers."""
     folder: Path
-    """Where the command keeps it."""
+    """Folder in which the command writes it."""
 
     @property
     def text(self) -> str:
-        """All of it in words, every agent's rules."""
+        """The whole explanation in words, with the rules of all agents."""
         return text(self.explanation)
 
     @property
     def figures(self) -> dict[str, Figure]:
-        """Its figures by name."""
+        """Figures by name."""
         return draw(self.explanation)
 
     def __str__(self) -> str:
-        return text(self.explanation, MOST_AGENTS)
+        return "\n".join(summarize(self.explanation))
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"

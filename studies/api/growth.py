@@ -14,10 +14,8 @@ from ...core.plugins.words import expect, expect_each
 from ..cost.profile import search_method
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import scaling_law as laws_of_results
-from ..results.parts import join_sizes
+from ..results.joining import join_sizes
 from ..results.results import Results
-from ..spec.conditions import ConditionSettings
-from ..spec.spec import Spec
 from ..spec.tables import label_but
 from ..trials.arrangement import arrange
 from .study import StudyResults
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Growth:
-    """How a measure grows with size; printed or shown by a notebook, table and sentences."""
+    """Growth of a measure with size; printed, it is a table with sentences."""
 
     analysis: laws_of_results.ScalingLaw
     """The laws, group by group."""
@@ -40,7 +38,7 @@ class Growth:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Which laws were chosen, how they predicted what was left out, how exponents differ."""
+        """Chosen laws, their predictions of sizes that were left out, differences of exponents."""
         return self.analysis.notes
 
     def figure(self) -> Figure:
@@ -73,7 +71,7 @@ def scaling_law(
     Parameters
     ----------
     study
-        Loaded results, whose sizes are a swept key of numbers.
+        Loaded results with a swept key of numbers as the size.
     measure
         Of episodes, ``steps``, ``return`` or a number of whole trials, by name; by default the
         first, which is success, or the return where nothing is one.
@@ -84,8 +82,7 @@ def scaling_law(
     criterion
         Fit the decisions of training until this share of five episodes in a row succeeds.
     predict
-        Sizes to predict, beside those that were run: the mean of as many seeds, with its 90%
-        interval.
+        Further sizes to predict: the mean of as many seeds, with its 90% interval.
 
     Raises
     ------
@@ -105,15 +102,15 @@ def scaling_law(
 
 
 def _method_remarks(study: StudyResults, results: Results, size: str | None) -> tuple[str, ...]:
-    """Return a sentence for each group of conditions whose search method changes with the size.
+    """Return a sentence for each group of conditions in which the search method changes with size.
 
-    Methods are those of teams that are built for this; a study whose files are not trusted, or
-    that is known by its table alone, has none.
+    A team of each condition is built to find its method. A study with untrusted files, or one that
+    is known by its table alone, has no methods.
     """
     columns = laws_of_results.columns_of(results)
     key = laws_of_results.size_key(columns, size)
     groups: dict[str, list[tuple[float, str]]] = {}
-    for condition, settings in _condition_settings(study).items():
+    for condition, settings in study.condition_settings().items():
         if condition in columns:
             row = columns[condition]
             with study._sources.active(), suppress(ValueError, ImportError):
@@ -135,15 +132,3 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
             "several methods; learner.decision.evaluator sets one for all."
         )
     return tuple(remarks)
-
-
-def _condition_settings(study: StudyResults) -> dict[str, ConditionSettings]:
-    """Return the settings of each condition, as far as they can be read."""
-    settings: dict[str, ConditionSettings] = {}
-    with study._sources.active(), suppress(ValueError, KeyError, ImportError):
-        if not study._settings:
-            spec = Spec.of(study.outline.table, study._sources)
-            return {c.label: c.settings for c in spec.conditions()}
-        for condition, table in study._settings.items():
-            settings[condition] = ConditionSettings.model_validate(table)
-    return settings

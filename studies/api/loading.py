@@ -13,9 +13,8 @@ from ...core.plugins.words import closest, expect, expect_each
 from ..errors import SpecError, refused
 from ..results import exported, foreign, marl_eval, published
 from ..results.foreign import Better, ScoreColumns
+from ..results.joining import combine, join_parts
 from ..results.json_values import JsonValue, parse
-from ..results.parts import join_parts
-from ..results.results import combine
 from ..results.score_files import SUFFIXES, ScoreTable, read_table, table_of
 from ..spec.outline import StudyOutline
 from ..spec.tables import SpecTable, TomlTable
@@ -38,9 +37,9 @@ def load(*places: Place, columns: Sequence[str] = (), better: Better | None = No
         marl-eval, as BenchMARL and Mava write them, which are put together if no run is in two of
         them; or tables of scores of other tools: CSV, JSON lines, JSON or Parquet, see
         `nested_agents.studies.results.foreign`.
-        Parts of one study, whose specs differ in their seeds alone, are put together. Conditions
-        of several studies whose labels are equal get the name of their directory; the first study
-        says how all of them are analysed.
+        Parts of one study, with specs that differ only in their seeds, are joined. Conditions of
+        several studies with equal labels get the name of their directory. The first study
+        determines the analysis.
     columns
         Roles of the columns of tables of scores: ``"condition=model,seed=run,score=accuracy"``. By
         default a column has the role that it is called by.
@@ -91,7 +90,7 @@ def compare_table(
     reference: str | None = None,
     **columns: Unpack[RoleColumns],
 ) -> Comparison:
-    """Compare conditions whose scores are in a table, by any tool.
+    """Compare conditions by a table of scores of any tool.
 
     The command ``compare`` does the same. Runs and items are paired by name; a table without seeds
     and items holds independent samples.
@@ -149,7 +148,7 @@ def _roles(columns: RoleColumns) -> Roles:
 
 
 Opened = StudyResults | ScoreTable | list[marl_eval.AlgorithmRun]
-"""What a path holds: a study, a table, or runs of the form of marl-eval."""
+"""Content of a path: a study, a table, or runs in the form of marl-eval."""
 
 
 def _open(path: Path) -> Opened:
@@ -225,7 +224,7 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
 
 
 def _outline(conditions: Mapping[str, Mapping[str, object]]) -> StudyOutline:
-    """Return the outline of results whose spec is not known."""
+    """Return the outline of results without a known spec."""
     table = {"study": "learning-curve", "seeds": 1, "episodes": 0, "steps": 0, "evaluation": 1}
     return StudyOutline.noted(table, conditions)
 

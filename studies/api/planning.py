@@ -26,7 +26,8 @@ from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
 from ..results.laws import FEWEST
 from ..results.notation import format_number
-from ..results.power import SMALLEST, USUAL_DEVIATION, exponent_text, planned_text
+from ..results.power import SMALLEST, USUAL_DEVIATION
+from ..results.power_text import exponent_text, planned_text
 from ..results.scaling_law import size_key
 from ..spec.controls import LEARN_NOTHING
 from ..spec.outline import StudyOutline
@@ -87,9 +88,9 @@ class Plan:
     processes: int
     """Number of trials that run at a time."""
     seconds: float | None
-    """Time of the whole study if it goes on as the pilot episodes did [s]; None: no pilot."""
+    """Time of the whole study, extrapolated from pilot episodes [s]; None without a pilot."""
     range: tuple[float, float] | None
-    """Lower and upper bound of this time [s]; None: no pilot."""
+    """Lower and upper bound of this time [s]; None without a pilot."""
     memory: float | None
     """Approximate memory of all processes [bytes]; None: no pilot, or unknown on this system."""
     comparisons: int

@@ -1,4 +1,4 @@
-"""What faults cost any policy in any environment, and how it comes back: the recovery table.
+"""Recovery table: the cost of faults for any policy in any environment, and its recovery.
 
 A policy runs the same episodes twice, with the faults and without: same worlds, same random
 numbers. Returns are sums of rewards, of a parallel environment their mean over agents. Of `BLOCK`
@@ -30,10 +30,9 @@ from ..results.recovery import BLOCK, REGAINED, recovery
 from ..results.statistics import bootstrap, exactly, rate
 
 Data: TypeAlias = Any
-"""An observation, action or space of Gymnasium, whose types are the environment's own; by agent of
-a parallel environment."""
+"""Observation, action or space of Gymnasium; by agent for a parallel environment."""
 Environment: TypeAlias = Any
-"""Of Gymnasium, or of PettingZoo's parallel kind."""
+"""Environment of Gymnasium, or parallel environment of PettingZoo."""
 
 
 @runtime_checkable
@@ -46,7 +45,7 @@ class Model(Protocol):
 
 @runtime_checkable
 class Begins(Protocol):
-    """What is told when a run begins, with or without faults."""
+    """Policy that is notified when a run begins, with or without faults."""
 
     def begin(self, seed: int) -> None:
         """Start the random numbers of a run."""
@@ -54,15 +53,15 @@ class Begins(Protocol):
 
 @runtime_checkable
 class Observes(Protocol):
-    """What sees every step, and may learn."""
+    """Policy that observes every step and may learn."""
 
     def observe(self, reward: Data, observation: Data, terminated: Data, truncated: Data) -> None:
         """Take in what a step led to."""
 
 
 Policy: TypeAlias = Model | Begins | Observes | Callable[[Data], Data]
-"""What may act: a model, or a function of an observation, or of observations by agent, that returns
-the action. It may be one that `Begins` or `Observes`, too."""
+"""Policy: a model, or a function that returns the action for an observation, or for observations by
+agent. It may also be one that `Begins` or `Observes`."""
 
 
 class Wrapping(TypedDict, total=False):
@@ -115,7 +114,7 @@ class FaultCourse(NamedTuple):
 
     @property
     def shortfall(self) -> FloatArray:
-        """What the episodes from the onset on fall short of their like without fault."""
+        """Return of the same episodes without faults minus that with faults, from the onset on."""
         return np.asarray((self.healthy - self.faulty)[:, self.onset :])
 
     def recovery(self) -> tuple[FloatArray, FloatArray]:
@@ -147,7 +146,7 @@ class FaultCourse(NamedTuple):
 
 @dataclass(frozen=True)
 class RecoveryTable:
-    """What faults cost, policy by policy; printed or shown by a notebook."""
+    """Cost of faults by policy; printed or shown by a notebook."""
 
     courses: tuple[FaultCourse, ...]
     """The returns behind every line."""

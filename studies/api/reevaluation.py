@@ -12,7 +12,8 @@ from ...core.plugins.words import show
 from ..errors import SpecError
 from ..presentation.progress import Terminal
 from ..results.results import DONE, read
-from ..spec.spec import Spec, plain
+from ..spec.objects import plain
+from ..spec.spec import Spec
 from ..spec.tables import TomlTable, label
 from ..store.database import EVALUATION
 from ..store.durable import TEAM
@@ -39,7 +40,7 @@ def reevaluate(
 
     Every team acts with its weights on the worlds of its own evaluation, and begins with the random
     numbers that it began that one with: under what it was trained with, it does the same again.
-    Files of yours that the study keeps are taken as it keeps them.
+    User files are read from the copies that the study keeps.
 
     Parameters
     ----------
@@ -47,9 +48,9 @@ def reevaluate(
         What `load` or `run` returned, or a part of it by ``where``; or the directory of a study
         that keeps its teams (``keep_teams = true``).
     topology
-        Topologies, as a spec has them: text, or a table laid over that of training.
+        Topologies as in a spec: text, or a table that overrides that of training.
     decision
-        Tables laid over ``learner.decision`` of training. If both are given, each of these is
+        Tables that override ``learner.decision`` of training. If both are given, each of these is
         evaluated with each topology.
     jobs
         Processes; None: one for every core.

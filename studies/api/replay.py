@@ -17,17 +17,17 @@ from ..store.database import Planned
 from ..store.store import Store
 
 FRAME = "<iframe title='{title}' srcdoc='{page}' style='{style}'></iframe>"
-"""What a notebook shows of a page."""
+"""Style of the page in a notebook."""
 STYLE = "width: 100%; height: 42rem; border: 0"
 MOST_BYTES = 20_000_000
-"""Of an animation that a notebook is given."""
+"""Maximum size of an animation in a notebook [bytes]."""
 
 
 class Replay(NamedTuple):
     """An animation."""
 
     path: Path
-    """Where it is."""
+    """Path of the file."""
     title: str
     """Condition, seed and episode."""
     player: Callable[[], str] = str

@@ -30,7 +30,7 @@ from ..workers.workers import check_workers, start_workers
 from .study import Place, StudyResults
 
 CHECKPOINT = 300.0
-"""How often a trial puts down what it has come to, if nobody says otherwise [s]."""
+"""Default interval between checkpoints of a trial [s]."""
 
 
 @contextmanager
@@ -62,12 +62,12 @@ def run_study(
     accept_code
         Whether to go on with a study although the installed code has changed.
     observer
-        Who is notified of progress; None: nobody.
+        Object that is notified of progress; None for no notifications.
     chosen
-        Those of its trials that are run; none named: all.
+        Trials to run. By default, all.
     checkpoint
-        How often a trial puts down what it has come to, so that it goes on from there if it is
-        killed [s]; 0: never.
+        Interval between checkpoints of a trial, from which a killed trial resumes [s]; 0 for no
+        checkpoints.
 
     Yields
     ------

@@ -16,6 +16,7 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
@@ -33,9 +34,11 @@ from ..errors import SpecError
 from ..presentation.headlines import below_random, headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.choices import choose_trials
-from ..results.contrasts import contrasts, missing_reference, power_with_first
+from ..results.comparison import compare_conditions, missing_reference, power_with_first
+from ..results.joining import join_sizes
 from ..results.notation import wrapped
 from ..results.results import Results, read
+from ..spec.conditions import ConditionSettings
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
 from ..spec.outline import StudyOutline, older_results, other_spec, sources_of
 from ..spec.tables import SpecTable, TomlTable
@@ -50,14 +53,16 @@ if TYPE_CHECKING:
 
     from ...core.agents.team import Team
     from ...core.interface.scenario import Scenario
+    from ..scalability.laws import Scaling
     from .explaining import TeamExplanation
+    from .scalability import ScalabilityReport
 
 Place = str | PathLike[str]
-"""Of a directory or a file."""
+"""Path of a directory or a file."""
 
 
 class Defaults(NamedTuple):
-    """What `StudyResults.compare` compares unless it is told otherwise."""
+    """Default arguments of `StudyResults.compare`."""
 
     measure: str | None = None
     by: str | None = None
@@ -65,19 +70,19 @@ class Defaults(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyResults:
-    """What the finished trials of a study measured, or those of several studies together.
+    """Results of the finished trials of one or several studies.
 
     Made by `run` and `load`. Printed, or shown by a notebook, it is its table.
     """
 
     outline: StudyOutline
-    """What the study consists of."""
+    """Outline of the study."""
     results: Results
-    """Its frames, and arrays of what they hold."""
+    """Data frames and arrays of the results."""
     failed: tuple[tuple[str, int, str], ...] = ()
     """Condition, seed and traceback of every failed trial."""
     remarks: tuple[str, ...] = ()
-    """What must be said of the results, in lines."""
+    """Remarks on the results, line by line."""
     _sources: Sources = field(default_factory=Sources, repr=False)
     _settings: Mapping[str, TomlTable] = field(default_factory=dict, repr=False)
     _directories: tuple[Path, ...] = ()
@@ -133,7 +138,7 @@ class StudyResults:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the study says of its results, verdicts and their power, line by line."""
+        """Verdicts and their power, line by line."""
         sentences = map(wrapped, headlines(self.results, self._settings))
         return (
             *missing_reference(self.results),
@@ -169,13 +174,13 @@ class StudyResults:
 
     @property
     def power(self) -> tuple[str, ...]:
-        """What comparisons with the first condition can find, as `compare` says it."""
+        """Power of comparisons with the first condition, as in `compare`."""
         is_own = self.results.measures and self.results.main.name in (SUCCESS.name, RETURN.name)
         return power_with_first(self.results) if is_own and self.results.phases else ()
 
     @cached_property
     def analysis(self) -> Any:
-        """What the study makes of its results, see `nested_agents.studies.catalogue.study`."""
+        """Analysis of the results by the study, see `nested_agents.studies.catalogue.study`."""
         with self._sources.active():
             return analyse_as(self.outline.study, self.results)
 
@@ -210,7 +215,7 @@ class StudyResults:
         by = by or self._defaults.by
         key = None if by == "condition" else by
         name = measure or self._defaults.measure or self.results.main.name
-        compared = contrasts(self.results, name, phase, key, reference)
+        compared = compare_conditions(self.results, name, phase, key, reference)
         missing = missing_reference(self.results) if reference is None and key is None else []
         return Comparison(compared, (*missing, *self._of_controls, *self.remarks))
 
@@ -255,6 +260,60 @@ class StudyResults:
         if name is not None and name not in figures:
             raise SpecError(f"figure = {name!r}: {closest(name, figures)}")
         return figures[next(iter(figures)) if name is None else name]
+
+    def condition_settings(self) -> dict[str, ConditionSettings]:
+        """Return the settings of each condition, as far as they can be read."""
+        from ..spec.spec import Spec  # imports all scenarios
+
+        settings: dict[str, ConditionSettings] = {}
+        with self._sources.active(), suppress(ValueError, KeyError, ImportError):
+            if not self._settings:
+                spec = Spec.of(self.outline.table, self._sources)
+                return {c.label: c.settings for c in spec.conditions()}
+            for condition, table in self._settings.items():
+                settings[condition] = ConditionSettings.model_validate(table)
+        return settings
+
+    def scalability(
+        self,
+        measure: str | None = None,
+        *,
+        size: str | None = None,
+        scaling: Scaling | None = None,
+        criterion: float | None = None,
+        budget: str = "",
+    ) -> ScalabilityReport:
+        """Answer which hierarchy scales, up to how many agents, and at which cost.
+
+        Parameters
+        ----------
+        measure
+            Measure of performance; by default the first, which is success, or the return where
+            nothing is a success.
+        size
+            The swept key that is the size, or its last part, as ``robots``; by default the only one
+            of numbers.
+        scaling
+            ``strong`` if the task is the same for all sizes, ``weak`` if it grows with the team; by
+            default as the scenario says.
+        criterion
+            Also count the decisions of training until this share of five episodes in a row
+            succeeds.
+        budget
+            Limits of costs, as ``"messages <= 50, decision_ms <= 100"``.
+
+        Raises
+        ------
+        SpecError
+            If there is only one size, or a cost of the budget was not measured; one line.
+        """
+        from .scalability import analyze
+
+        results = self.results
+        if self._tables:
+            results = join_sizes(results, self._tables, self._settings, size)
+        settings = self.condition_settings()
+        return analyze(results, settings, measure, size, scaling, criterion, budget)
 
     def replay(
         self,
@@ -325,7 +384,7 @@ class StudyResults:
 
     @property
     def status(self) -> Status:
-        """How far the study is now: what is done, running, failed and left, and for how long."""
+        """Progress of the study: finished, running, failed and remaining trials, and time left."""
         return Status.of(self.directory)
 
     def report(self, path: Place | None = None) -> Path:
@@ -352,7 +411,7 @@ class StudyResults:
 
     @property
     def directory(self) -> Path:
-        """Where the study is kept.
+        """Directory of the study.
 
         Raises
         ------

@@ -44,9 +44,9 @@ CONTROLS: dict[str, TomlTable] = {
     name: {"preset": name, "learner": {"kind": "frozen", "decision": {"rule": rule}}}
     for name, rule in (("frozen", "value"), ("planner", "reward"))
 }
-"""What the best is compared with, as overrides of a spec."""
+"""Controls of the best configuration, as overrides of a spec."""
 AS = "frozen, as "
-"""How the control of a configuration is called, before its name."""
+"""Prefix of the names of controls."""
 USUAL: dict[str, tuple[object, ...]] = {
     "learner.weights": ("own", "role"),
     "learner.decision.value_of": ("own", "below", "team"),
@@ -59,11 +59,11 @@ USUAL: dict[str, tuple[object, ...]] = {
     "learner.ridge": (0.1, 1.0, 10.0, 100.0),
     "learner.exploration.rate": (0.1, 0.3, 0.6),
 }
-"""What is tried of a spec without a table ``[tune]``, where its learner and scenario have it."""
+"""Values that are tried without a table ``[tune]``, if learner and scenario have these keys."""
 BEST_FILE = "best.toml"
 TABLE_FILE = "configurations.csv"
 DRAWS = 50
-"""Draws for every configuration wanted, before those found are taken for all there are."""
+"""Maximum number of draws per configuration; if no new one is found, there are no others."""
 
 Point = Mapping[str, object]
 """Values by dotted key."""
@@ -71,12 +71,12 @@ Point = Mapping[str, object]
 
 @dataclass(frozen=True)
 class Tuning:
-    """What tuning found."""
+    """Result of tuning."""
 
     best: Spec
     """The spec with the best configuration, and its own seeds."""
     changes: Point
-    """What that configuration lays over the spec; empty if the spec is not bettered."""
+    """Changes of the spec by the best configuration; empty if no configuration is better."""
     study: StudyResults
     """The finalists and the controls, on all seeds."""
     configurations: pd.DataFrame
@@ -97,7 +97,7 @@ class Tuning:
 
     @property
     def lines(self) -> list[str]:
-        """What was found, in lines."""
+        """Results, line by line."""
         name, success = self.configurations.loc[0, ["name", "success"]]
         lines = [f"Best of {len(self.configurations)} configurations: {name}"]
         lines += [f"  {key} = {show(value)}" for key, value in self.changes.items()]
@@ -138,8 +138,8 @@ def tune(
         A `Spec` of one condition, a table, or the path of a TOML file. Its table ``[tune]`` has
         lists of values by dotted key; without it, `USUAL` ones are tried.
     out
-        Where the study of all configurations is kept, beside ``best.toml``, the spec of the best,
-        and ``configurations.csv``.
+        Directory of the study of all configurations, which also gets ``best.toml``, the spec of the
+        best one, and ``configurations.csv``.
     trials
         Configurations to try, the spec's own among them.
     seeds
@@ -169,7 +169,7 @@ def tune(
     observer = Terminal() if progress else Observer()
 
     def run(wanted: Container[str], n_seeds: int) -> Results:
-        """Run conditions on the first seeds, beside all that has been planned before."""
+        """Run conditions on the first seeds, together with all trials planned before."""
         for trial in everything:
             if trial.condition in wanted and trial.seed < first_seed + n_seeds:
                 planned[trial.identity] = trial
@@ -243,12 +243,12 @@ def _check_request(spec: Spec, trials: int, seeds: int, first_seed: int, draw: i
 
 
 def _lay_over(table: TomlTable, point: Point) -> TomlTable:
-    """Return a table with values laid over it."""
+    """Return a table overridden by values."""
     return reduce(overlay, starmap(nested, point.items()), table)
 
 
 def _lay_over_spec(spec: Spec, point: Point) -> Spec:
-    """Return a spec with values laid over it, and nothing left to tune."""
+    """Return a spec overridden by values, without its table ``[tune]``."""
     table = {key: value for key, value in spec.table().items() if key != "tune"}
     return Spec.of(_lay_over(table, point), spec.sources)
 
@@ -270,7 +270,7 @@ def _space(spec: Spec) -> dict[str, Sequence[object]]:
         scenario = spec.conditions()[0].settings.scenario.build()
     usual = dict(USUAL)
     if len({*scenario.roles}) == len(scenario.agents):
-        del usual["learner.weights"]  # nobody shares a role
+        del usual["learner.weights"]  # no two agents share a role
     possible = dict[str, Sequence[object]]()
     for key, values in usual.items():
         for value in values:

@@ -1,7 +1,7 @@
-"""Studies: the measurement of one trial, the analysis of all trials, and its figures.
+"""Studies: measurement of a trial, analysis of all trials, and figures.
 
-A spec names a study of the catalog, ``study = "scaling"``, or a class of a file,
-``study = "mine.py:Mine"``, which inherits `Study` or offers the same attributes.
+A spec names a study of the catalog, ``study = "scaling"``, or a class in a file, ``study =
+"mine.py:Mine"``, which inherits `Study` or has the same attributes.
 """
 
 from __future__ import annotations
@@ -49,18 +49,17 @@ class Study:
     """
 
     NUMBERS: Sequence[str] = ()
-    """Numbers of whole trials that the analysis needs. Trials of other studies without them are
-    refused."""
+    """Numbers of whole trials that the analysis needs. Trials without them are refused."""
     PUBLISHED: Sequence[str] | None = None
-    """Measures of an episode that published results keep; None: all."""
+    """Measures in published results; None for all."""
     TIMED: bool = True
-    """False if trials are too short for their times to be meaningful."""
+    """Whether trials are long enough for meaningful times."""
 
     def check(self, spec: Spec) -> None:
-        """Raise `SpecError` unless the spec has what the study needs."""
+        """Raise `SpecError` if the spec does not fit the study."""
 
     def measure(self, trial: Trial) -> TrialResult:
-        """Run one trial; called by name in worker processes."""
+        """Run one trial; imported by name in worker processes."""
         return measure(trial)
 
     def draw(self, analysis: Analysis) -> Figures:
@@ -70,32 +69,32 @@ class Study:
 
 @dataclass(frozen=True)
 class LoadedStudy:
-    """The attributes of a study, with defaults for those that it lacks."""
+    """Attributes of a study with defaults for missing ones."""
 
     measure: Callable[[Trial], TrialResult]
     """Runs one trial; imported by name in worker processes."""
     analyse: Callable[[Results], Any]
-    """Turns results into estimates; its attribute `table` holds the `Summary` lines. Further ones
-    are those of `nested_agents.studies.results.analysis.Analysis`, each of which may be missing."""
+    """Returns the estimates of results with the attribute `table` of `Summary` rows, and optional
+    attributes of `nested_agents.studies.results.analysis.Analysis`."""
     draw: Callable[[Any], Figures]
     """Returns the figures of an analysis by name."""
     check: Callable[[Spec], None] = accept
-    """Raises `SpecError` unless the spec has what the study needs."""
+    """Raises `SpecError` if the spec does not fit the study."""
     numbers: Sequence[str] = ()
     """Names of the numbers of whole trials that the analysis needs."""
     published: Sequence[str] | None = None
-    """Names of the measures of an episode that published results keep; None: all."""
+    """Names of the measures in published results; None for all."""
     timed: bool = True
-    """Whether trials are long enough for their times to be meaningful."""
+    """Whether trials are long enough for meaningful times."""
 
 
 def load_study(name: str) -> LoadedStudy:
-    """Return the study of a name in `STUDIES`, or of a user's file.
+    """Return a study by its name in `STUDIES` or in a user's file.
 
     Raises
     ------
     SpecError
-        If there is none, it may not be run, or lacks a function that studies have; one line.
+        If the study is unknown, its file is not trusted, or it lacks a function.
     """
     with refused(f"study = {name!r}: "):
         entry = STUDIES.find(name)
@@ -109,13 +108,13 @@ def load_study(name: str) -> LoadedStudy:
 
 
 def notes_of(analysis: Any) -> tuple[str, ...]:
-    """Return what an analysis says in words, line by line; one of your own may say nothing."""
+    """Return the remarks of an analysis, which those of users may lack."""
     return tuple(offered(analysis, "notes", ()))
 
 
 def measure(trial: Trial) -> TrialResult:
-    """Run a trial that is measured by its episodes alone."""
-    from ..trials.session import run_trial  # who only reads results needs nothing that learns
+    """Run a trial without further measurements."""
+    from ..trials.session import run_trial  # reading results does not import learners
 
     return run_trial(trial)
 
@@ -129,25 +128,25 @@ def check_evaluated(spec: Spec) -> None:
 
 
 def check_evaluations(spec: Spec, example: str) -> None:
-    """Raise `SpecError` unless trained teams are evaluated otherwise, too, as in an `example`."""
+    """Raise `SpecError` unless trained teams have further evaluations, as in an `example`."""
     if not spec.evaluations:
         raise SpecError(f"evaluations: missing; {spec.study} needs one at least, as {example}")
 
 
 def check_rule_bases(spec: Spec, why: str) -> None:
-    """Refuse conditions whose learner is no hierarchy of fuzzy agents.
+    """Refuse conditions without fuzzy agents.
 
     Parameters
     ----------
     spec
-        Of a study that looks into the agents.
+        The spec.
     why
-        What it looks for, to be read after "agents with rule bases".
+        Reason why the study needs rule bases, for the message.
 
     Raises
     ------
     SpecError
-        If there is such a condition; one line, which names the learners that will do.
+        If a condition has another learner; the message names the allowed ones.
     """
     from ...core.learners import LEARNERS, LearnerSettings
 
@@ -162,12 +161,12 @@ def check_rule_bases(spec: Spec, why: str) -> None:
 
 
 def analyse_as(name: str, results: Results) -> Any:
-    """Return what a study makes of results, which may be those of another study.
+    """Return the analysis of results by a study, which may differ from the one that ran.
 
     Raises
     ------
     SpecError
-        If there is no such study, or trials lack what it rests on; one line.
+        If the study is unknown, or trials lack numbers that it needs.
     """
     study = load_study(name)
     for needed in study.numbers:
@@ -185,7 +184,7 @@ def analyse_as(name: str, results: Results) -> Any:
 
 
 def select_published(name: str, results: Results) -> Results:
-    """Return what a study's results are published with, see `PUBLISHED` and `TIMED` above."""
+    """Return the part of results that a study publishes, see `Study.PUBLISHED` and `TIMED`."""
     study = load_study(name)
     measures = results.measures
     if study.published is not None:
@@ -195,7 +194,7 @@ def select_published(name: str, results: Results) -> Results:
 
 
 def distinct(values: Iterable[T]) -> list[T]:
-    """Return values without repetition, in the order in which they first come.
+    """Return values without repetition, in the order of their first occurrence.
 
     >>> distinct("banana")
     ['b', 'a', 'n']
@@ -204,14 +203,14 @@ def distinct(values: Iterable[T]) -> list[T]:
 
 
 def system_of(results: Results, condition: str) -> tuple[str, dict[str, object]]:
-    """Return the name of a condition's override, and what else is swept, by key."""
+    """Return the name of a condition's override and its other swept values by key."""
     columns = dict(results.columns.get(condition, {}))
     name = str(columns.pop("name", condition))
     return name, {key: value for key, value in columns.items() if value != ""}
 
 
 def draw_figures(study: LoadedStudy, analysis: Any) -> Figures:
-    """Return the figures of an analysis by name, as all figures look; none of an empty table."""
+    """Return the figures of an analysis in the common style; none for an empty table."""
     from ..presentation.figures import apply_style, spell_dollars  # matplotlib takes its time
 
     with apply_style():
@@ -221,5 +220,5 @@ def draw_figures(study: LoadedStudy, analysis: Any) -> Figures:
 
 
 def measure_by_name(trial: Trial) -> TrialResult:
-    """Run a trial by the study that it names; imported by name in worker processes."""
+    """Run a trial by the study it names; imported by name in worker processes."""
     return load_study(trial.study).measure(trial)

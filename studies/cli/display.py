@@ -1,7 +1,7 @@
-"""What the user sees on the terminal: everything that a command prints goes through here.
+"""Printing on the terminal; every command prints through this module.
 
-Labels, tracebacks and titles may be anybody's, from a spec, a database or a published file. What a
-terminal would obey in them is written out, see `printable`.
+Labels, tracebacks and titles may come from any spec, database or published file. Control characters
+in them are escaped, see `printable`.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from ..api.study import StudyResults
     from ..presentation.tables import SummaryTable
 
-Form: TypeAlias = Literal["table", "markdown", "latex", "csv"]
-"""How a table of estimates is printed."""
+Form: TypeAlias = Literal["table", "markdown", "latex", "csv", "json"]
+"""Format of a table of estimates."""
 
 
 def print_text(*texts: object, sep: str = "\n", end: str = "\n") -> None:
@@ -32,7 +32,7 @@ def print_text(*texts: object, sep: str = "\n", end: str = "\n") -> None:
 
 
 def print_data(text: str) -> None:
-    """Print what other programs read: as it is, but on a terminal as `print_text` does."""
+    """Print data for other programs unchanged, but on a terminal like `print_text`."""
     sys.stdout.write(printable(text) if sys.stdout.isatty() else text)
 
 
@@ -76,6 +76,8 @@ def in_form(table: SummaryTable, form: Form) -> str:
             return table.latex
         case "csv":
             return table.csv
+        case "json":
+            return table.json
         case "table":
             return f"{table}\n"
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def open_study(directory: Path) -> Iterator[Store]:
-    """Open a study to read it, and say so if the spec beside its database is another one."""
+    """Open a study for reading, and report if the spec in its folder differs from its database."""
     with Store.open(directory) as store:
         if (remark := other_spec(store)) is not None:
             say(remark)
@@ -72,7 +72,7 @@ def trust_files(*sources: Path) -> None:
 def trust_beside(*places: Path) -> None:
     """Do so for the studies that places are, or lie in as their specs do, and for what these name.
 
-    A spec that stands beside a database may name other files than the database keeps.
+    The spec in the folder of a database may name other files than the database keeps.
     """
     folders = {place if place.is_dir() else place.parent for place in map(Path.resolve, places)}
     for folder in folders:
@@ -88,17 +88,17 @@ def _trust(texts: Mapping[str, str]) -> None:
 
 
 def _named_by_copy(folder: Path) -> dict[str, str]:
-    """Return the code that the spec beside a database names; none if that is no spec."""
+    """Return the code that the spec in the folder of a database names; empty without a spec."""
     try:
         table = tomllib.loads(read_text(folder / SPEC_FILE))
         files = {name: Sources(folder).text(name) for name in sorted(files_in(table))}
     except (OSError, ValueError, RecursionError):
-        return {}  # told by whoever reads the spec
+        return {}  # the reader of the spec reports this
     return _untrusted(folder, files, table)
 
 
 def untrusted(source: Path) -> dict[str, str]:
-    """Return the code of others that a study brings along or names, by what it is.
+    """Return the untrusted code that a study contains or names.
 
     These are the Python files that are kept with it, and modules by name; those of a file of
     results are named in its spec. Of the files that such a spec names, only the study's is run.

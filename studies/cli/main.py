@@ -1,7 +1,7 @@
 """The command line: finds the command, runs it, and turns what went wrong into an exit status.
 
-Statuses: 0 done, 1 a trial failed, 2 something the user can mend (one line on standard error),
-130 interrupted, 141 the reader of the output has gone. A command is one line in `COMMANDS` and a
+Statuses: 0 success, 1 a trial failed, 2 a mistake of the user (one line on standard error), 130
+interrupted, 141 closed output. A command is one line in `COMMANDS` and a
 click command of that name in a module of `commands`.
 """
 
@@ -29,7 +29,7 @@ REFUSING = ("strict", "surrogateescape")
 """The error handlers that Python's streams have by locale and that raise for such characters."""
 
 LEAST_ADDRESSES = 10**9
-"""Of the process [bytes]: with less, libraries of linear algebra crash or wait for ever."""
+"""Minimum address space [bytes]; with less, libraries of linear algebra crash or hang."""
 
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Run": {
@@ -44,6 +44,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "table": (".commands.reading", "Print the results of a study, one row per condition."),
         "compare": (".commands.reading", "Compare conditions of one or more studies by seed."),
         "fit": (".commands.fitting", "Fit scaling laws over team sizes, and predict."),
+        "scalability": (".commands.scalability", "Show which hierarchy scales, and its cost."),
         "results": (".commands.reading", "Print the measures of every episode."),
         "report": (".commands.reading", "Write the study as one self-contained HTML file."),
         "explain": (".commands.reading", "Explain a trained team in words and figures."),
@@ -186,7 +187,7 @@ def run_to_status(program: str, run: Callable[[], int]) -> int:
 
 
 COMPLETE = "_NESTED_AGENTS_COMPLETE"
-"""What a shell sets to be told how a command line goes on."""
+"""Environment variable that a shell sets to ask for completions."""
 
 
 def _run(arguments: list[str]) -> int:

@@ -107,8 +107,8 @@ _backend = click.option(
 _address = click.option(
     "--address",
     metavar="tcp://HOST:PORT",
-    help="Of the scheduler of a running Dask cluster, all of whose workers are used unless --jobs "
-    "says otherwise. If missing, a cluster is started here.",
+    help="Address of the scheduler of a running Dask cluster; all its workers are used unless "
+    "--jobs says otherwise. By default, a local cluster is started.",
 )
 _accept_code = flag(
     "--accept-code",
@@ -140,19 +140,19 @@ checkpoint = number(
 
 trust = flag(
     "--trust",
-    "Run, from now on, the Python files that came with the study, and import the modules that it "
-    "names, though no spec of yours has done so yet. They can do whatever you can.",
+    "Trust the code of the study, now and later: run the Python files that came with it and import "
+    "the modules that it names. This code can do whatever you can.",
 )
-"""Whether code that a study brings along or names may be run, see `core.plugins.trust`."""
+"""Whether a study may run the code that it contains or names, see `core.plugins.trust`."""
 
 changes = click.option(
     "--set",
     "changes",
     multiple=True,
     metavar="KEY=VALUE...",
-    help='Lay values over the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
+    help='Change values of the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
 )
-"""Assignments laid over a spec, see `nested_agents.studies.spec.tables.assignment`."""
+"""Changes of a spec, see `nested_agents.studies.spec.tables.assignment`."""
 
 figures = click.option(
     "--figures",
@@ -162,7 +162,7 @@ figures = click.option(
     default=("png", "svg"),
     help="Formats of the figures.",
 )
-"""What figures of a study are written as."""
+"""Formats of the figures of a study."""
 
 plot = click.option(
     "--plot", type=PATH, metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
@@ -190,12 +190,14 @@ measure = click.option(
     help="A measure of episodes, steps, return, or a number of whole trials, as messages; by "
     "default the first, success (return where nothing is one), or the first score of a table.",
 )
-"""What is compared, or fitted."""
+"""Measure that is compared or fitted."""
 
 phase = click.option(
-    "--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one."
+    "--phase",
+    metavar="PHASE",
+    help="Phase of the episodes; by default evaluation, if there is one.",
 )
-"""Which episodes of a study count."""
+"""Phase of the episodes of a study."""
 
 
 columns = click.option(
@@ -208,8 +210,8 @@ columns = click.option(
 """Roles of the columns of a table, see `nested_agents.studies.api.loading.load`."""
 
 
-def formats(*choices: str, text: str = "How to print it.") -> Decorator:
-    """Return the option ``--format``, whose default is the first choice."""
+def formats(*choices: str, text: str = "Output format.") -> Decorator:
+    """Return the option ``--format``; the first choice is its default."""
     kind = click.Choice(choices)
     return click.option("--format", "form", type=kind, default=choices[0], help=text)
 
@@ -219,6 +221,7 @@ form = formats(
     "markdown",
     "latex",
     "csv",
-    text="How to print the table; CSV holds every digit, LaTeX needs the package booktabs.",
+    "json",
+    text="How to print the table; CSV and JSON hold every digit, LaTeX needs the package booktabs.",
 )
-"""How a table of estimates is printed."""
+"""Format of a table of estimates."""

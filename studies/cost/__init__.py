@@ -1,1 +1,1 @@
-"""What hierarchies cost: by formula, counted and timed."""
+"""Cost of hierarchies: formulas of Section VII, counts and times of the running system."""

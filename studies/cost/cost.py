@@ -1,15 +1,16 @@
 """Cost of a topology: by formula, counted in the running system, and timed.
 
 The formulas (Eq. 18-23) count the operations of a sweep over all states, while the running system
-visits one state a step. They share two numbers, which are counted and compared: the joint actions
-that each agent tries, ``|A| ** (1 + |below|)``, and the rules that value each of them.
+visits one state per step. Both depend on the number of joint actions that each agent tries,
+``|A| ** (1 + |below|)``, and on the number of rules that evaluate each of them. These two numbers
+are counted and compared.
 
-In a coordination graph an agent tries joint actions of itself and its neighbors, and the team
-decides by variable elimination, whose own operations are timed but not counted. Some ways to decide
-(`WAYS`) replace a topology: they try few of all joint actions.
+In a coordination graph, an agent tries the joint actions of itself and its neighbors. The
+operations of variable elimination are timed but not counted. Some `DECISION_METHODS` replace a
+topology and try few joint actions.
 
-Counting and timing use the line-up scenario, because its prediction costs next to nothing, and
-sigmoid membership functions, because every rule of theirs fires.
+Counts and times use the line-up scenario, because its prediction costs very little, with sigmoid
+membership functions, because all of their rules fire.
 """
 
 import tracemalloc
@@ -31,51 +32,52 @@ from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.agents import Counts
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
-from ...core.rules.rule_base import RuleBaseSettings
+from ...core.values.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 
 SINGLE_AGENT = "single-agent"
-"""Name that replaces a topology for the single agent of Eq. 23."""
+"""Name of the single agent of Eq. 23, which replaces a topology."""
 MEMBERSHIPS = 5
 PAPER = Problem()
-"""|S|, |A| and L of the paper's experiment."""
+"""Quantities |S|, |A| and L of the paper's experiment."""
 RULES = MEMBERSHIPS**2
-"""|S| of an agent that is counted and timed."""
+"""Number of rules |S| of an agent in counts and times."""
 ACTIONS = 4
-"""|A| of an agent that is counted and timed."""
+"""Number of actions |A| of an agent in counts and times."""
 LEARNER = TDLambdaSettings(
     rule_base=RuleBaseSettings(membership="sigmoid", memberships=MEMBERSHIPS, order=2),
     decision=DecisionSettings(rule="value", evaluator="exact"),
 )
-"""The learner that is counted and timed: the paper's, over the two variables of line-up."""
+"""Learner in counts and times: that of the paper, over the two variables of line-up."""
 
 
-def _around_a_plan(n: int, actions: int) -> list[int]:
+def _best_response_counts(n: int, actions: int) -> list[int]:
     cuts = {round(share * n) for share in CUTS} - {0, n}
     starts = actions + len(cuts) * actions * (actions - 1)
     return [starts + (n + 1) * actions] + [actions] * (n - 1)
 
 
-WAYS: dict[str, tuple[str, Callable[[int, int], list[int]] | None]] = {
-    # The first agent of a chain plans for all and hands its plan down.
-    "best-response": ("chain", _around_a_plan),
+DECISION_METHODS: dict[str, tuple[str, Callable[[int, int], list[int]] | None]] = {
+    # The first agent of a chain plans for all agents and communicates its plan.
+    "best-response": ("chain", _best_response_counts),
     "max-plus": ("coordination-graph", None),
-    # Forward passes without a prediction: an agent values its actions, or draws one.
+    # Forward passes without a prediction: values of the actions, or one sampled action.
     "fitted-q": ("chain", lambda n, actions: [actions] * n),
     "hierarchy-ppo": ("chain", lambda n, actions: [1] * n),
 }
-"""Ways to decide that stand in place of a topology: that by which they are told, and how many joint
-actions each of n agents tries that has so many actions; none: all of those that it considers."""
-PASSES = ("fitted-q", "hierarchy-ppo")
-"""Those of them that are not counted and timed."""
-MOST_OPERATIONS = 4 * 10**8
-"""Rule evaluations a step beyond which nothing is measured: about a second a step."""
-LEAST_SECONDS = 0.3
-"""How long each repeat is timed at least [s]."""
-MOST_TIMES = 100
-"""How often each repeat is timed at most."""
+"""Decision methods that replace a topology: the topology of their communication, and a function of
+the numbers of agents and actions that returns the joint actions each agent tries. None means all
+joint actions in the agent's lookahead."""
+MODEL_FREE = ("fitted-q", "hierarchy-ppo")
+"""Decision methods without search, which are not counted and timed."""
+MAX_OPERATIONS = 4 * 10**8
+"""Maximum number of rule evaluations of a measured step, which take about a second."""
+MIN_SECONDS = 0.3
+"""Minimum time of each repeat [s]."""
+MAX_STEPS = 100
+"""Maximum number of steps of each repeat."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class StepCost:
     """Cost of one step of the running system."""
 
     counted: Counts
-    """Counts of the whole team."""
+    """Counts of the whole team per step."""
     deciding: float
     """Median time of a decision [s]."""
     learning: float
@@ -91,11 +93,11 @@ class StepCost:
     memory: int
     """Peak memory of team and step [bytes]."""
     repeats: tuple[float, ...]
-    """Time of a step in each repeat, each with a new team [s]."""
+    """Time of a step in each repeat, with a new team each [s]."""
 
     @property
     def step(self) -> Estimate:
-        """Mean time of a step over repeats with its 95% interval [s]; one repeat has none."""
+        """Mean time of a step [s] with its 95% interval if there are several repeats."""
         return bootstrap(self.repeats, bounds=NOT_NEGATIVE)
 
 
@@ -109,24 +111,24 @@ class CostRow:
     problem: Problem
     """Rules, actions and iterations of the formulas."""
     nested_exact: int | None
-    """Eq. 18; none for the single agent."""
+    """Operations by Eq. 18; None for the single agent."""
     nested_closed_form: int | None
-    """Eq. 19; none unless the topology is a chain."""
+    """Operations by Eq. 19; None unless the topology is a chain."""
     nested_asymptotic: Fraction | None
-    """Eq. 21; none unless the topology is a chain."""
+    """Operations by Eq. 21; None unless the topology is a chain."""
     single_agent: int
-    """Eq. 23."""
+    """Operations by Eq. 23."""
     memberships: int | None = None
     """Membership functions of each state variable, if they determine the rules."""
     formula: Counts | None = None
     """Counts of a step of the whole team by the formulas, if a measurement was requested."""
     measured: StepCost | None = None
     network: tuple[int, int] | None = None
-    """If requested, the messages of a decision, and how many of them follow one another."""
+    """Numbers of messages of a decision and of those sent in sequence, if requested."""
     broadcast: int = 0
-    """States that agents send to others besides these messages."""
+    """Number of states that agents broadcast in addition."""
     free: int = 0
-    """Maximum number of agents over which one agent searches, itself included; 0 for `WAYS`."""
+    """Maximum number of agents in one search; 0 for `DECISION_METHODS`."""
 
     @property
     def by_formula(self) -> dict[str, int | Fraction | None]:
@@ -146,34 +148,33 @@ class CostRow:
 
 
 def joint_actions(text: str, n: int, actions: int) -> list[int]:
-    """Return how many joint actions each of n agents tries in a decision."""
-    topology, tried = WAYS.get(text, (text, None))
+    """Return the number of joint actions that each of n agents tries in a decision."""
+    topology, tried = DECISION_METHODS.get(text, (text, None))
     if tried is not None:
         return tried(n, actions)
     return [actions ** (1 + below) for below in agents_below(topology, n)]
 
 
 def messages(text: str, n: int) -> tuple[int, int]:
-    """Return how many messages a decision of n agents takes, and how many follow one another.
+    """Return the number of messages of a decision, and of those sent one after another.
 
-    A single agent hears all others and tells them. In a chain everybody is told by all above. To
-    eliminate variables each hands a table to the next, and hears what is best; by max-plus
-    neighbours tell each other in every round, of which are at most 100.
+    A single agent collects the states of all others and sends their actions. In a chain each agent
+    receives the actions of all above. Variable elimination passes a table from agent to agent and
+    the best actions back. In max-plus, neighbors exchange messages in each round.
     """
     if text == SINGLE_AGENT:
         return 2 * (n - 1), 2 * (n > 1)
-    hierarchy = _hierarchy(WAYS.get(text, (text,))[0], n)
-    if not hierarchy.neighbours:
-        return hierarchy.messages, hierarchy.depth - 1
+    hierarchy = _hierarchy(DECISION_METHODS.get(text, (text,))[0], n)
+    if not hierarchy.neighbors:
+        return hierarchy.n_messages, hierarchy.depth - 1
     rounds = MaxPlusSettings().rounds
-    return (rounds * hierarchy.messages, rounds) if text == "max-plus" else (2 * n - 2, 2 * n - 2)
+    return (rounds * hierarchy.n_messages, rounds) if text == "max-plus" else (2 * n - 2, 2 * n - 2)
 
 
 def broadcasts(text: str, n: int) -> int:
-    """Return how many states are sent to agents before a decision, beside its messages.
+    """Return the number of states that agents send to all others before a decision.
 
-    Each agent sends its own to all others, from which they predict. A single agent is told states
-    by the messages that it hears.
+    They are needed for predictions. The messages of a single agent include them.
     """
     return 0 if text == SINGLE_AGENT else n * (n - 1)
 
@@ -183,7 +184,7 @@ def _hierarchy(text: str, n: int) -> Hierarchy:
 
 
 def agents_below(text: str, n: int) -> Sequence[int]:
-    """Return how many agents are below each of n agents in the topology written as `text`.
+    """Return the number of agents below each of n agents in a topology.
 
     Raises
     ------
@@ -191,12 +192,12 @@ def agents_below(text: str, n: int) -> Sequence[int]:
         If the topology is refused.
     """
     if text in ("chain", "chain:reversed", "chain:interleaved"):
-        return range(n)  # a thousand hierarchies of a thousand agents take their time
+        return range(n)  # building a thousand hierarchies of a thousand agents would be slow
     return below_counts(_hierarchy(text, n))
 
 
 def pairs(n: int) -> tuple[tuple[int, ...], ...]:
-    """Return n agents as robots of two wheels; of an odd number, the last has one.
+    """Return n agents grouped as robots with two wheels; the last has one if n is odd.
 
     Examples
     --------
@@ -207,7 +208,7 @@ def pairs(n: int) -> tuple[tuple[int, ...], ...]:
 
 
 def step_formula(text: str, n: int) -> Counts:
-    """Return what a step of the running system comes to by the formulas, for the whole team."""
+    """Return the counts of a step of the whole team by the formulas."""
     if text == SINGLE_AGENT:
         return Counts(ACTIONS**n, (ACTIONS * RULES) ** n, RULES**n)
     joint = sum(joint_actions(text, n, ACTIONS))
@@ -215,8 +216,8 @@ def step_formula(text: str, n: int) -> Counts:
 
 
 def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
-    """Count and time a step of n agents; none where it would take too long or too much memory."""
-    if text in PASSES or step_formula(text, n).rule_evaluations > MOST_OPERATIONS:
+    """Count and time a step of n agents; None if it would take too long."""
+    if text in MODEL_FREE or step_formula(text, n).rule_evaluations > MAX_OPERATIONS:
         return None
     learner, scenario, hierarchy = _arrange(text, LineUpSettings(carts=n).build())
     _warm_up()
@@ -229,7 +230,7 @@ def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
         tracemalloc.stop()
     before = astuple(team.counts)
     times = [_time_steps(team, scenario)]
-    # An episode here has two steps, of which the second alone changes weights.
+    # An episode has two steps, and only the second one updates weights.
     steps = 2 * len(times[0]), 2 * len(times[0]), len(times[0])
     after = astuple(team.counts)
     counted = (int(b - a) // n for a, b, n in zip(before, after, steps, strict=True))
@@ -243,26 +244,26 @@ def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
 
 
 def _time_steps(team: Team, scenario: Scenario) -> list[tuple[float, float]]:
-    """Take steps until enough time has been measured; return (deciding, learning) [s] of each."""
+    """Return the times (decision, learning) of steps until `MIN_SECONDS` have passed [s]."""
     times = [_step(team, scenario)]
-    while sum(map(sum, times)) < LEAST_SECONDS and len(times) < MOST_TIMES:
+    while sum(map(sum, times)) < MIN_SECONDS and len(times) < MAX_STEPS:
         times.append(_step(team, scenario))
     return times
 
 
 def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hierarchy]:
-    """Return the learner of a topology over line-up, what it acts in, and the hierarchy."""
+    """Return learner, scenario and hierarchy for a topology over line-up."""
     n = len(line_up.agents)
     if text == SINGLE_AGENT:
         scenario = join_agents(line_up, "team")
         base = LEARNER.rule_base.model_copy(update={"order": 2 * n})
         learner = LEARNER.model_copy(update={"rule_base": base})
         return learner, scenario, Hierarchy(scenario.agents, [])
-    settings = parse(WAYS.get(text, (text,))[0])
+    settings = parse(DECISION_METHODS.get(text, (text,))[0])
     hierarchy = build(settings, line_up.agents, pairs(n))
     usual = "variable-elimination" if settings.kind == "coordination-graph" else "exact"
-    evaluator = text if text in WAYS else usual
-    if settings.kind == "coordination-graph" and not hierarchy.neighbours:
+    evaluator = text if text in DECISION_METHODS else usual
+    if settings.kind == "coordination-graph" and not hierarchy.neighbors:
         evaluator = "exact"  # a single agent has no neighbors
     decision = DecisionSettings(rule="value", evaluator=evaluator)
     return LEARNER.model_copy(update={"decision": decision}), line_up, hierarchy
@@ -270,7 +271,7 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
 
 @cache
 def _warm_up() -> None:
-    """Have everything imported and compiled before memory is traced and time taken."""
+    """Import and compile everything before memory and time are measured."""
     line_up = LineUpSettings(carts=2).build()
     for topology in ("chain", "independent"):
         hierarchy = build(topology, line_up.agents)
@@ -278,9 +279,9 @@ def _warm_up() -> None:
 
 
 def _step(team: Team, scenario: Scenario) -> tuple[float, float]:
-    """Take a step from a fresh start; return (deciding, learning) [s].
+    """Return the times (decision, learning) of the second step of an episode [s].
 
-    It is the second step of an episode: in the first, the learner has nothing to look back on.
+    In the first step the learner has no previous state.
     """
     _, record = control_loop(scenario, team, episodes=1, steps=2, seed=0)
     return record.deciding, record.learning

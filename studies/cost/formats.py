@@ -14,7 +14,6 @@ from typing import Literal
 
 from ...core.evaluators.enumeration import AutoSettings
 from ...core.numerics import pd
-from ...core.shell import command_line
 from ...topologies.view import align, format_count
 from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex
@@ -30,19 +29,19 @@ from .cost import (
 
 Form = Literal["table", "json", "csv", "latex"]
 VARIABLES = 7
-"""State variables of an agent (Section III): rules = memberships ** VARIABLES."""
+"""Number of state variables of an agent (Section III): rules = memberships ** VARIABLES."""
 QUANTITIES: dict[str, Callable[[CostRow], int | None]] = {
     "memberships": lambda row: row.memberships,
     "rules": lambda row: row.problem.rules,
     "actions": lambda row: row.problem.actions,
 }
-"""Headings and values of the quantities of the formulas that a table may vary."""
+"""Quantities that a table may vary: heading and value in a row."""
 FORMULAS = ("Eq. 18", "Eq. 19", "Eq. 21", "single agent", "ratio")
 """Headings of `CostRow.by_formula`."""
 MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MB")
-"""Headings of the measurements of a step."""
+"""Headings of the columns for measured steps."""
 NETWORK = ("messages", "in turn", "1 ms", "10 ms", "1 ms*", "10 ms*")
-"""Headings of messages, and of the seconds that a decision waits for them."""
+"""Headings of the columns for messages and waiting times [s]."""
 OF_THE_PAPER = PAPER.chain_closed_form(4)
 """Operations of four agents by Eq. 19, with the paper's |S|, |A| and L."""
 
@@ -66,7 +65,7 @@ def format_rows(rows: Sequence[CostRow], form: Form) -> str:
 
 
 def scientific(value: int | Fraction | None) -> str:
-    """Return a number for reading: some digits, powers of ten if it is large.
+    """Return a number rounded for reading, in scientific notation if it is large.
 
     Examples
     --------
@@ -81,7 +80,7 @@ def scientific(value: int | Fraction | None) -> str:
 
 
 def _record(row: CostRow) -> dict[str, object]:
-    """Return a row with integers as integers; Eq. 21 is rounded to the nearest one."""
+    """Return a row as a record of exact integers; Eq. 21 is rounded."""
     record: dict[str, object] = {"agents": row.agents, "topology": row.topology}
     record |= {name: of(row) for name, of in QUANTITIES.items()}
     record["iterations"] = row.problem.iterations
@@ -116,7 +115,7 @@ def _measured_record(cost: StepCost) -> dict[str, object]:
 
 
 def _varied(rows: Sequence[CostRow]) -> dict[str, Callable[[CostRow], int | None]]:
-    """Return the quantities that have several values."""
+    """Return the quantities with several values."""
     return {name: of for name, of in QUANTITIES.items() if len({of(row) for row in rows}) > 1}
 
 
@@ -162,7 +161,7 @@ def _network_cells(row: CostRow) -> list[str]:
 
 
 def _constants(rows: Sequence[CostRow]) -> str:
-    """Return the quantities that are the same in all rows, as the paper writes them."""
+    """Return the quantities with one value, in the notation of the paper."""
     varied = _varied(rows)
     row = rows[0]
     problem = row.problem
@@ -198,32 +197,32 @@ def _table(rows: Sequence[CostRow]) -> str:
         measured = f"line-up scenario, |A| = {ACTIONS}, |S| = {RULES}"
         lines += ["", f"Per step of the running system ({measured}):"]
         lines += ["", *align(tables["formula"], "><>>>>>>", 2), ""]
-        lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
+        lines += ["formula, counted: joint actions tried; ms: decision and learning;"]
         most = max((len(row.measured.repeats) for row in rows if row.measured), default=1)
         if most > 1:
             lines += [f"[]: 95% interval of the mean of {most} repeats, each with a new team;"]
-        lines += ["-: not measured, beyond a second or so a step."]
+        lines += ["-: not measured, because a step takes more than about a second."]
         lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
     if "network" in tables:
-        lines += ["", "Messages of a decision, and how long it waits for them [s]:", ""]
+        lines += ["", "Messages of a decision, and waiting times [s]:", ""]
         lines += [*align(tables["network"], "><>>>>>>", 2), ""]
-        lines += ["in turn: how many follow one another, others going at once, of 1 or 10 ms each;"]
-        lines += ["*: on a channel that carries one message at a time."]
-        lines += ["Not counted: n (n - 1) states sent to others, to predict by (broadcast)."]
+        lines += ["in turn: messages that must be sent one after another, 1 or 10 ms each;"]
+        lines += ["*: all messages on a channel that carries one at a time."]
+        lines += ["Not counted: n (n - 1) states broadcast for predictions."]
     return "\n".join(lines)
 
 
 def _of_another_evaluator(rows: Sequence[CostRow]) -> list[str]:
-    """Return for which rows the default evaluator does not try what the formulas count."""
+    """Return a remark on rows for which the default evaluator tries fewer joint actions."""
     auto = AutoSettings()
     own = dict.fromkeys(row.topology for row in rows if row.free > auto.exact_up_to)
     if not own:
         return []
     return wrap(
-        f"They count the evaluator exact. The default, auto, is exact up to {auto.exact_up_to} "
-        f"agents (one and those below it), up to {auto.sampling_up_to} sampling if agents "
-        "decide by their own value, else best-response, which try fewer joint actions: "
-        f"{command_line('profile')} counts and times them. Rows: {', '.join(own)}.",
+        "The formulas count the evaluator exact. For more than "
+        f"{auto.exact_up_to} agents (one and those below it), the default evaluator auto chooses "
+        "sampling or best-response, which try fewer joint actions. "
+        f"Rows: {', '.join(own)}.",
         WIDTH,
         break_on_hyphens=False,
     )

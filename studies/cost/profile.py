@@ -1,13 +1,13 @@
-"""What the time of a decision goes to, and how many joint actions it tries: of conditions as run.
+"""Profile of decisions: processor time by part, and the number of joint actions tried.
 
-While a team acts and learns as it would in a trial, a timer of the operating system asks at short
-intervals in which part of the program it is; the processor time since it asked last counts for
-that. So nothing is added to what is timed, and results stay as they are. Compiled code counts for
-whoever called it: where a world has compiled prediction, values and search into one call, all of it
-counts as prediction.
+This is a sampling profiler. While a team acts and learns as in a trial, a timer of the operating
+system interrupts at short intervals, and the processor time since the last interrupt counts for the
+part of the program that is running. The results of the team therefore do not change. Compiled code
+counts for its caller: where one compiled call predicts, values and searches, all of it counts as
+prediction.
 
-Beside the time stand the joint actions that the evaluator tried, and those that the formulas count
-(Eq. 18), which are of exact enumeration.
+The joint actions that the evaluator tries are compared with the formula (Eq. 18), which assumes
+exact enumeration.
 """
 
 from __future__ import annotations
@@ -38,27 +38,26 @@ from ..spec.tables import label_but
 from ..trials.arrangement import Arrangement, arrange, check_conditions
 
 PACKAGE = Path(__file__).parents[2]
-"""Where the program is."""
+"""Folder of the package."""
 SEED = 10_000
-"""Of the worlds and the team; no study reports it."""
+"""Seed of environments and team, which no study reports."""
 INTERVAL = 0.001
-"""Between two questions where the program is [s]."""
+"""Sampling interval [s]."""
 BEGINNING = 5
-"""Steps of the two episodes before, in which all is compiled and something is learned."""
+"""Steps of each of two episodes that compile everything and learn before timing begins."""
 LONGEST = 5.0
-"""How many times the wanted time is spent on a condition at most, to see an episode's end."""
+"""Maximum factor on the requested time, which may be exceeded to reach the end of an episode."""
 MOST_SECONDS = 3600.0
 
 DECIDING = ("predict", "value", "search", "messages")
-"""Parts of a decision: predicting what joint actions lead to, valuing that by rules or networks,
-choosing among joint actions, turns and messages."""
+"""Parts of a decision: predicting next states, valuing them, searching, passing messages."""
 PARTS = (*DECIDING, "learn", "world", "sense")
-"""These, learning, the world's step, and sensing where the world tells it apart."""
+"""All parts: those of a decision, learning, the step of the environment, and sensing."""
 ROOMS = {
     "core/adaptation": "predict",
     "core/interface": "predict",
     "scenarios": "predict",
-    "core/rules": "value",
+    "core/values": "value",
     "core/networks": "value",
     "core/learners": "value",
     "core/evaluators": "search",
@@ -67,26 +66,26 @@ ROOMS = {
     "core/agents": "messages",
     "core/hierarchy": "messages",
 }
-"""What the rooms of the program are for while a team decides; others work for those that call."""
+"""Part of a decision that the code of each folder belongs to; other code counts for its caller."""
 
 
 class Profile(NamedTuple):
-    """What a decision of one condition takes, and its step."""
+    """Profile of one condition."""
 
     condition: str
     group: str
-    """The condition without its size."""
+    """Label of the condition without its size."""
     agents: int
     evaluator: str
-    """What chooses among joint actions; of teams without one, the kind of learner."""
+    """Search method; for teams without search, the kind of learner."""
     decisions: int
-    """How many were timed."""
+    """Number of timed decisions."""
     tried: float
-    """Joint actions that a decision tried."""
+    """Joint actions tried per decision."""
     formula: int
-    """The same by the formulas."""
+    """Joint actions by the formula."""
     seconds: Mapping[str, float]
-    """Of a decision and its step, by part [s]."""
+    """Time per decision by part [s]."""
 
     @property
     def deciding(self) -> float:
@@ -116,16 +115,14 @@ class ProfileTable:
 
 
 def profile(spec: Spec | Mapping[str, object] | Path | str, seconds: float = 1.0) -> ProfileTable:
-    """Time decisions of every condition of a study, part by part, beside what they count.
-
-    Nothing is kept. Worlds and teams are of a seed that no study reports.
+    """Profile the decisions of every condition of a study; nothing is kept.
 
     Parameters
     ----------
     spec
         A `Spec`, a table, or the path of a TOML file.
     seconds
-        How long each condition is timed, once it is compiled and has learned from a few steps [s].
+        Time for each condition after compilation and a few steps of learning [s].
 
     Raises
     ------
@@ -136,7 +133,7 @@ def profile(spec: Spec | Mapping[str, object] | Path | str, seconds: float = 1.0
     if not 0.0 < seconds <= MOST_SECONDS:
         raise SpecError(f"--seconds {seconds:g}: must be above 0 and at most {MOST_SECONDS:g}")
     if sys.platform == "win32" or threading.current_thread() != threading.main_thread():
-        raise SpecError("profile: takes a timer of Linux or macOS, and the main thread")
+        raise SpecError("profile: needs the timer of Linux or macOS, and the main thread")
     check_conditions(spec)
     rows = []
     with spec.sources.active():
@@ -149,7 +146,7 @@ def profile(spec: Spec | Mapping[str, object] | Path | str, seconds: float = 1.0
 
 
 def _profile(names: tuple[str, str], own: Arrangement, steps: int, wanted: float) -> Profile:
-    """Return the profile of a condition, called by its label and that of its group."""
+    """Return the profile of a condition with its label and that of its group."""
     team = own.team
     for _ in control_loop(own.scenario, team, episodes=2, steps=min(BEGINNING, steps), seed=SEED):
         pass
@@ -179,35 +176,34 @@ def _profile(names: tuple[str, str], own: Arrangement, steps: int, wanted: float
         evaluator=search_method(team),
         decisions=decisions,
         tried=(team.counts.joint_actions - before) / decisions,
-        formula=team.hierarchy.joint_actions(len(team.action_set)),
+        formula=team.hierarchy.count_joint_actions(len(team.action_set)),
         seconds=each,
     )
 
 
 def search_method(team: Team) -> str:
-    """Return the evaluators of a team, or the kinds of learners that have none."""
-    return " ".join(dict.fromkeys(map(_evaluator, team.parts)))
-
-
-def _evaluator(part: object) -> str:
-    """Return what chooses among joint actions for a part of a team."""
-    if not isinstance(part, FuzzyAgents):
-        return type(part).__name__
-    if not isinstance(part.evaluator, Aggregation):
-        return part.settings.kind
-    settings = part.settings.decision.evaluator
-    if isinstance(settings, AutoSettings):
-        settings = settings.chosen(part.evaluator.problem)
-    return settings.kind
+    """Return the search methods of a team, or the kinds of learners that do not search."""
+    methods = []
+    for part in team.parts:
+        if not isinstance(part, FuzzyAgents):
+            methods.append(type(part).__name__)
+        elif not isinstance(part.evaluator, Aggregation):
+            methods.append(part.settings.kind)
+        else:
+            settings = part.settings.decision.evaluator
+            if isinstance(settings, AutoSettings):
+                settings = settings.chosen(part.evaluator.problem)
+            methods.append(settings.kind)
+    return " ".join(dict.fromkeys(methods))
 
 
 class Sampler:
-    """Adds up by part the processor time of what runs within, as a timer finds it.
+    """Samples processor time by part while its context is active.
 
     Attributes
     ----------
     seconds
-        By part [s].
+        Processor time by part [s].
     """
 
     def __init__(self) -> None:
@@ -238,7 +234,7 @@ class Sampler:
         self._last = now
 
     def _part(self, frame: FrameType | None) -> str:
-        """Return the part of what runs; empty where that is no step of the control loop."""
+        """Return the running part; empty outside a step of the control loop."""
         room = ""
         within = None
         while frame is not None and frame.f_code is not control_loop.__code__:
@@ -266,7 +262,7 @@ HEADS = ("condition", "evaluator", "tried", "formula", "ms", "us each")
 
 
 def _lines(rows: Sequence[Profile]) -> Iterator[str]:
-    """Yield the tables: what is counted and timed, and the time by part; then what has grown."""
+    """Yield the tables of counts and of times by part, then sentences on growth."""
     counted = [HEADS]
     timed: list[tuple[str, ...]] = [("ms", *PARTS)]
     for row in rows:
@@ -281,9 +277,9 @@ def _lines(rows: Sequence[Profile]) -> Iterator[str]:
     yield from align(timed, f"<{'>' * len(PARTS)}")
     yield ""
     yield from wrap(
-        "tried: joint actions a decision, by the evaluator that is used; formula: those of exact "
-        "enumeration (Eq. 18). ms: processor time of a decision; us each: for each joint action "
-        "tried. Learning and the world's step are not of a decision.",
+        "tried: joint actions per decision; formula: joint actions of exact enumeration (Eq. "
+        "18); ms: processor time of a decision without learning and the environment; us each: "
+        "time per joint action tried.",
         WIDTH,
     )
     yield from _growth(rows)
@@ -294,7 +290,7 @@ def _figures(value: float) -> str:
 
 
 def _growth(rows: Sequence[Profile]) -> Iterator[str]:
-    """Yield for each group how time has grown from its smallest to its largest team, and why."""
+    """Yield a sentence for each group on the growth of time from its smallest to largest team."""
     groups: dict[str, list[Profile]] = {}
     for row in rows:
         groups.setdefault(row.group, []).append(row)
@@ -310,17 +306,17 @@ def _growth(rows: Sequence[Profile]) -> Iterator[str]:
         text = (
             f"{f'{group}: ' * bool(group)}{first.agents} to {last.agents} agents: decisions take "
             f"{format_number(longer)} times as long: {format_number(tried)} times the joint "
-            f"actions, each {format_number(longer / tried)} times as long. {shares[most]:.0%} is "
-            f"{most}"
+            f"actions, each {format_number(longer / tried)} times as long. The largest part is "
+            f"{most} ({shares[most]:.0%})"
         )
         yield from wrap(f"{text}; {_evaluators(own)}.", WIDTH, subsequent_indent="  ")
 
 
 def _evaluators(rows: Sequence[Profile]) -> str:
-    """Return which evaluators there were, and which of them try what the formulas count."""
+    """Return the search methods, and which of them try as many joint actions as the formula."""
     names = list(dict.fromkeys(row.evaluator for row in rows))
     others = [row for row in rows if round(row.tried) != row.formula]
     if not others:
-        return "as the formulas count"
+        return "as many as by the formula"
     agents = ", ".join(str(row.agents) for row in others)
-    return f"{' then '.join(names)}: not what the formulas count with {agents} agents"
+    return f"{' then '.join(names)}: not as by the formula with {agents} agents"

@@ -12,10 +12,10 @@ from typing import TypedDict, Unpack
 from ...core.agents.cost import Problem, is_chain
 from ...core.plugins.words import expect, expect_each, expect_within
 from .cost import (
+    DECISION_METHODS,
     MEMBERSHIPS,
     PAPER,
     SINGLE_AGENT,
-    WAYS,
     CostRow,
     agents_below,
     broadcasts,
@@ -224,7 +224,7 @@ def _rows(
     network: bool,
 ) -> list[CostRow]:
     """Return the rows of a topology over n agents; without repeats nothing is measured."""
-    below = () if text in {SINGLE_AGENT, *WAYS} else agents_below(text, n)
+    below = () if text in {SINGLE_AGENT, *DECISION_METHODS} else agents_below(text, n)
     is_one = bool(below) and is_chain(below)
     formula = step_formula(text, n) if repeats else None
     measured = measure(text, n, repeats) if repeats else None

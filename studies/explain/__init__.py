@@ -1,1 +1,1 @@
-"""What a trained team has learned, in words and figures."""
+"""Explanations of trained teams in words and figures."""

@@ -1,13 +1,11 @@
-"""Explains a trained team: its functions with their rules in words, its policy, its self-model.
+"""Explanation of a trained team: its value functions, policy and self-model.
 
-A study keeps its trained teams if its spec says so. Else, a trial being a pure function of its
-content, its training is run again, in seconds, and held against the episodes that are kept. Either
-way the team explained is the team that was measured, or nothing is explained.
+A study keeps its trained teams if its spec says so. Otherwise the training is repeated and compared
+with the kept episodes. Either way, the explained team is the one that was measured.
 
-A rule base is taken apart into what each state variable adds to an agent's f.
-For every way of standing in the membership functions alike, f falls uniquely into a constant,
-functions of one variable, each of mean zero, and what several variables do together beyond them
-(the analysis of variance, Hoeffding 1948)::
+The value function f of an agent is decomposed by the analysis of variance (Hoeffding 1948), with
+all rules equally likely, into a constant, functions of one variable with mean zero, and
+interactions::
 
     f(x) = c + sum_j g_j(x_j) + the rest
 
@@ -42,9 +40,9 @@ from ...core.interface.scenario import PolicyMap, Scenario
 from ...core.interface.spaces import Variable
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.printing import printable
-from ...core.rules.kernels.fuzzy import Partition
-from ...core.rules.rule_base import RuleBase
-from ...scenarios.checking.predictions import apart
+from ...core.values.partitions import Partition
+from ...core.values.rule_base import RuleBase
+from ...scenarios.checking.predictions import state_differences
 from ..errors import WIDTH, SpecError, refused
 from ..store.database import STAGE, columns
 from ..store.durable import TEAM
@@ -57,19 +55,19 @@ WORDS = {
     3: ("low", "medium", "high"),
     5: ("very low", "low", "medium", "high", "very high"),
 }
-"""Of membership functions on a line that have none of their own."""
+"""Words for the membership functions of variables without labels."""
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What the f of one agent consists of."""
+    """Decomposition of the value function f of one agent."""
 
     constant: float
     """Mean of all rules."""
     singles: tuple[FloatArray, ...]
     """``(m_j,)`` consequents of every variable j, of mean zero: g_j at the centres."""
     variance: float
-    """Of all rules."""
+    """Variance over all rules."""
 
     def share(self, consequents: FloatArray) -> float:
         """Return the share of the variance that consequents of mean zero have."""
@@ -207,7 +205,7 @@ Effects = tuple[FloatArray, ...]
 
 @dataclass
 class BodyEffects:
-    """What the bodies were believed to be at some moments."""
+    """Effects of actuators as the self-model estimated them at some moments."""
 
     moments: dict[str, Effects]
     """Effects of all bodies by moment: ``built``, perhaps ``before`` the first failure, ``after``
@@ -216,34 +214,34 @@ class BodyEffects:
     """Standard deviations of the last of them, as the self-model has them."""
 
     def note(self, moment: str, model: SelfModel) -> None:
-        """Note what is believed now."""
+        """Record the present estimates."""
         self.moments[moment] = tuple(effect.copy() for effect in model.effects)
         self.deviations = model.deviations
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """What is known of a trained team."""
+    """Explanation of a trained team as numbers."""
 
     trial: Trial
-    """The trial that it was trained in."""
+    """Trial of the team."""
     agents: tuple[str, ...]
-    """Its agents, by name."""
+    """Names of the agents."""
     actuators: tuple[str, ...]
-    """What moves the bodies, by name; mostly the agents themselves."""
+    """Names of the actuators, which usually are the agents."""
     rules: RuleBase
-    """The rule base that all of them have."""
+    """Rule base of all agents."""
     variables: tuple[Variable, ...]
-    """Its state variables."""
+    """State variables of the rule base."""
     parts: tuple[Parts, ...]
-    """What each agent's f consists of."""
+    """Decomposition of the value function of each agent."""
     policy: PolicyMap | str
-    """What its scenario shows of what it does: text by ``lines()``, a drawing by ``figure()``; or
-    why there is none."""
+    """Policy map of the scenario with ``lines()`` and ``figure()``, or the reason why there is
+    none."""
     bodies: BodyEffects | None
-    """What bodies believed their actuators to do; none: they have no self-model."""
+    """Estimates of the self-model; None without one."""
     errors: pd.DataFrame | None
-    """By how much predictions are wrong, see `errors_of`; none: the team has not learned them."""
+    """Errors of the learned predictor, see `errors_of`; None without one."""
 
 
 def explain(store: Store, trial: Trial) -> Explanation:
@@ -375,7 +373,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
     """Return root mean square errors by variable, or None if nothing is predicted by experience.
 
     The team acts by what it has learned. Each decision is held for as long as predictions look
-    ahead. The given predictor stands beside, if there is one that looks as far.
+    ahead. The given predictor is compared if it has the same horizon.
 
     Parameters
     ----------
@@ -396,7 +394,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         team.begin_world(world, episode)
         for _ in range(DECISIONS):
             joint = team.act(Observation(states, scenario), explore=False).joint_action
-            guesses = {"learned": _states(predictor.predict(states), joint), "as it is": states}
+            guesses = {"learned": _states(predictor.predict(states), joint), "persistence": states}
             given = scenario.predict() if scenario.horizon == horizon else None
             if given is not None:
                 guesses["given"] = _states(given, joint)
@@ -405,7 +403,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
                 break
             states = reached
             for name, guess in guesses.items():
-                errors[name].append(apart(scenario, states, guess))
+                errors[name].append(state_differences(scenario, states, guess))
     index = [variable.name for variable in scenario.state_space.variables]
     roots = {name: np.sqrt(np.square(e).mean(axis=(0, 1))) for name, e in errors.items()}
     return pd.DataFrame(roots, index=index)

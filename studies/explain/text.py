@@ -15,28 +15,62 @@ from ...core.numerics import pd
 from ..errors import WIDTH
 from ..presentation import figures
 from ..presentation.figures import add_legend, look, marker
-from .team import BodyEffects, Explanation, Parts, exponent, mean_shares, percent, rules_table
+from .team import (
+    BodyEffects,
+    Explanation,
+    Parts,
+    exponent,
+    labels,
+    mean_shares,
+    percent,
+    place,
+    rules_table,
+)
 
 TEMPLATE = Path(__file__).with_name("text.txt.jinja")
-MOST_AGENTS = 8
-"""Agents whose rules are printed; the file holds those of all."""
+N_VARIABLES = 3
+"""Number of variables in a summary."""
 
 
-def text(explained: Explanation, agents: int | None = None) -> str:
-    """Return the explanation.
+def summarize(explained: Explanation) -> list[str]:
+    """Return the most important facts about a trained team in about ten lines.
 
-    Parameters
-    ----------
-    explained
-        The explanation.
-    agents
-        How many agents' rules to write; none: all. Those that have the same are written once.
+    The first agent stands for all agents of the team.
     """
+    trial = explained.trial
+    count = f"{len(explained.agents)} agents with {explained.rules.n_rules} rules each"
+    lines = [f"{trial.condition}, seed {trial.seed}: {count}."]
+    if not any(part.variance > 0 for part in explained.parts):
+        return [*lines, "All rules have equal weights: the team has learned nothing."]
+    first = explained.parts[0]
+    lines.append(f"Most important state variables, with the values for {explained.agents[0]}:")
+    for j, share in list(mean_shares(explained.parts).items())[:N_VARIABLES]:
+        variable = explained.variables[j]
+        partition = explained.rules.partitions[j]
+        names = labels(variable, partition)
+        best, worst = (
+            f"{names[k]} ({place(variable, partition.centres[k])})"
+            for k in (int(first.singles[j].argmax()), int(first.singles[j].argmin()))
+        )
+        lines.append(f"  {variable.name} ({percent(share)}): best is {best}, worst {worst}")
+    groups = share_rules(explained.agents, explained.parts)
+    if len(groups) == 1:
+        lines.append("All agents share one value function.")
+    elif len(groups) < len(explained.agents):
+        lines.append(f"The agents share {len(groups)} value functions.")
+    if explained.bodies:
+        failures = list(verdicts(explained.bodies, explained.actuators))
+        lines += failures or ["The self-model finds that all actuators work."]
+    return lines
+
+
+def text(explained: Explanation) -> str:
+    """Return the whole explanation; agents with the same functions are written once."""
     parts = explained.parts
     variables = explained.variables
     bodies = explained.bodies
     alike = share_rules(explained.agents, parts)
-    first = [explained.agents.index(names[0]) for names in alike][:agents]
+    first = [explained.agents.index(names[0]) for names in alike]
     shares = [f"{variables[j].name} {percent(share)}" for j, share in mean_shares(parts).items()]
     environment = jinja2.Environment(trim_blocks=True, undefined=jinja2.StrictUndefined)
     environment.filters["wrapped"] = _wrapped
@@ -54,8 +88,7 @@ def text(explained: Explanation, agents: int | None = None) -> str:
             [explained.agents[i] for i in first],
             [parts[i] for i in first],
         ),
-        alike=[" = ".join(names) for names in alike[:agents] if len(names) > 1],
-        more=len(alike) - len(first),
+        alike=[" = ".join(names) for names in alike if len(names) > 1],
         verdicts=list(verdicts(bodies, explained.actuators)) if bodies else (),
         effects=effects_table(bodies, explained.actuators) if bodies else "",
         errors="" if explained.errors is None else explained.errors.to_string(float_format="%.3g"),
@@ -65,7 +98,7 @@ def text(explained: Explanation, agents: int | None = None) -> str:
 
 
 def share_rules(agents: Sequence[str], parts: Sequence[Parts]) -> list[list[str]]:
-    """Return the agents in groups whose functions are the same, as where they share weights."""
+    """Return groups of agents with equal functions, which share weights."""
     groups: dict[bytes, list[str]] = {}
     for name, part in zip(agents, parts, strict=True):
         groups.setdefault(np.concatenate(part.singles).tobytes(), []).append(name)
@@ -100,10 +133,10 @@ def effects_table(bodies: BodyEffects, actuators: Sequence[str]) -> str:
 
 
 def verdicts(bodies: BodyEffects, actuators: Sequence[str]) -> Iterator[str]:
-    """Yield, for every actuator whose drive is not what it was built with, what it is taken for.
+    """Yield a line for every actuator that the self-model finds changed.
 
-    Its drive is the part of its effect that is along the one it was built with; a change within
-    two of its standard deviations is called uncertain.
+    The drive of an actuator is the projection of its effect on the effect as built. A change within
+    two standard deviations is called uncertain.
     """
     built = bodies.moments["built"]
     last = bodies.moments["after"]

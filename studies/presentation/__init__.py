@@ -1,1 +1,1 @@
-"""How estimates look: figures, tables, files; nothing is computed here."""
+"""Presentation of estimates as figures, tables and files, without any computation."""

@@ -1,4 +1,4 @@
-"""How every figure looks, and how figures are written to files."""
+"""Style of all figures, and writing of figures to files."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,25 +16,27 @@ from numpy.typing import ArrayLike
 
 from ...core.fonts import cover_text
 from ..results.aggregates import Aggregates
-from ..results.analysis import Difference, Figures
-from ..results.statistics import LEVEL, Estimate, stack_estimates
+from ..results.analysis import Figures
+from ..results.differences import Difference
+from ..results.permutation_tests import LEVEL
+from ..results.statistics import Estimate, stack_estimates
 from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")
 """Formats that figures are written in."""
 USUAL = ("png", "svg")
-"""Those that figures of a study are written in by default."""
+"""Default formats of the figures of a study."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Distinct to colour-blind readers (Okabe and Ito 2008); the palest is left out."""
+"""Colors distinct to color-blind readers (Okabe and Ito 2008), without the palest."""
 STYLES = (
     "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1.5, 1, 1.5, 1, 1.5)),
     (0, (1, 3.5)), (0, (8, 3)),
 )  # fmt: skip
-"""As many as there are colours, most of which are one grey on paper."""
+"""Line styles, one for each color, because most colors are the same gray on paper."""
 MARKERS = "osD^vPX"
-"""The same for points."""
+"""Markers of points, one for each color."""
 IN_ROW = 0.2
-"""How far the points of one row of a chart stand apart, in rows."""
+"""Distance between the points of one row of a chart [rows]."""
 SETTINGS: dict[str, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -47,13 +49,13 @@ SETTINGS: dict[str, Any] = {
 
 @contextmanager
 def apply_style() -> Iterator[None]:
-    """Let figures that are made within look as all do."""
+    """Apply the style of all figures to those made within the context."""
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
         yield
 
 
 def spell_dollars(figure: Figure, names: Iterable[str]) -> Figure:
-    """Let ``$`` be a character in a figure if it is one in names; else it begins a formula."""
+    """Print ``$`` as a character if any name contains it, instead of starting a formula."""
     if any("$" in name for name in names):
         for text in figure.findobj(Text):
             if isinstance(text, Text) and "$" in text.get_text():  # ticks of logarithms come later
@@ -77,7 +79,7 @@ def grid(
     least: float = 0.0,
     **sharing: Any,
 ) -> tuple[Figure, Any]:
-    """Return a figure of a number of panels, see `panels`, at most so many side by side.
+    """Return a figure with a number of panels, at most `most` in a row, see `panels`.
 
     Width and height [inch] are those of `each` panel and the `margin` of all of them; the width is
     the `least` at least.
@@ -92,20 +94,20 @@ def grid(
 
 
 def look(index: int) -> dict[str, Any]:
-    """Return colour and dashes of a line, by which lines differ."""
+    """Return color and dashes of a line."""
     cycle = index // len(COLOURS)  # a colour that comes again has other dashes
     return {"color": COLOURS[index % len(COLOURS)], "ls": STYLES[(index + cycle) % len(STYLES)]}
 
 
 def marker(index: int) -> str:
-    """Return the marker that goes with a `look`."""
+    """Return the marker that belongs to a `look`."""
     return MARKERS[index % len(MARKERS)]
 
 
 def draw_curve(
     axes: Axes, x: ArrayLike, estimate: Estimate, index: int, *, alpha: float = 0.12, **kwargs: Any
 ) -> None:
-    """Draw estimates ``(n,)`` over `x` as a line, with a band for their intervals."""
+    """Draw estimates ``(n,)`` over `x` as a line with a band of intervals."""
     axes.fill_between(
         np.asarray(x), estimate.low, estimate.high, color=look(index)["color"], alpha=alpha, lw=0
     )
@@ -123,7 +125,7 @@ def draw_row(
 
 
 def beside(count: int) -> list[float]:
-    """Return where the points of one row stand, in rows from its middle.
+    """Return the offsets of the points of one row from its middle [rows].
 
     >>> beside(3)
     [-0.2, 0.0, 0.2]
@@ -138,12 +140,12 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 
 
 def as_rates(axes: Axes, which: Literal["x", "y"] = "y") -> None:
-    """Let an axis show rates, from 0 to 1."""
+    """Set the limits of an axis of rates."""
     axes.set(**{f"{which}lim": (-0.03, 1.03)})
 
 
 def as_episodes(axes: Axes) -> None:
-    """Let the horizontal axis count episodes."""
+    """Label the horizontal axis as episodes, with whole numbers."""
     axes.set_xlabel("episode")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1, steps=[1, 2, 5, 10]))
     axes.tick_params(labelbottom=True)
@@ -155,7 +157,7 @@ def handle(label: str, **kwargs: Any) -> Line2D:
 
 
 def add_legend(figure: Figure, handles: Sequence[Line2D], title: str = "", ncols: int = 4) -> None:
-    """Name what is drawn, above the panels."""
+    """Add a legend above the panels."""
     figure.legend(
         handles=handles, title=title or None, loc="outside upper center", ncols=ncols,
         frameon=False, handlelength=3,
@@ -163,13 +165,13 @@ def add_legend(figure: Figure, handles: Sequence[Line2D], title: str = "", ncols
 
 
 def name_curves(figure: Figure, labels: Sequence[str], title: str = "", **look_of: Any) -> None:
-    """Name the curves above the panels, as many beside each other as there is room for."""
+    """Add a legend of curves above the panels, with as many columns as fit."""
     handles = [handle(label, **look(i), lw=1.6, **look_of) for i, label in enumerate(labels)]
     add_legend(figure, handles, title, ncols=max(1, 90 // (max(map(len, labels)) + 8)))
 
 
 def name_points(figure: Figure, labels: Sequence[str], title: str = "") -> None:
-    """Name the points of `draw_row` above the panels."""
+    """Add a legend of the points of `draw_row` above the panels."""
     looks = [{"color": look(i)["color"], "marker": marker(i), "ls": ""} for i in range(len(labels))]
     add_legend(figure, [handle(n, **own) for n, own in zip(labels, looks, strict=True)], title)
 
@@ -186,9 +188,9 @@ def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = U
 
 
 def write(figure: Figure, path: Path) -> None:
-    """Write a figure: SVG, PNG or PDF by suffix; it is there whole or not at all.
+    """Write a figure atomically as SVG, PNG or PDF, by the suffix of the path.
 
-    Equal figures give equal files: no date in them.
+    Equal figures give equal files, because they hold no date.
 
     Raises
     ------
@@ -203,7 +205,7 @@ def write(figure: Figure, path: Path) -> None:
 
 
 def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
-    """Let an axis be logarithmic, its ticks plain numbers: 0.5, 1, 2, 5.
+    """Make an axis logarithmic with plain numbers as ticks: 0.5, 1, 2, 5.
 
     It stays linear where nothing is above zero.
     """
@@ -220,26 +222,26 @@ def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
 
 
 def check_suffix(path: Path) -> None:
-    """Refuse a path that `write` does not take, before anything is computed for it."""
+    """Raise `ValueError` if `write` does not support the suffix of a path."""
     if path.suffix not in SUFFIXES:
         raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
 
 
 CHARACTERS = 15
-"""Of a legend that have room in an inch."""
+"""Characters of a legend that fit into an inch."""
 APART = 0.06
-"""How far neighbouring lines stand apart, in doublings of the horizontal axis."""
+"""Distance between neighboring lines, in doublings of the horizontal axis."""
 
 
 def style(index: int) -> dict[str, Any]:
-    """Return how a line looks: lines differ in colour, marker and dashes."""
+    """Return color, marker and dashes of a line."""
     return look(index) | {"marker": marker(index), "markersize": 4, "linewidth": 1.2}
 
 
 def draw_line(
     axes: Axes, sizes: Sequence[int], estimates: Sequence[Estimate], index: int, lines: int
 ) -> None:
-    """Draw estimates with their intervals: line `index` of so many lines, beside the others."""
+    """Draw line `index` of several lines with intervals, shifted a little from the others."""
     beside = 2.0 ** (APART * (index - (lines - 1) / 2))
     places = [beside * n for n in sizes]
     all_of_them = stack_estimates(estimates)
@@ -248,7 +250,7 @@ def draw_line(
 
 
 def scale_axis(axes: Axes, sizes: Sequence[int]) -> None:
-    """Let the horizontal axis be the logarithm of the size of teams."""
+    """Make the horizontal axis the logarithm of the team size."""
     axes.set_xscale("log", base=2)
     axes.set_xticks(sizes, [str(n) for n in sizes])
     axes.xaxis.set_minor_locator(NullLocator())
@@ -256,7 +258,7 @@ def scale_axis(axes: Axes, sizes: Sequence[int]) -> None:
 
 
 def name_lines(figure: Figure, labels: Sequence[str], title: str) -> None:
-    """Name the lines above the panels, as many beside each other as there is room for."""
+    """Add a legend of lines above the panels, with as many columns as fit."""
     handles = [handle(label, **style(i)) for i, label in enumerate(labels)]
     room = int(CHARACTERS * figure.get_figwidth() // (max(map(len, labels)) + 6))
     add_legend(figure, handles, title, ncols=max(1, min(4, room)))
@@ -319,7 +321,7 @@ def _forest_legend(figure: Figure, lines: Sequence[Difference]) -> None:
 
 
 def count_seeds(counts: Iterable[int]) -> str:
-    """Return in words how many seeds there are, of conditions that may differ in them.
+    """Return the number of seeds, or its range if conditions differ.
 
     >>> count_seeds([20, 20]), count_seeds([20, 18, 20])
     ('20', '18 to 20')

@@ -13,12 +13,12 @@ from ..results.scaling_law import ScalingLaw, scaling_law
 from . import figures
 
 POINTS = 60
-"""Of a line."""
+"""Points of a curve."""
 BEYOND = 2.0
-"""How far beyond the largest size a law is drawn if nothing else is predicted."""
+"""Factor by which a curve extends beyond the largest size if no size is predicted."""
 
 REPORTED = {"success": "growth of success", "decision_median": "growth of the time of a decision"}
-"""Measures whose laws are drawn in a report, and what the figures are called."""
+"""Names of the figures of laws in a report, by measure."""
 
 
 def growth_figures(results: Results) -> dict[str, Figure]:

@@ -1,13 +1,14 @@
-"""A sentence for each team that learns: whether it has learned, and beside what."""
+"""A sentence for each learning team: whether it learned, compared with its controls."""
 
 from collections.abc import Mapping
 from typing import Any
 
-from ..results.analysis import Difference, estimate_of
-from ..results.contrasts import contrasts
+from ..results.analysis import estimate_of
+from ..results.comparison import compare_conditions
+from ..results.differences import Difference
 from ..results.notation import format_estimate, wrapped
+from ..results.permutation_tests import LEVEL
 from ..results.results import Results
-from ..results.statistics import LEVEL
 from ..spec.controls import (
     LEARN_NOTHING,
     TROUBLESHOOTING,
@@ -18,11 +19,11 @@ from ..spec.controls import (
 from .progress import count
 
 MOST = 3
-"""Teams that learn of which sentences are made; of more, tables and verdicts tell."""
+"""Largest number of learning teams that have sentences; more are left to the tables."""
 
 
 def headlines(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return sentences that say what the teams of a study have learned, in evaluation.
+    """Return sentences on what the teams of a study have learned, by evaluation.
 
     They are judged by `Results.main`. A team has learned if it is significantly better than the
     control that differs from it in learning alone, p adjusted over all conditions. None of teams
@@ -50,9 +51,9 @@ def headlines(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tu
 
 
 def below_random(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return a remark on the learners whose evaluation ends below that of random actions, in lines.
+    """Return a remark, in lines, on learners that end below the random control of their scenario.
 
-    Learners are judged by the means of `Results.main`, beside the random control of their scenario.
+    The comparison uses the means of `Results.main`.
     """
     main = results.main
     there = {c: settings[c] for c in results.of_phase("evaluation") if c in settings}
@@ -79,7 +80,7 @@ def _sentence(
     results: Results, team: str, control: str, settings: Mapping[str, Mapping[str, Any]]
 ) -> str:
     """Return what is said of a team that learns, and of its controls."""
-    compared = contrasts(results, results.main.name, "evaluation", reference=team)
+    compared = compare_conditions(results, results.main.name, "evaluation", reference=team)
     less = {d.condition: d for d in compared.differences}
     counted = count(len(results.seeds(team)), "seed")
     is_learned = control in less and _is_below(less[control])

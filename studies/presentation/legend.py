@@ -1,4 +1,4 @@
-"""What columns of tables mean, in words."""
+"""Explanations of table columns."""
 
 import tomllib
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ def _known() -> dict[str, str]:
 
 
 def meanings(titles: Iterable[str]) -> dict[str, str]:
-    """Return what columns are, by title; those that only their scenario knows are left out.
+    """Return explanations of columns by title, as far as they are known.
 
     Examples
     --------

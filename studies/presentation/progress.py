@@ -1,6 +1,6 @@
-"""How a study goes, shown while it runs: a bar on a terminal, else lines.
+"""Progress of a running study: a bar on a terminal, otherwise lines.
 
-With them are words for numbers of things and lengths of time.
+The module also formats counts and durations.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def duration(seconds: float) -> str:
 
 
 PLAIN_SECONDS = 10.0
-"""How often a line tells of the progress when there is no terminal."""
+"""Interval between lines of progress without a terminal [s]."""
 
 
 def say(line: str) -> None:
@@ -59,7 +59,7 @@ def say(line: str) -> None:
 
 
 class Terminal(Observer):
-    """Shows on standard error how a study goes; what is noted more than once is said once.
+    """Shows the progress of a study on standard error; repeated notes are printed once.
 
     `react` is called with every outcome, while other trials run.
     """
@@ -69,7 +69,7 @@ class Terminal(Observer):
         self._noted: set[str] = set()
 
     def announce(self, spec: Spec, directory: Path, processes: int) -> None:
-        """Say what is about to be run."""
+        """Print the size of the study before it runs."""
         conditions = len(spec.conditions())
         seeds = len(spec.seeds)
         self.note(
@@ -79,14 +79,14 @@ class Terminal(Observer):
         )
 
     def note(self, line: str) -> None:
-        """Say it, if it has not been said."""
+        """Print a note once."""
         if line not in self._noted:
             self._noted.add(line)
             width = get_terminal_size().columns if sys.stderr.isatty() else len(line)
             say(line if len(line) <= width else fill(line, width, subsequent_indent="  "))
 
     def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
-        """Show how many of `total` trials are done, which have failed, and how long is left."""
+        """Show progress, failures and remaining time."""
         if done:
             say(f"{done} of {total} trials were run before")
         if done == total:

@@ -17,6 +17,7 @@ from shutil import get_terminal_size
 from typing import Any, Literal, NamedTuple, TextIO
 
 import numpy as np
+from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -36,14 +37,14 @@ from .progress import count
 Format = Literal["table", "csv", "json"]
 
 FORMATS = {"seed": "d", "episode": "d", "steps": "d", "return": ".4g"}
-"""How values are shown that all scenarios have; measures see to theirs."""
+"""Formats of the values that all scenarios have; measures define the others."""
 MISSING = "–"
 
 
 def write_rows(
     frame: pd.DataFrame, measures: Sequence[Measure], form: Format, file: TextIO
 ) -> None:
-    """Write a frame of episodes, some of whose columns are those of `measures`.
+    """Write a frame of episodes, which has the columns of `measures`.
 
     CSV and JSON hold every digit, so equal results are equal bytes. Truth values are 0 and 1 in
     CSV, true and false in JSON.
@@ -162,7 +163,7 @@ class SummaryTable:
     titles: tuple[str, ...]
     """Headings of the estimates."""
     lines: tuple[Summary, ...]
-    """Its lines. Printed, it is as on a terminal of 80 columns; a notebook shows it as HTML."""
+    """Lines of the table. It prints as on a terminal of 80 columns; notebooks show HTML."""
 
     def __str__(self) -> str:
         file = io.StringIO()
@@ -193,13 +194,13 @@ class SummaryTable:
 
     @property
     def seeds(self) -> int:
-        """How many seeds all its lines have; 0 if they differ."""
+        """Number of seeds of all lines; 0 if they differ."""
         (least, *more) = {seeds for _, seeds, _ in self.rows} or {0}
         return 0 if more else least
 
     @property
     def legend(self) -> list[str]:
-        """Lines that say what stands in the cells."""
+        """Lines that explain the cells."""
         if not self.rows:
             return ["no trial has finished"]
         over = count(self.seeds, "seed") if self.seeds else "seeds"
@@ -207,19 +208,19 @@ class SummaryTable:
 
     @property
     def meanings(self) -> dict[str, str]:
-        """What its columns are, by heading, as far as it is known."""
+        """Explanations of the columns by heading, as far as they are known."""
         return meanings(self.titles)
 
     @property
     def remark(self) -> str:
-        """What must be said of the intervals."""
+        """Remark on the intervals."""
         if all(seeds >= FEW for _, seeds, _ in self.rows):
             return "Intervals: of rates Wilson's, else by bootstrap (short if values are skewed)."
         return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Its lines as text."""
+        """Lines as text."""
         rows = []
         for line in self.lines:
             estimates = (line.estimates.get(title) for title in self.titles)
@@ -236,6 +237,23 @@ class SummaryTable:
             parts = stack_estimates([line.estimates.get(title, UNKNOWN) for line in self.lines])
             columns |= zip((title, f"{title} low", f"{title} high"), parts, strict=True)
         return in_csv(pd.DataFrame(columns))
+
+    @property
+    def json(self) -> str:
+        """The whole table as JSON with every digit; unknown bounds are null.
+
+        A row has ``condition``, ``seeds``, and ``value``, ``low`` and ``high`` by title.
+        """
+        rows = []
+        for line in self.lines:
+            estimates = {
+                title: dict(zip(("value", "low", "high"), map(_finite, estimate), strict=True))
+                for title, estimate in line.estimates.items()
+                if title in self.titles
+            }
+            row = {"condition": line.condition, "seeds": line.seeds, "estimates": estimates}
+            rows.append(json.dumps(row))
+        return "[" + ",\n ".join(rows) + "]\n"
 
     @property
     def markdown(self) -> str:
@@ -269,8 +287,14 @@ class SummaryTable:
         return self.html
 
 
+def _finite(value: ArrayLike) -> float | None:
+    """Return a number of JSON, which has no infinity and no NaN."""
+    number = float(np.asarray(value))
+    return number if np.isfinite(number) else None
+
+
 def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTable:
-    """Return the table of some summaries, whose estimates may differ in their titles.
+    """Return the table of summaries, which may have different estimates.
 
     Parameters
     ----------
@@ -306,7 +330,7 @@ def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> s
     frame
         Cells by heading.
     names
-        The column whose texts, as those of headings, are no LaTeX yet.
+        Column of plain text that needs escaping, as headings do.
     columns
         Arguments of ``tabular``: how columns are aligned.
     note
@@ -320,7 +344,7 @@ def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> s
 
 
 def _protected(text: str) -> str:
-    """Return escaped text that is no option of the line before, and whose > any font shows."""
+    """Return escaped text that LaTeX does not take for an option of the line before."""
     return "{}" * text.startswith(("[", "*")) + text.replace(">", "$>$")
 
 
@@ -347,20 +371,20 @@ Row = tuple[str, int, tuple[Cell | None, ...]]
 
 
 LABEL = 24
-"""What a condition's label may be broken to, if there is no room for all of it [characters]."""
+"""Width to which a condition's label may be broken [characters]."""
 
 
 class Column(NamedTuple):
     """A column on a terminal: values end at one place, and their intervals begin at one."""
 
     place: int
-    """Of its title among those of the table."""
+    """Index of its title in the table."""
     heading: str
-    """Its title, in one line or two."""
+    """Title in one or two lines."""
     value: int
     """Width of its values [characters]."""
     width: int
-    """Its width [characters]."""
+    """Width [characters]."""
 
     def padded(self, cell: Cell | None) -> str:
         """Return a cell of it."""
@@ -368,7 +392,7 @@ class Column(NamedTuple):
 
 
 def _columns(titles: Sequence[str], rows: Sequence[Row], lines: int) -> Iterator[Column]:
-    """Yield columns whose titles have so many lines at most, one or two."""
+    """Yield columns with titles of at most `lines` lines, one or two."""
     for i, title in enumerate(map(printable, titles)):
         cells = [cell for _, _, row in rows if (cell := row[i])]
         value = max((len(cell.value) for cell in cells), default=0)
@@ -390,7 +414,7 @@ def _in_two_lines(title: str) -> str:
 def _blocks(
     titles: Sequence[str], rows: Sequence[Row], label: int, width: int
 ) -> list[list[Column]]:
-    """Return which columns stand side by side: in one block if titles fit in a line, or in two.
+    """Return blocks of columns that fit side by side, one block if titles of two lines fit.
 
     Otherwise in as few blocks as fit.
     """

@@ -1,4 +1,4 @@
-"""The page: what a study's directory holds, in figures and sentences, put into the template."""
+"""Report pages: results of a study rendered into an HTML template."""
 
 import platform
 import re
@@ -18,11 +18,10 @@ from ..presentation.growth import growth_figures
 from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.analysis import Analysis, identity_lines
-from ..results.contrasts import contrasts, missing_reference
-from ..results.notation import format_estimate, whole
+from ..results.analysis import identity_lines
+from ..results.comparison import compare_conditions, missing_reference
+from ..results.notation import whole
 from ..results.results import read
-from ..results.statistics import LEVEL
 from ..spec.controls import control_lines
 from ..spec.outline import StudyOutline, sources_of
 from ..spec.tables import dumps
@@ -31,8 +30,16 @@ from ..store.store import Store
 from ..workers.runner import installed
 from .pictures import hierarchy_pictures, pictures
 from .replays import Replays, replays
+from .sentences import condition_sentences, main_title, methods, significant, verdict
 
 FOLDER = Path(__file__).parent
+CITATION = (
+    "nested-agents contributors (2026). nested-agents, version {version}. Its architecture is that "
+    "of Karigiannis, J. N., Rekatsinas, T. I. and Tzafestas, C. S. (2010). Fuzzy Rule Based "
+    "Neuro-Dynamic Programming for Mobile Robot Skill Acquisition on the basis of a Nested "
+    "Multi-Agent Architecture."
+)
+"""References for a publication that uses the results, see CITATION.cff."""
 
 
 def page(directory: Path) -> str:
@@ -41,7 +48,7 @@ def page(directory: Path) -> str:
     Raises
     ------
     SpecError
-        If the directory holds no readable study, or rows that are damaged.
+        If the directory has no readable study, or its results are damaged.
     """
     with Store.open(directory) as store:
         store.verify()
@@ -64,25 +71,26 @@ def page(directory: Path) -> str:
         figures |= growth_figures(results)
     notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
-        notes = contrasts(
-            results, results.main.name
-        ).notes  # what `compare` says of it, this included
+        notes = compare_conditions(results, results.main.name).notes  # with the identity lines
     notes = (*missing_reference(results), *notes)
     there = {label: own for label, own in settings.items() if label in results.conditions}
     table = tabulate(analysis.table)
-    rate = rate_of(table)
+    rate = main_title(table)
     return _template("page").render(
         study=outline.study,
+        title=outline.table.get("title") or outline.study,
+        citation=CITATION.format(version=installed("nested-agents")),
         extent=extent(outline),
         compared=", ".join(next(iter(outline.columns.values()))),
         standing=standing(len(trials), counts["done"], counts["failed"]),
         complete=counts["done"] == len(trials),
         significant=significant(analysis),
-        leads=headlines(results, there) or extremes(table, rate),
-        rate=rate,
+        leads=(*verdict(table, rate, analysis), *headlines(results, there)),
+        sentences=condition_sentences(table, rate, analysis),
+        methods=methods(outline, settings, extent(outline), is_compared=bool(analysis.differences)),
         notes=unfolded((*notes, *control_lines(there), *below_random(results, there))),
         table=table,
-        pictures=pictures(figures),
+        pictures=pictures(dict(sorted(figures.items(), key=is_secondary))),
         replays=packed,
         topologies=topologies(outline),
         hierarchies=drawn,
@@ -109,13 +117,13 @@ def comparison_page(
     Parameters
     ----------
     title
-        What is compared.
+        Title of the comparison.
     sources
-        Where the results are from.
+        Origin of the results.
     notes
-        What is said of them, in lines.
+        Remarks, in lines.
     table, figures
-        What is shown.
+        Table and figures of the comparison.
     """
     return _template("comparison").render(
         title=title,
@@ -130,7 +138,7 @@ def comparison_page(
 
 
 def player_page(packed: Replays) -> str:
-    """Return a page of packed episodes alone, which a notebook shows in a frame; empty of none."""
+    """Return a page that plays episodes, for a frame in a notebook; empty without episodes."""
     if not packed.episodes:
         return ""
     script = Markup(packed.script)
@@ -139,12 +147,12 @@ def player_page(packed: Replays) -> str:
 
 
 def check_path(file: Path) -> None:
-    """Refuse to write a page to where no HTML file can be.
+    """Check that an HTML file can be written to a path.
 
     Raises
     ------
     SpecError
-        If it is a directory, has another suffix, or is in no directory.
+        If the path is a directory, has another suffix, or its directory does not exist.
     """
     if file.is_dir() or not file.name:
         raise SpecError(f"--out {file}: is a directory")
@@ -167,44 +175,20 @@ def _template(name: str) -> jinja2.Template:
     return environment.get_template(f"{name}.html.jinja")
 
 
-def rate_of(table: SummaryTable) -> str:
-    """Return the heading of the success that a summary tells, in evaluation if it is there.
-
-    Where nothing is one, that of the return.
-    """
-    titles = [title for title in table.titles if "difference" not in title]
-    rates = [t for t in titles if "success" in t] or [t for t in titles if "return" in t]
-    return next((title for title in rates if "evaluation" in title), rates[0] if rates else "")
-
-
-def extremes(table: SummaryTable, title: str) -> tuple[str, ...]:
-    """Return the lowest and the highest of a column as a sentence; none of fewer than two lines."""
-    lines = [line for line in table.lines if title in line.estimates]
-    lines.sort(key=lambda line: float(line.estimates[title].value))
-    if len(lines) < 2:
-        return ()
-    ends = (lines[0], lines[-1])
-    low, high = (f"{format_estimate(line.estimates[title])} ({line.condition})" for line in ends)
-    return (f"{title.capitalize()}: from {low} to {high}.",)
-
-
-def significant(analysis: Analysis) -> str:
-    """Return how many differences are significant, in words; empty if nothing was compared."""
-    compared = [d.p < LEVEL for group in analysis.differences.values() for d in group]
-    return (
-        f"{sum(compared)} of {count(len(compared), 'difference')} significant" if compared else ""
-    )
+def is_secondary(figure: tuple[str, object]) -> bool:
+    """Return whether a figure shows something else than success; such figures come last."""
+    return "success" not in figure[0] and "learning" not in figure[0]
 
 
 class Note(NamedTuple):
-    """A line of what a study says, in one piece."""
+    """A remark of a study without line breaks."""
 
     indent: int
     text: str
 
 
 def unfolded(lines: Iterable[str]) -> list[Note]:
-    """Return lines whose continuations, indented by two, are joined to what they continue."""
+    """Join the continuations of lines, which are indented by two, to the lines they continue."""
     notes: list[Note] = []
     for line in lines:
         indent = len(line) - len(line.lstrip())
@@ -217,7 +201,7 @@ def unfolded(lines: Iterable[str]) -> list[Note]:
 
 
 def _read_own(name: str) -> Markup:
-    """Return a file of this package, which is HTML already."""
+    """Return a file of this package as safe HTML."""
     return Markup((FOLDER / name).read_text(encoding="utf-8"))
 
 
@@ -233,11 +217,11 @@ PACKAGES = (
     "scipy",
     "shapely",
 )
-"""The packages that results and figures come from."""
+"""Packages that compute results and figures."""
 
 
 def runs(values: Iterable[int]) -> str:
-    """Return whole numbers in order, runs of three or more by their ends.
+    """Return sorted whole numbers in words; runs of three or more are given by their ends.
 
     >>> runs([0, 1, 2, 3, 7, 9, 8, 20]), runs([1, 0])
     ('0 to 3, 7 to 9, 20', '0, 1')
@@ -252,7 +236,7 @@ def runs(values: Iterable[int]) -> str:
 
 
 def extent(outline: StudyOutline) -> str:
-    """Return what a study consists of."""
+    """Return the number of conditions, seeds, episodes and steps of a study in words."""
     after = ""
     if outline.evaluation:
         longest = outline.table.get("evaluation_steps")
@@ -269,7 +253,7 @@ def extent(outline: StudyOutline) -> str:
 
 
 def topologies(outline: StudyOutline) -> dict[str, str]:
-    """Return the topologies that a spec names, as it writes them, failures included, by where."""
+    """Return the topologies in a spec as written there, by the part of the spec."""
     own = {o["name"]: o for o in outline.table.get("overrides", ())}
     tables = {"every condition": outline.table} | own | dict(outline.table.get("evaluations", {}))
     return {
@@ -278,7 +262,7 @@ def topologies(outline: StudyOutline) -> dict[str, str]:
 
 
 def standing(total: int, done: int, failed: int) -> str:
-    """Return how far a study is."""
+    """Return the progress of a study in a sentence."""
     if done == total:
         return f"All {count(total, 'trial')} are done." if total > 1 else "Its one trial is done."
     left = total - done - failed
@@ -289,14 +273,14 @@ def standing(total: int, done: int, failed: int) -> str:
 
 
 def versions() -> list[tuple[str, str]]:
-    """Return name and version of the software that is running, and the platform in words."""
+    """Return names and versions of the installed software, and the platform."""
     machine = f"{platform.system()} on {platform.machine()}"
     python = platform.python_implementation(), platform.python_version()
     return [python, *((name, installed(name)) for name in PACKAGES), ("platform", machine)]
 
 
 def hide_places(text: str) -> str:
-    """Return text in which absolute paths keep their last two parts only.
+    """Shorten absolute paths in a text to their last two parts.
 
     >>> hide_places('File "/home/me/lib/core/team.py", line 3')
     'File "…/core/team.py", line 3'

@@ -1,4 +1,4 @@
-"""Figures and hierarchies of a study, as they stand in a page."""
+"""Figures and hierarchies of a study as elements of an HTML page."""
 
 import base64
 import io
@@ -19,49 +19,72 @@ from ..store.store import Store
 from ..trials.hierarchies import hierarchies_of
 from ..trials.keeping import spec_of
 
-MOST_DRAWN = 4
-"""Hierarchies of a study that are drawn."""
-MOST_AGENTS = 64
-"""Of a hierarchy that is drawn."""
+MAX_HIERARCHIES = 4
+"""Maximum number of hierarchies that are drawn."""
+MAX_AGENTS = 64
+"""Maximum number of agents of a hierarchy that is drawn."""
+PANEL_MARGIN = 4.0
+"""Margin around a panel that is shown on its own [pt]."""
 
 
 class Picture(NamedTuple):
     """A figure."""
 
     name: str
-    """Its file's, without suffix."""
+    """File name without suffix."""
     svg: Markup
-    """An element that can stand in a page beside others."""
+    """SVG element with ids that differ from those of other figures in the page."""
     pdf: str
-    """The same figure, in base64."""
+    """The same figure as PDF, in base64."""
+    prefix: str
+    """Prefix of the ids in the SVG element."""
+    panels: tuple[str, ...]
+    """View boxes of the panels and of the legend, which narrow screens stack; empty for one."""
 
     @property
     def title(self) -> str:
-        """The name in words."""
+        """Name with spaces."""
         return self.name.replace("-", " ").replace("_", " ")
 
 
 def pictures(figures: Mapping[str, Figure], prefix: str = "figure") -> list[Picture]:
-    """Return a study's figures, by name, as they stand in a page and are taken away from it.
-
-    Their ids begin with a prefix.
-    """
+    """Return figures as elements of a page with ids that begin with a prefix."""
     drawings = []
     with apply_style():
         for number, (name, figure) in enumerate(figures.items(), 1):
             cover_text(figure)
             svg = io.StringIO()
             figure.savefig(svg, format="svg", metadata={"Date": None})
-            text = embed(svg.getvalue(), f"{prefix}{number}-")
+            name_space = f"{prefix}{number}-"
+            text = embed(svg.getvalue(), name_space)
             pdf = io.BytesIO()
             figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
             encoded = base64.b64encode(pdf.getvalue()).decode("ascii")
-            drawings.append(Picture(name, Markup(text), encoded))
+            drawings.append(Picture(name, Markup(text), encoded, name_space, panel_boxes(figure)))
     return drawings
 
 
+def panel_boxes(figure: Figure) -> tuple[str, ...]:
+    """Return the SVG view boxes ``x y width height`` of a figure's panels and legends [pt]."""
+    panels = [axes for axes in figure.axes if axes.get_visible()]
+    if len(panels) < 2:
+        return ()
+    scale = 72.0 / figure.dpi
+    height = figure.bbox.height * scale
+    boxes = []
+    for artist in (*figure.legends, *panels):
+        box = artist.get_tightbbox()
+        if box is not None and box.width > 1.0:
+            margin = PANEL_MARGIN if artist in panels else 0.0
+            x = box.x0 * scale - margin
+            y = height - box.y1 * scale - margin
+            sizes = (side * scale + 2 * margin for side in (box.width, box.height))
+            boxes.append(" ".join(f"{value:.1f}" for value in (x, y, *sizes)))
+    return tuple(boxes)
+
+
 def embed(svg: str, prefix: str) -> str:
-    """Return an SVG file's root element, its ids and its style kept from those of other ones.
+    """Return the root element of an SVG file with a prefix for its ids and its style.
 
     Examples
     --------
@@ -77,16 +100,17 @@ def embed(svg: str, prefix: str) -> str:
 
 
 def hierarchy_pictures(store: Store) -> list[Picture]:
-    """Return pictures of the hierarchies of a study, the first ones, of not too many agents.
+    """Return pictures of the first hierarchies of a study.
 
-    None of what cannot be built here: a study of another version, or of files that nobody trusts.
+    Hierarchies that cannot be built here are omitted: those of studies of another version, or of
+    files that are not trusted.
     """
     drawings: dict[str, Figure] = {}
     with suppress(SpecError):
         spec = spec_of(store)
         with spec.sources.active():
-            for view in islice(hierarchies_of(spec), MOST_DRAWN):
-                if len(view.hierarchy) <= MOST_AGENTS:
+            for view in islice(hierarchies_of(spec), MAX_HIERARCHIES):
+                if len(view.hierarchy) <= MAX_AGENTS:
                     drawings[view.title] = picture(
                         view.hierarchy, bodies=view.bodies, failing=view.failing
                     )

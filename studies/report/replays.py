@@ -1,16 +1,15 @@
-"""The episodes on the page: recordings packed small by those who play them, or drawn as films.
+"""Recorded episodes in a report: played on a canvas, or shown as animations.
 
-A scenario whose settings name a `player` has its recordings played on a canvas. The player is a
-module with ``scene_of(recording)``, which raises ValueError if it cannot play it, with
-``pack(recording, scene)``, and the path ``SCRIPT`` of what draws a packed episode in its scene.
-Any other that draws its episodes, one's own included, has them drawn as animations, one for each
-condition.
+Settings of a scenario can name a `player`, which plays recordings on a canvas. It is a module with
+``scene_of(recording)``, which raises ValueError if it cannot play the recording,
+``pack(recording, scene)``, and the path ``SCRIPT`` of a script that draws packed episodes. For
+other scenarios that draw their episodes, the report shows one animation for each condition.
 """
 
 import base64
 import tempfile
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from pkgutil import resolve_name
@@ -27,8 +26,8 @@ from ..store.store import Store
 from ..trials.keeping import spec_of
 from ..trials.trial import Trial, trials_of
 
-MOST_BYTES = 1_500_000
-"""Of all packed episodes together."""
+MAX_BYTES = 1_500_000
+"""Maximum size of all packed episodes together."""
 
 
 Json = dict[str, Any]
@@ -39,13 +38,13 @@ class EpisodePlayer(Protocol):
     """A module that plays recordings on a canvas."""
 
     SCRIPT: Path
-    """What draws a packed episode in its scene."""
+    """Path of the script that draws packed episodes."""
 
     def scene_of(self, recording: Recording) -> Json:
-        """Return the shapes that a recording is drawn in; raise ValueError if it cannot be."""
+        """Return the fixed shapes of a recording; raise ValueError if it cannot be played."""
 
     def pack(self, recording: Recording, scene: Json) -> Json:
-        """Return a recording as small as can be; its `data` is text."""
+        """Return a recording as compact JSON with its `data` as text."""
 
 
 class Film(NamedTuple):
@@ -58,22 +57,22 @@ class Film(NamedTuple):
 
 
 class Replays(NamedTuple):
-    """What the page plays."""
+    """Recorded episodes of a page."""
 
     scenes: list[Json]
-    """The shapes that episodes are drawn in."""
+    """Fixed shapes of episodes."""
     episodes: list[Json]
-    """The packed episodes; `scene` is an index into `scenes`."""
+    """Packed episodes; `scene` is an index into `scenes`."""
     script: str
-    """What draws them; empty if there are none."""
+    """Script that draws the episodes; empty without episodes."""
     films: list[Film]
-    """Episodes that other scenarios draw themselves."""
+    """Animations of other scenarios."""
     missing: dict[str, Counter[str]]
-    """How many finished trials are not shown, by condition, by reason."""
+    """Numbers of finished trials that are not shown, by reason and condition."""
 
     @property
     def remarks(self) -> list[str]:
-        """What is missing, in words: a sentence for every reason."""
+        """A sentence for each reason why trials are not shown."""
         sentences = []
         for reason, trials in self.missing.items():
             parts = [f"{name} ({count(number, 'seed')})" for name, number in trials.items()]
@@ -82,11 +81,11 @@ class Replays(NamedTuple):
 
 
 def replays(
-    store: Store, results: Results, trials: Iterable[Planned], most_bytes: int = MOST_BYTES
+    store: Store, results: Results, trials: Iterable[Planned], max_bytes: int = MAX_BYTES
 ) -> Replays:
-    """Pack the recordings of finished trials, in their order, until there is no more room.
+    """Pack the recordings of finished trials in order, up to a maximum size.
 
-    Those that no canvas can play are drawn by their scenarios, one for each condition.
+    Recordings without a player are shown as animations, one for each condition.
     """
     reached = _reached(results)
     done = {(condition, seed) for condition, seed, _ in reached}
@@ -100,16 +99,16 @@ def replays(
     for trial in trials:
         if (trial.condition, trial.seed) not in done:
             continue
-        if size >= most_bytes:
+        if size >= max_bytes:
             missing["Left out to keep the page small"][trial.condition] += 1
             continue
         try:
             kept = {k: store.recording(trial.identity, name) for k, name in trial.recorded.items()}
         except NotRecordedError:
-            missing["Not shown, as the scenario records no episodes"][trial.condition] += 1
+            missing["Not shown because the scenario records no episodes"][trial.condition] += 1
             continue
         except SpecError:
-            missing["Not shown, as the recording is missing or damaged"][trial.condition] += 1
+            missing["Not shown because the recording is missing or damaged"][trial.condition] += 1
             continue
         for number, recording in kept.items():
             player, scene = _scene_of(recording)
@@ -129,37 +128,45 @@ def replays(
             episodes.append(episode)
             scripts.add(player.SCRIPT.read_text(encoding="utf-8"))
             size += len(episode["data"])
-    films: list[Film] = []
-    readable: dict[str, Trial] = {}
-    if others:  # else nothing is asked for, and no file of the study's is run
-        with suppress(SpecError):  # of another version
-            readable = {trial.identity: trial for trial in trials_of(spec_of(store))}
-    for condition in dict.fromkeys(trial.condition for trial in others):
-        trial = next(trial for trial in others if trial.condition == condition)
-        gif = _gif(store, readable[trial.identity]) if trial.identity in readable else ""
-        if 0 < len(gif) <= most_bytes - size:
-            films.append(Film(trial.condition, trial.seed, gif))
-            size += len(gif)
+    films = _films(store, others, max_bytes - size)
     filmed = {film.condition for film in films}
     if not_drawn := Counter(t.condition for t in others if t.condition not in filmed):
-        missing["Not shown, as the scenario cannot draw it, or there is no room"] = not_drawn
+        missing["Not shown because the scenario cannot draw it, or the page is full"] = not_drawn
     return Replays(scenes, episodes, "".join(scripts), films, missing)
 
 
+def _films(store: Store, planned: Sequence[Planned], max_bytes: int) -> list[Film]:
+    """Return an animation for the first trial of each condition, up to a maximum size."""
+    films: list[Film] = []
+    if not planned:
+        return films
+    trials: dict[str, Trial] = {}
+    with suppress(SpecError):  # a study of another version
+        trials = {trial.identity: trial for trial in trials_of(spec_of(store))}
+    first = {trial.condition: trial for trial in reversed(planned)}
+    for condition in dict.fromkeys(trial.condition for trial in planned):
+        trial = first[condition]
+        gif = _gif(store, trials[trial.identity]) if trial.identity in trials else ""
+        if 0 < len(gif) <= max_bytes:
+            films.append(Film(condition, trial.seed, gif))
+            max_bytes -= len(gif)
+    return films
+
+
 def _gif(store: Store, trial: Trial) -> str:
-    """Return the GIF of a trial's last episode in base64; nothing if its scenario cannot draw."""
+    """Return the last episode of a trial as a GIF in base64; empty if it cannot be drawn."""
     scenario = trial.world()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "episode.gif"
         try:
             scenario.animate(store.recording(trial.identity, "last"), path)
-        except Exception:  # a drawing may be anybody's, and the page is worth more than it
+        except Exception:  # a failing drawing of a user must not prevent the report
             return ""
         return base64.b64encode(path.read_bytes()).decode("ascii")
 
 
 def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
-    """Return who plays a recording, and in which scene; none if nobody can."""
+    """Return the player of a recording and its scene; None without a player."""
     models = [SCENARIOS.model(name) for name in SCENARIOS.built_in]
     names = [model.player for model in models if issubclass(model, ScenarioSettings)]
     for name in dict.fromkeys(filter(None, names)):
@@ -170,9 +177,9 @@ def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
 
 
 def _reached(results: Results) -> Mapping[tuple[str, int, int], bool]:
-    """Return whether each training episode reached the goal, by condition, seed and number.
+    """Return whether each training episode succeeded, by condition, seed and number.
 
-    Of episodes in many environments at once it is not known.
+    Episodes in many parallel environments count as failures, because their success is unknown.
     """
     training = results.episodes.query("phase == 'training'")
     success = training.set_index(["condition", "seed", "episode"])["success"]

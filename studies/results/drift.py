@@ -1,4 +1,4 @@
-"""How far a law may be left where nothing was measured: its exponent wanders as size grows.
+"""Deviation from a law beyond the measured sizes, because its exponent drifts.
 
 The exponent is taken for a random walk in ``x = log n``, so that values deviate from the law by an
 integrated Wiener process (Wahba 1978) that is zero at the smallest size. What it wanders by, sigma
@@ -18,9 +18,9 @@ from ...core.numerics import optimize, special, stats
 from .statistics import Array
 
 WANDER = 0.3
-"""The scale of the distribution of sigma before anything is measured."""
+"""Scale of the prior of sigma."""
 SIGMAS = np.concatenate([[0.0], np.geomspace(1e-4, 30.0, 50)])
-"""Over which it is averaged."""
+"""Grid of sigma over which predictions are averaged."""
 PRIOR = np.gradient(SIGMAS) / (1.0 + (SIGMAS / WANDER) ** 2)
 EXACT = 1e-12
 """Variance of rounding."""
@@ -63,14 +63,14 @@ class Mixture(NamedTuple):
 
 
 class Drift(NamedTuple):
-    """How far a law is left at a size, for each of `SIGMAS`."""
+    """Deviation from a law at a size, for each of `SIGMAS`."""
 
     weights: Array
-    """How likely each is ``(s,)``."""
+    """Posterior weights ``(s,)``."""
     shifts: Array
-    """By how much the law is expected to lie too low there ``(s,)``."""
+    """Expected deviations from the law ``(s,)``."""
     variances: Array
-    """Of what it is left by, beyond what the law's own parameters vary by ``(s,)``."""
+    """Variances of the deviations beyond those of the law's parameters ``(s,)``."""
 
 
 def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: Array) -> Drift:

@@ -1,6 +1,6 @@
 """Exported tables of a study, read back: its episodes, or its trials.
 
-They are recognized by their columns. The file ``study.json`` beside them says what the columns are;
+They are recognized by their columns. The file ``study.json`` in their folder describes the columns;
 without it, conditions are in the order of the rows, and which values are better is not known.
 """
 
@@ -25,7 +25,7 @@ TRIALS = ("condition", "seed", "state", "identity")
 
 
 class Description(NamedTuple):
-    """What is known of an exported study, besides its rows."""
+    """Description of an exported study besides its rows."""
 
     conditions: Mapping[str, SpecTable]
     """Swept keys by condition, in the order of the study."""
@@ -33,7 +33,7 @@ class Description(NamedTuple):
 
 
 class Exported(NamedTuple):
-    """Results of an exported table, and what must be said of them."""
+    """Results of an exported table, with remarks."""
 
     results: Results
     conditions: Mapping[str, SpecTable]
@@ -123,7 +123,7 @@ def _conditions(
         strange = ~labels.isin(list(written)).to_numpy()
         if strange.any():
             row = int(strange.argmax())
-            allowed = "a condition of study.json beside it"
+            allowed = "a condition of study.json in its folder"
             raise table.refusal(row, "condition", labels[row], allowed)
         return known.conditions, labels.map(written)
     levels = pd.DataFrame({key: plain_levels(table.text(key)) for key in swept}, labels.index)
@@ -142,8 +142,10 @@ def _whole(table: ScoreTable, column: str) -> pd.Series:
 
 
 def _measures(frame: pd.DataFrame, names: Sequence[str]) -> tuple[list[Measure], list[str]]:
-    """Return the measures of an export whose study is not known."""
-    notes = ["study.json is not beside it: which values are better is known of success and return"]
+    """Return the measures of an export without a description."""
+    notes = [
+        "no study.json in its folder: which values are better is known of success and return only"
+    ]
     measures = []
     for name in names:
         if name == SUCCESS.name:

@@ -43,9 +43,9 @@ class ScoreColumns(NamedTuple):
     """The role of each column of a table."""
 
     condition: tuple[str, ...] = ("condition",)
-    """What is compared; several columns are crossed."""
+    """Columns of the compared conditions; several columns are crossed."""
     score: tuple[str, ...] = ("score",)
-    """What is measured, each column a measure."""
+    """Columns of scores, each a measure."""
     seed: str | None = None
     """Name of the run."""
     item: str | None = None
@@ -122,8 +122,8 @@ class Foreign(NamedTuple):
 def results_of(table: ScoreTable, columns: ScoreColumns, better: Better = "higher") -> Foreign:
     """Return the results of a table of scores.
 
-    A condition whose rows have no seed, where others have one, holds published figures: it is
-    shown, and not paired.
+    A condition without seeds, where other conditions have them, holds published figures. It is
+    shown but not paired.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def _keys(table: ScoreTable, columns: ScoreColumns, levels: pd.DataFrame) -> dic
 
 
 def _pairing_notes(columns: ScoreColumns) -> list[str]:
-    """Return what must be said of how runs are paired, in lines."""
+    """Return remarks on how runs are paired."""
     if columns.seed is not None:
         return []
     if columns.item is not None:

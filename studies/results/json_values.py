@@ -1,6 +1,6 @@
-"""Values of a JSON file of somebody else, each with the key under which it stands.
+"""Values of a foreign JSON file with their keys.
 
-What a value is asked to be, it is; or `ValueError` names the key, the value and what is allowed.
+Every access checks the type; `ValueError` names the key, the value and what is allowed.
 """
 
 from __future__ import annotations
@@ -38,36 +38,36 @@ class JsonValue(NamedTuple):
     """
 
     content: Any
-    """As `json` reads it."""
+    """Value as `json` reads it."""
     key: str = ""
-    """Where it stands in the file; empty for the whole of it."""
+    """Path of the value in the file; empty for the whole file."""
 
     def refusal(self, allowed: str) -> ValueError:
         """Return the error that says what it is, and what is allowed."""
         return ValueError(f"{self.key or 'the file'} = {show(self.content)}: must be {allowed}")
 
     def table(self) -> dict[str, JsonValue]:
-        """Return its values by name."""
+        """Return the values of a table by name."""
         if not isinstance(self.content, dict):
             raise self.refusal("a table")
         before = f"{self.key}." if self.key else ""
         return {name: JsonValue(own, f"{before}{name}") for name, own in self.content.items()}
 
     def child(self, name: str) -> JsonValue:
-        """Return its value of a name that it must have."""
+        """Return a required value of a table."""
         own = self.table()
         if name not in own:
             raise ValueError(f"{self.key + '.' if self.key else ''}{name}: is missing")
         return own[name]
 
     def items(self) -> list[JsonValue]:
-        """Return its values one by one."""
+        """Return the values of a list."""
         if not isinstance(self.content, list):
             raise self.refusal("a list")
         return [JsonValue(own, f"{self.key}[{i}]") for i, own in enumerate(self.content)]
 
     def text(self, allowed: Iterable[str] = ()) -> str:
-        """Return the text that it is, one of those `allowed` if there are such."""
+        """Return the value as text, one of `allowed` if any are given."""
         known = list(allowed)
         if not isinstance(self.content, str):
             raise self.refusal("text")
@@ -82,7 +82,7 @@ class JsonValue(NamedTuple):
         return self.content
 
     def whole(self, least: int = 0, most: int = MOST_WHOLE) -> int:
-        """Return the whole number that it is."""
+        """Return the value as a whole number."""
         content = self.content
         is_whole = isinstance(content, int) and not isinstance(content, bool)
         if not is_whole or not least <= content <= most:
@@ -90,7 +90,7 @@ class JsonValue(NamedTuple):
         return int(content)
 
     def number(self) -> float:
-        """Return the finite number that it is; a whole one as it is."""
+        """Return the value as a finite number; whole numbers stay integers."""
         content = self.content
         if isinstance(content, bool) or not isinstance(content, int | float):
             raise self.refusal("a finite number")

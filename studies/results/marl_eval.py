@@ -50,7 +50,7 @@ def dumps(results: Results, environments: Mapping[str, str], task: str) -> str:
     environments
         The environment of each condition.
     task
-        What all of them do.
+        Task of all conditions.
 
     Raises
     ------
@@ -102,14 +102,14 @@ def _exported_runs(results: Results, condition: str) -> Iterator[tuple[str, dict
 
 
 class AlgorithmRun(NamedTuple):
-    """What one run of an algorithm on a task measured."""
+    """Measurements of one run of an algorithm on a task."""
 
     task: str
     """Environment and task."""
     algorithm: str
     name: str
     series: dict[str, dict[int, list[float]]]
-    """By metric and step count, the values measured there."""
+    """Measured values by metric and step count."""
     absolute: dict[str, list[float]]
     """Absolute metrics by name."""
     ignored: tuple[str, ...]
@@ -345,7 +345,7 @@ def _curves(series: pd.DataFrame, kept: pd.DataFrame) -> pd.DataFrame:
 
 
 def _counts_episodes(runs: Sequence[AlgorithmRun]) -> bool:
-    """Tell whether a step is an episode, whose length the step counts add up."""
+    """Return whether steps are episodes, so that step counts are cumulative lengths."""
     return any(run.series for run in runs) and all(_adds_up(run) for run in runs)
 
 

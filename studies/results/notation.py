@@ -104,11 +104,11 @@ def _fixed(value: float, decimals: int, rounding: str = ROUND_HALF_UP, *, signed
 
 
 WHOLE = re.compile(r"[-+]?\d\S* \[[^]]*\]|\w+ [=<] \S+|\d+ seeds?|last \d+")
-"""What stands in one line: an estimate and its interval, ``p = 0.03``, a count of seeds."""
+"""Text that is not broken: an estimate with its interval, ``p = 0.03``, a count of seeds."""
 
 
 def whole(text: str) -> str:
-    """Return text with no-break spaces in what stands in one line."""
+    """Return text with no-break spaces within numbers, see `WHOLE`."""
     return WHOLE.sub(lambda part: part[0].replace(" ", "\N{NO-BREAK SPACE}"), text)
 
 

@@ -1,8 +1,9 @@
-"""The power of paired comparisons: which differences a number of seeds can find.
+"""Power of comparisons: which differences a number of seeds detects.
 
-Power is that of finding one difference of a given size among several comparisons: as Holm's first
-step has it, p times their number must stay below `LEVEL`. The differences of single seeds are taken
-for independent and normal.
+Power is the probability that one difference of a given size is significant among several
+comparisons. As in the first step of Holm's method, p times their number must be below `LEVEL`. The
+power of paired runs assumes that the differences of single seeds are independent and normal. The
+power of independent runs is that of the two-sample t test.
 """
 
 import math
@@ -12,16 +13,14 @@ from collections.abc import Sequence
 from functools import cache
 from itertools import combinations
 from numbers import Integral, Real
-from textwrap import wrap
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.numerics import quadrature, special
+from ...core.numerics import optimize, quadrature, special
 from ...core.plugins.words import expect, expect_within
-from ..errors import WIDTH
-from .notation import format_number, wrapped
-from .statistics import EXACT, LEVEL, OPEN_UNIT, Array
+from .permutation_tests import EXACT, LEVEL
+from .statistics import OPEN_UNIT
 
 WANTED = 0.8
 """The power that studies are planned for (Cohen 1988)."""
@@ -33,16 +32,14 @@ known. In the published studies of 20 and 30 seeds nine conditions in ten have l
 USUAL_LOG_DEVIATION = 0.5
 """The same of logarithms, as of decisions to a criterion: three in four of 279 comparisons that are
 published have less."""
-APART = 0.2
-"""Difference of exponents of which it is told how many seeds find it."""
-LARGEST = 4096
-"""Agents of the largest teams that are proposed."""
 SUPPOSED = 4.0
-"""Seeds of `USUAL_DEVIATION` that are supposed beside those seen: a few that agree tell little."""
+"""Number of seeds of `USUAL_DEVIATION` that are added, because a few equal seeds say little."""
 RATES = 1.07
-"""By how much more success rates seem to deviate: they have ties and bounds, which cost a test some
-power. Without it studies of ten episodes find up to 0.04 less than is promised, with it up to 0.03,
-see `research.power`."""
+"""Factor on the deviation of success rates, because their ties and bounds reduce the power. Without
+it studies of ten episodes detect up to 0.04 less than is said, with it up to 0.03, see
+`research.power`."""
+ROUNDING = 1e-12
+"""Relative deviation that counts as rounding: values that deviate by less are equal."""
 FEW_PATTERNS = 32
 """If fewer patterns of signs are extreme enough to be significant, the power is simulated."""
 SIMULATED = 4000
@@ -189,7 +186,7 @@ def _check(**arguments: float) -> None:
 def deviation_of(samples: Sequence[ArrayLike], *, of_rates: bool) -> float | None:
     """Return the standard deviation of the differences of single seeds, pooled over comparisons.
 
-    Of rates, `SUPPOSED` seeds of `USUAL_DEVIATION` count beside those of every comparison, and it
+    For rates, `SUPPOSED` seeds of `USUAL_DEVIATION` are added to each comparison, and it
     is `RATES` times as large. None if it cannot be known.
 
     Parameters
@@ -206,8 +203,11 @@ def deviation_of(samples: Sequence[ArrayLike], *, of_rates: bool) -> float | Non
     >>> deviation_of([[2.0] * 5], of_rates=False)
     """
     arrays = [np.asarray(sample, dtype=float) for sample in samples if np.size(sample) > 1]
+    largest = max((float(abs(array).max()) for array in arrays), default=0.0)
     squares = sum(float(((array - array.mean()) ** 2).sum()) for array in arrays)
     freedom = float(sum(len(array) - 1 for array in arrays))
+    if squares <= freedom * (ROUNDING * largest) ** 2:
+        squares = 0.0
     if of_rates:
         squares += SUPPOSED * len(arrays) * USUAL_DEVIATION**2
         freedom += SUPPOSED * len(arrays)
@@ -247,7 +247,7 @@ def power_of_t(freedom: int, shift: float, beyond: float) -> float:
 
 @cache
 def _simulated(effect: float, seeds: int, extreme: int) -> float:
-    """Return the share of simulated studies whose observed signs are among the most extreme.
+    """Return the share of simulated studies with observed signs among the most extreme.
 
     A pattern of signs is at least as extreme as the observed one if the sizes that it takes for
     negative sum up to no more than those that are. There are never more than `extreme` such
@@ -264,159 +264,36 @@ def _simulated(effect: float, seeds: int, extreme: int) -> float:
     return float((reached <= extreme).mean())
 
 
-def power_text(
-    seeds: int,
-    comparisons: int,
-    deviation: float | None,
-    smallest: float | None,
-    measure: str = "",
-    unit: str = "",
-) -> list[str]:
-    r"""Return lines on what paired seeds can tell, given the deviation of their differences.
+def detectable_independent(
+    deviation: float, counts: tuple[int, int], comparisons: int = 1, wanted: float = WANTED
+) -> float:
+    """Return the smallest difference that independent runs detect with the wanted power.
+
+    It is infinite if no permutation of labels can be significant with so few runs.
 
     Parameters
     ----------
-    seeds, comparisons
-        How many.
     deviation
-        Standard deviation of the differences of single seeds; None: it is not known.
-    smallest
-        The smallest difference that is of interest; None: none is named.
-    measure
-        By what conditions are compared.
-    unit
-        Of differences, to be read after a number.
-
-    Examples
-    --------
-    >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
-    Power: 5 seeds and 2 comparisons cannot give an adjusted p below 0.05, whatever
-      the outcome. It needs at least 7 seeds; for a difference of 0.20, about 18.
-    >>> print(*power_text(20, 1, 0.25, 0.2, "evaluation success"), sep="\n")
-    Power: with 20 seeds, a difference of 0.17 is found with probability 0.80 in
-      evaluation success. For a difference of 0.20 it takes about 15 seeds.
-    """
-    counted = f"{seeds} seed{'s' * (seeds != 1)}"
-    among = f" and {comparisons} comparisons" if comparisons > 1 else ""
-    needed = seeds_needed(comparisons)
-    enough = seeds_for(smallest, deviation, comparisons) if smallest and deviation else None
-    goal = format_number(smallest or 0.0)
-    within = f" in {measure}" if measure else ""
-    if seeds < needed:
-        text = (
-            f"{counted}{among} cannot give an adjusted p below 0.05{within}, whatever the outcome. "
-            f"It needs at least {needed} seeds"
-        )
-        text += f"; for a difference of {goal}, about {enough}." if enough else "."
-    elif deviation is None:
-        text = f"{counted}{among} that deviate by nothing{within}: how small a difference they "
-        text += "would find cannot be determined."
-    else:
-        least = format_number(detectable(deviation, seeds, comparisons))
-        text = f"with {counted}{among}, a difference of {least}{unit} is found with "
-        text += f"probability {format_number(WANTED)}{within}."
-        if enough and goal != least:
-            text += f" For a difference of {goal} it takes about {enough} seeds."
-    return wrapped(f"Power: {text}")
-
-
-def planned_text(
-    seeds: int,
-    comparisons: int,
-    deviation: float | None,
-    smallest: float | None,
-    *,
-    of_rates: bool,
-) -> list[str]:
-    """Return lines on what paired seeds can tell before any have run, and of what it is.
-
-    Parameters are those of `power_text`; a deviation that is not known is the unit. `of_rates`:
-    whether success rates are compared, or returns.
-    """
-    unit = "" if deviation else " standard deviations"
-    what = "success rates" if of_rates else "returns, as nothing is a success"
-    supposed = (
-        f"differences of single seeds are taken to deviate by {deviation:g}"
-        if deviation
-        else "how much those of single seeds deviate is not known before (--deviation)"
-    )
-    text = f"Differences of {what}, every condition with the first, p adjusted; {supposed}."
-    known = power_text(seeds, comparisons, deviation or 1.0, smallest, unit=unit)
-    return [*known, *wrap(text, WIDTH)]
-
-
-def exponent_text(
-    sizes: Sequence[float],
-    seeds: int,
-    comparisons: int = 1,
-    deviation: float = USUAL_LOG_DEVIATION,
-) -> list[str]:
-    r"""Return lines on which exponents paired seeds tell apart, and what it takes for `APART`.
-
-    The exponent of a seed is the slope of its logarithms over those of the sizes, so that exponents
-    deviate by what logarithms do, over the root of the sum of squares of those of the sizes.
-
-    Parameters
-    ----------
-    sizes
-        That are run, `seeds` times each.
-    seeds
-        How many.
+        Standard deviation of single runs, in the unit of the difference.
+    counts
+        Numbers of runs of the two conditions, 2 or more each.
     comparisons
-        Of exponents, over which p is adjusted.
-    deviation
-        Of the differences of logarithms of single seeds at a size.
+        Number of comparisons over which p is adjusted.
+    wanted
+        The power.
 
     Examples
     --------
-    >>> print(*exponent_text([2, 4, 8, 16], 20), sep="\n")
-    Exponents: with 20 seeds of sizes 2 to 16, those that differ by 0.21 are
-      significantly different with probability 0.80. A difference of 0.20 takes about
-      23 seeds, or sizes to 32.
+    >>> round(detectable_independent(1.0, (20, 20)), 2), detectable_independent(1.0, (3, 3))
+    (0.91, inf)
     """
-    goal = format_number(APART)
-    counted = f"{seeds} seed{'s' * (seeds != 1)}"
-    enough = seeds_for(APART, deviation / _reach(sizes), comparisons)
-    larger = list(sizes)
-    while detectable(deviation / _reach(larger), seeds, comparisons) > APART:
-        larger.append(2.0 * larger[-1])
-        if larger[-1] > LARGEST:
-            break
-    takes = f"A difference of {goal} takes about {enough} seeds" if enough else ""
-    if seeds < seeds_needed(comparisons):
-        text = f"{counted} are too few for a significant difference, "
-        text += f"at least {seeds_needed(comparisons)} are needed. {takes}."
-    else:
-        least = format_number(detectable(deviation / _reach(sizes), seeds, comparisons))
-        text = f"with {counted} of sizes {sizes[0]:g} to {sizes[-1]:g}, those that differ by "
-        text += f"{least} are significantly different with probability {format_number(WANTED)}."
-        if len(larger) > len(sizes) and takes:
-            up_to = f", or sizes to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
-            text += f" {takes}{up_to}."
-    return wrapped(f"Exponents: {text}")
-
-
-def _reach(sizes: Sequence[float]) -> float:
-    """Return the root of the sum of squares of the logarithms of sizes about their mean."""
-    logs = np.log(sizes)
-    return float(np.linalg.norm(logs - logs.mean()))
-
-
-def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool = True) -> list[str]:
-    """Return lines on which differences comparisons could find, and how many seeds it takes.
-
-    Parameters
-    ----------
-    samples
-        Differences of single seeds ``(n_seeds,)``, by comparison: all that were adjusted together,
-        of one unit.
-    measure
-        By what conditions are compared.
-    of_rates
-        Whether they are differences of success rates, of which `SMALLEST` is of interest.
-    """
-    if not samples:
-        return []
-    deviation = deviation_of(samples, of_rates=of_rates)
-    smallest = SMALLEST if of_rates else None
-    return power_text(min(map(len, samples)), len(samples), deviation, smallest, measure)
+    first, second = counts
+    level = LEVEL / comparisons
+    mirrored = 2 if first == second else 1  # a sample and its complement are equally extreme
+    if mirrored / math.comb(first + second, first) >= level:
+        return math.inf
+    freedom = first + second - 2
+    beyond = float(special.stdtrit(freedom, 1.0 - level / 2.0))
+    scale = math.sqrt(1.0 / first + 1.0 / second)
+    reach = optimize.brentq(lambda d: power_of_t(freedom, d, beyond) - wanted, 0.0, beyond + 10.0)
+    return deviation * scale * float(reach)

@@ -27,9 +27,9 @@ from .json_values import JsonValue, parse
 from .results import SECONDS, Array, Results, StepLimits, from_arrays, pad_rows
 
 GATHERINGS = get_args(Measure.__annotations__["gathering"])
-"""How the steps of an episode make one number."""
+"""Ways in which the steps of an episode make one number."""
 HEADER = "study.json"
-"""Name of the file beside exported tables that describes their study."""
+"""Name of the file that describes the study of exported tables."""
 FEW = 100
 """Fewer rows, or values, are always written one by one."""
 
@@ -60,7 +60,7 @@ def dumps(outline: StudyOutline, results: Results) -> str:
 
 
 def header(outline: StudyOutline, results: Results) -> dict[str, object]:
-    """Return what tells the results of a study apart from rows: version, spec, keys, measures."""
+    """Return the description of a study: version, spec, swept keys, measures."""
     return {
         "results_version": RESULTS_VERSION,
         "spec": outline.table,
@@ -70,7 +70,7 @@ def header(outline: StudyOutline, results: Results) -> dict[str, object]:
 
 
 class Header(NamedTuple):
-    """What `header` holds."""
+    """Content of `header`."""
 
     outline: StudyOutline
     columns: dict[str, dict[str, str | float | bool | None]]
@@ -90,7 +90,7 @@ class Header(NamedTuple):
 
     @property
     def description(self) -> Description:
-        """What must be known to read exported tables."""
+        """Description for reading exported tables."""
         return Description(self.columns, self.measures)
 
     @classmethod
@@ -109,7 +109,7 @@ class Header(NamedTuple):
 
 
 def header_beside(path: Path) -> Header | None:
-    """Return the header of the exported study beside a table; None if there is none.
+    """Return the header in the folder of an exported table; None if there is none.
 
     Raises
     ------
@@ -212,7 +212,7 @@ def _pack(values: np.ndarray, *, is_rate: bool) -> Packed:
 
 
 def _constant(values: np.ndarray) -> Packed | None:
-    """Return many equal values as one of them and their shape; None of others."""
+    """Return many equal values as value and shape; None for other arrays."""
     if values.size < FEW or not (values == values.flat[0]).all():
         return None
     return {"all": values.flat[0].item(), "shape": list(values.shape)}
@@ -231,9 +231,9 @@ def _pack_numbers(results: Results, wanted: Callable[[str], bool]) -> dict[str, 
 
 
 MOST_SEEDS = 100_000
-"""Of a condition; no study has more trials."""
+"""Largest number of seeds of a condition."""
 MOST_EPISODES = 1_000_000
-"""Of a trial; a spec allows no more."""
+"""Largest number of episodes of a trial."""
 MOST_VERSION = 1_000_000
 """Larger than any version of results will be."""
 MOST_VALUES = 20_000_000
@@ -241,7 +241,7 @@ MOST_VALUES = 20_000_000
 
 
 class Room:
-    """How many values may still be made of one that is written for all."""
+    """Number of values that compact arrays of a file may still expand to."""
 
     def __init__(self) -> None:
         self._left = MOST_VALUES

@@ -1,14 +1,12 @@
-"""What the finished trials of a study measured, as two tidy frames: episodes and trials.
+"""Results of a study as two tidy frames: episodes and trials.
 
-Tables, comparisons, figures, reports and exported files are functions of these frames. A column's
-unit and meaning stand in ``frame.attrs["columns"]`` by its name. A part
-of a study's trials can be chosen, and several studies put together.
+Tables, comparisons, figures, reports and exported files are functions of these frames. Units and
+meanings of the columns are in ``frame.attrs["columns"]`` by name.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -20,10 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.interface.measures import RETURN, SUCCESS, Measure, main_measure
 from ...core.numerics import pd
-from ..spec.tables import SpecTable, flat, label
+from ..spec.tables import SpecTable
 from ..store.database import EVALUATION
 from ..store.store import Store
-from ..trials.episodes import join_measures
 
 Array = NDArray[Any]
 
@@ -75,10 +72,10 @@ class Results:
     phases: tuple[str, ...] = ()
     """The phases of the episodes: training, evaluation, then others."""
     columns: Mapping[str, SpecTable] = field(default_factory=dict)
-    """By condition, what tells it from the others, see
+    """Swept keys with their values by condition, see
     `nested_agents.studies.spec.conditions.Condition`."""
     measures: tuple[Measure, ...] = (SUCCESS,)
-    """What is measured of an episode, of any condition; success first."""
+    """Measures of episodes of any condition, success first."""
     usage: tuple[str, ...] = ()
     """Names of the numbers that differ from run to run, times first."""
     pairs_episodes: bool = False
@@ -108,14 +105,14 @@ class Results:
         return {name: values for name, values in own.items() if name not in others}
 
     def has(self, condition: str, phase: str = "", measure: str = "") -> bool:
-        """Tell whether a condition has finished trials, episodes of a phase, a measure of them."""
+        """Return whether a condition has finished trials, episodes of a phase, or a measure."""
         rows = self._rows.get((phase, condition))
         if rows is None or not measure:
             return rows is not None if phase else condition in self._finished
         return measure in self._measured and not np.isnan(self._measured[measure][rows]).any()
 
     def has_any(self, condition: str, phase: str, measure: str) -> bool:
-        """Tell whether any episode of a phase has a measure, or it is none of episodes."""
+        """Return whether any episode of a phase has a measure."""
         rows = self._rows.get((phase, condition), np.empty(0, int))
         values = self._measured.get(measure, np.zeros(len(self.episodes)))
         return not np.isnan(values[rows]).all()
@@ -181,7 +178,7 @@ class Results:
         return row_means(self.by_seed(condition, phase, measure))
 
     def other_evaluations(self, condition: str) -> dict[str, str]:
-        """Return the phases of a condition's evaluations beside its own, by their names."""
+        """Return the phases of a condition's further evaluations by name."""
         return {
             phase.removeprefix(EVALUATION): phase
             for phase in self.phases
@@ -190,7 +187,7 @@ class Results:
 
     @cached_property
     def main(self) -> Measure:
-        """The measure that is compared: the first, or the return if that never varies.
+        """The measure that is compared by default: the first, or the return if that never varies.
 
         Where returns are left out, it is the first measure that can vary.
         """
@@ -259,49 +256,6 @@ def row_means(values: pd.DataFrame) -> pd.Series:
     return pd.Series(mean(array, axis=1), values.index)
 
 
-UNKNOWN = "agent groups"
-"""What bodies are called if their number is not swept."""
-
-
-class Sizes(NamedTuple):
-    """Numbers of bodies.
-
-    Examples
-    --------
-    >>> joints = Sizes({"2": 2, "8": 8}, ("scenario.joints",))
-    >>> joints.shown(1), joints.shown(8), Sizes({"chain": 3, "star": 5}).shown(3)
-    ('1 joint', '8 joints', '3 agent groups')
-    >>> Sizes({"chain": 3, "star": 3}).shown(3)
-    ''
-    """
-
-    counts: Mapping[str, int]
-    """By condition."""
-    keys: Sequence[str] = ()
-    """Swept keys that are this number, whatever the scenario calls it."""
-
-    @classmethod
-    def of(cls, results: Results, conditions: Iterable[str]) -> Sizes:
-        """Return those of conditions whose trials have counted them."""
-        counts = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
-        swept = {c: results.columns.get(c, {}) for c in counts}
-        keys = dict.fromkeys(key for row in swept.values() for key in row)
-        own = (k for k in keys if all(str(swept[c].get(k)) == str(n) for c, n in counts.items()))
-        return cls(counts, tuple(own))
-
-    @property
-    def word(self) -> str:
-        """What bodies are called, in the plural."""
-        names = (k.removeprefix("scenario.") for k in self.keys if k.startswith("scenario."))
-        return next(names, UNKNOWN)
-
-    def shown(self, number: int) -> str:
-        """Return a number in words; nothing if it is the same everywhere, and nobody named it."""
-        if not self.keys and len(set(self.counts.values())) == 1:
-            return ""
-        return f"{number} {self.word.removesuffix('s') if number == 1 else self.word}"
-
-
 def read(store: Store) -> Results:
     """Read all that has been run; what has failed is in the frame of trials alone."""
     episodes, trials = (
@@ -324,7 +278,7 @@ def assemble(
     measures: tuple[Measure, ...],
     usage: Iterable[str],
 ) -> Results:
-    """Return results whose frames are those given, below each other, their columns described.
+    """Return results with the rows of all given frames, and descriptions of the columns.
 
     Rates are truth values. The other arguments are attributes of `Results`.
     """
@@ -438,77 +392,3 @@ def describe_number(name: str) -> tuple[Measure, float]:
     unit, *_ = NUMBERS.get(name, ("s" if is_time else "1",))
     least = 0.0 if is_time or name in NUMBERS else None  # numbers of other studies may be negative
     return Measure(name, name, unit, least=least, greatest=1.0 if name in SHARES else None), 1.0
-
-
-DIRECTORY = "directory"
-"""Column that tells from which study a condition came, where there are several."""
-
-
-def _distinguish(name: str, tables: Sequence[SpecTable]) -> list[str]:
-    """Return labels of conditions of one name, by one or two settings that tell all apart; or none.
-
-    Examples
-    --------
-    >>> _distinguish("default", [{"scenario": {"robots": n, "box": "disc"}} for n in (2, 4)])
-    ['default, robots=2', 'default, robots=4']
-    """
-    own = [dict(flat(table)) for table in tables]
-    keys = dict.fromkeys(key for table in own for key in table)
-    other = [key for key in keys if len({repr(table.get(key)) for table in own}) > 1]
-    labels = [label({key: table.get(key, "") for key in other}, name) for table in own]
-    return labels if len(other) <= 2 and len(set(labels)) == len(labels) else []
-
-
-def combine(
-    studies: Sequence[tuple[str, Results]], settings: Sequence[SpecTable] = ()
-) -> tuple[Results, list[dict[str, str]]]:
-    """Return the results of several studies as those of one, and the new labels of each.
-
-    Conditions whose label occurs more than once are distinguished by their `settings`, where one or
-    two of these differ, else by the name of their study. Their columns tell it, too, as
-    `DIRECTORY`.
-
-    Raises
-    ------
-    SpecError
-        If two studies mean different things by the name of a measure.
-    """
-    names, parts = zip(*studies, strict=True)
-    times = Counter(condition for part in parts for condition in part.columns)
-    several = [condition for condition, count in times.items() if count > 1]
-    labels = [
-        {c: f"{c} ({name})" if c in several else c for c in part.columns} for name, part in studies
-    ]
-    for condition in several if settings else ():
-        at = [i for i, part in enumerate(parts) if condition in part.columns]
-        apart = _distinguish(condition, [settings[i].get(condition, {}) for i in at])
-        if not times.keys() & set(apart):
-            for i, text in zip(at, apart, strict=False):
-                labels[i][condition] = text
-    keys = dict.fromkeys(k for part in parts for row in part.columns.values() for k in row)
-    columns = {
-        new[condition]: {**{key: row.get(key, "") for key in keys}, DIRECTORY: name}
-        for name, part, new in zip(names, parts, labels, strict=True)
-        for condition, row in part.columns.items()
-    }
-
-    def rename(frame: pd.DataFrame, new: Mapping[str, str]) -> pd.DataFrame:
-        label = frame["condition"].map(new)
-        swept = {k: label.map(lambda c, k=k: columns[c][k]) for k in (*keys, DIRECTORY)}
-        return frame.assign(condition=label, **swept)
-
-    episodes = [rename(part.episodes, new) for part, new in zip(parts, labels, strict=True)]
-    trials = [rename(part.trials, new) for part, new in zip(parts, labels, strict=True)]
-    phases = dict.fromkeys(phase for part in parts for phase in part.phases)
-    usage = (name for part in parts for name in part.usage)
-    measures = join_measures(part.measures for part in parts)
-    results = assemble(episodes, trials, phases, columns, measures, usage)
-    limits = _loosest(part.step_limits for part in parts)
-    pairs_episodes = any(part.pairs_episodes for part in parts)
-    return replace(results, step_limits=limits, pairs_episodes=pairs_episodes), labels
-
-
-def _loosest(limits: Iterable[StepLimits]) -> StepLimits:
-    """Return the limits of all studies together, which are known if each study's are."""
-    training, evaluation = zip(*limits, strict=True)
-    return StepLimits(*(None if None in own else max(own) for own in (training, evaluation)))

@@ -20,7 +20,7 @@ class Scale(NamedTuple):
     """A scale on which means are fitted."""
 
     quantity: str
-    """Name of the quantity whose logarithm is fitted."""
+    """Name of the quantity; its logarithm is fitted."""
     curves: tuple[Curve, ...]
     """Laws, simple ones first."""
     back: Callable[[Array], Array]
@@ -55,7 +55,7 @@ class Sample(NamedTuple):
     sizes: Array
     """``(m,)`` in ascending order, 1 or more."""
     values: Array
-    """``(n_seeds, m)`` linearized values on the scale, whose mean is fitted."""
+    """``(n_seeds, m)`` linearized values on the scale; their mean is fitted."""
     observed: Array
     """``(n_seeds, m)`` the values themselves."""
     censored: BoolArray
@@ -112,7 +112,11 @@ def of_numbers(
     means = _checked_means(sizes, values)
     if not (means > 0.0).all():
         size = sizes[int(np.argmin(means))]
-        raise ValueError(f"the mean at size {size:g} is {means.min():.4g}, allowed: positive means")
+        raise ValueError(
+            f"the mean at size {size:g} is {means.min():.4g}, allowed: positive means. A law of "
+            "growth describes quantities above 0: fit another measure, as --measure steps, or "
+            "fit a cost (the negated return) from a table of scores"
+        )
     linear = np.log(means) + values / means - 1.0
     unseen = np.zeros(values.shape, dtype=bool)
     return Sample(sizes, linear, values, unseen, np.ones(len(sizes)), LOG, bounds=bounds)

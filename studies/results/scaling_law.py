@@ -1,4 +1,4 @@
-"""How the results of a study grow with the size of its teams: laws by groups of conditions."""
+"""Growth of a study's results with the team size: laws by groups of conditions."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from ..errors import SpecError
 from ..spec.tables import label_but
 from . import laws
 from .analysis import Summary
-from .contrasts import title_of, values_of
+from .comparison import title_of, values_of
 from .notation import format_estimate, format_number, format_p, wrapped
-from .power import APART, seeds_for
+from .permutation_tests import LEVEL, holm
+from .power import seeds_for
+from .power_text import APART
 from .results import Results
 from .samples import GEOMETRIC, of_numbers, of_rates, of_times
-from .statistics import LEVEL, NOT_NEGATIVE, Array, bootstrap, holm
+from .statistics import NOT_NEGATIVE, Array, bootstrap
 
 WINDOW = 5
 """Episodes in a row whose mean success must reach a criterion."""
@@ -47,9 +49,9 @@ class ScalingLaw(NamedTuple):
     title: str
     """Title of the measure."""
     size: str
-    """What is counted: robots, joints, agents."""
+    """Name of the size: robots, joints, agents."""
     fits: tuple[Fitted, ...]
-    """By group."""
+    """Laws by group."""
     predicted: tuple[int, ...]
     """Sizes that are predicted besides those that were run."""
     remarks: tuple[str, ...] = ()
@@ -68,7 +70,7 @@ class ScalingLaw(NamedTuple):
 
     @property
     def legend(self) -> tuple[str, ...]:
-        """How the table's values and intervals are computed, in lines."""
+        """Computation of the table's values and intervals, in lines."""
         text = "Intervals of parameters: 95%, seeds resampled, Student's."
         scales = {law.sample.scale for _, law, *_ in self.fits if law is not None}
         if self.predicted:
@@ -100,7 +102,7 @@ class ScalingLaw(NamedTuple):
         pairs = [(g, laws.compare(law, base[1])) for g, law in known[1:] if _alike(law, base[1])]
         if not pairs:
             return []
-        lines = [f"Exponents, less that of {base[0]}:"]
+        lines = [f"Exponents, minus that of {base[0]}:"]
         ps = holm([contrast.p for _, contrast in pairs]).tolist()
         for (group, contrast), p in zip(pairs, ps, strict=True):
             word = "differs" if p < LEVEL else "no significant difference"
@@ -110,8 +112,8 @@ class ScalingLaw(NamedTuple):
         seeds = seeds_for(APART, spread, len(pairs)) if spread > 0.0 else None
         if seeds is not None:
             lines += wrapped(
-                f"Power: exponents that differ by {format_number(APART)} are significantly "
-                f"different with probability 0.80 by about {seeds} seeds at these sizes."
+                f"Power: about {seeds} seeds at these sizes detect a difference of exponents of "
+                f"{format_number(APART)} with power 0.80."
             )
         return lines
 
@@ -194,7 +196,7 @@ def scaling_law(
         }
         title = title_of(shown_as, own)
     else:
-        samples = _decisions(results, measure, criterion)
+        samples = decisions_to_criterion(results, measure, criterion)
         title = f"decisions to {format_number(criterion)} of {measure}"
         shown_as, own = SUCCESS, ""
     counts = _episodes(results, own) if shown_as.is_rate and criterion is None else {}
@@ -267,7 +269,7 @@ def _episodes(results: Results, phase: str) -> dict[str, float]:
     return dict(counts["size"] / counts["nunique"])
 
 
-def _decisions(
+def decisions_to_criterion(
     results: Results, measure: str, criterion: float
 ) -> dict[str, tuple[pd.Series, pd.Series]]:
     """Return by condition decisions until the criterion, or all, and whether it was not reached."""

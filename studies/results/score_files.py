@@ -32,14 +32,14 @@ SEPARATORS = {";": "semicolons", "\t": "tabs"}
 
 
 class ScoreTable(NamedTuple):
-    """A table whose cells are still what its file or frame holds."""
+    """A table with the unconverted cells of its file or frame."""
 
     frame: pd.DataFrame
     """Cells by column name."""
     places: Sequence[object]
     """Number of the line, or label of the row, of each row."""
     word: str = "row"
-    """What a place is called: line or row."""
+    """Kind of place: line or row."""
 
     @property
     def columns(self) -> list[str]:
@@ -122,7 +122,7 @@ class JsonNumber(str):
 
 
 def is_blank(cell: object) -> bool:
-    """Tell whether a cell holds nothing."""
+    """Return whether a cell is blank."""
     if isinstance(cell, str):
         return not cell.strip()
     return cell is None or (pd.api.types.is_scalar(cell) and bool(pd.isna(cell)))

@@ -1,7 +1,7 @@
-"""Cells of CSV files that no spreadsheet takes for a formula."""
+"""Protection of CSV cells from being formulas of a spreadsheet."""
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""With what a spreadsheet's formula begins, if the spaces before it are left out."""
+"""Characters with which a spreadsheet's formula begins, after any spaces."""
 
 
 def harmless(value: object) -> object:

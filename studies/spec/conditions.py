@@ -1,8 +1,8 @@
-"""Conditions: what a study compares, and what a trial of one depends on besides seed and length.
+"""Conditions of a study: validated settings on which a trial depends besides its seed and length.
 
-A curriculum is what a team is trained on before the scenario of its condition. A stage of it is a
-number of episodes in a scenario, described by changes of the condition's own: what a sweep or an
-override says of it holds in the stages, too, unless they say otherwise.
+A curriculum is a list of stages in which a team is trained before the scenario of its condition. A
+stage is a number of episodes in a scenario, described by changes of the condition's own scenario.
+Values of sweeps and overrides therefore hold in the stages, too, unless a stage changes them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from ...core.plugins.settings import (
     ScenarioSettings,
     Settings,
     check_team,
-    unwritten,
 )
 from ...scenarios import DEFAULT, SCENARIOS
 from ...scenarios.faults.perception import perceived
@@ -36,10 +35,10 @@ from ...topologies.config import Topology, parse
 from .tables import SpecTable
 
 SECONDS_PER_PAIR = 1e-8
-"""What a decision takes at least for every pair of agents, of whatever scenario [s]."""
+"""Minimum time of a decision per pair of agents, in any scenario [s]."""
 
 Length = Annotated[int, Field(ge=1, le=1_000_000)]
-"""A number of episodes, or of steps."""
+"""Number of episodes or steps."""
 
 
 def _printable(name: str) -> str:
@@ -49,18 +48,18 @@ def _printable(name: str) -> str:
 
 
 Name = Annotated[str, AfterValidator(_printable)]
-"""How users call something of theirs."""
+"""Name given by the user."""
 
 
 class StageSettings(Settings):
     """A stage of a curriculum, as it stands in a spec."""
 
     name: Name
-    """How its episodes are called."""
+    """Name of the stage, which is also the phase of its episodes."""
     episodes: Length
-    """Training episodes in it."""
+    """Number of training episodes."""
     scenario: SpecTable = Field(default_factory=dict)
-    """Laid over the condition's scenario."""
+    """Changes of the condition's scenario."""
 
 
 def _distinct(stages: tuple[StageSettings, ...]) -> tuple[StageSettings, ...]:
@@ -86,25 +85,25 @@ class Stage(NamedTuple):
 
 
 class ConditionSettings(Settings):
-    """All that a trial depends on besides its seed and its length."""
+    """Validated settings of a condition."""
 
     scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = Field(
         default_factory=lambda: cast(ScenarioSettings, SCENARIOS.parsed(DEFAULT))
     )
-    agents: Annotated[Granularity, unwritten("actuator")] = "actuator"
+    agents: Granularity = "actuator"
     topology: Topology = parse("chain")
     learner: Annotated[TeamSettings, Plugged(LEARNERS)] = BatchTDSettings()
 
-    def arrange(self, world: Scenario) -> tuple[Scenario, Hierarchy]:
-        """Return a world as the agents see it, and their hierarchy.
+    def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
+        """Return a scenario as the agents perceive it, and their hierarchy.
 
         Raises
         ------
         ValueError
-            If agents or topology do not fit the world, or agents are too many by an estimate; one
-            line that names the culprit.
+            If agents or topology do not fit the scenario, or there are too many agents by an
+            estimate; one line.
         """
-        scenario = perceived(join_agents(world, self.agents), self.scenario.perception)
+        scenario = perceived(join_agents(scenario, self.agents), self.scenario.perception)
         try:
             check_team(len(scenario.agents), SECONDS_PER_PAIR)
         except ValueError as error:
@@ -114,110 +113,109 @@ class ConditionSettings(Settings):
 
     @property
     def failure_spans(self) -> tuple[FailureSpan, ...]:
-        """When failures of the scenario begin and end, or agents leave and return."""
+        """Episodes in which failures begin and end, or agents leave and return."""
         left = [f for f in self.topology.failures if isinstance(f, LeftAgents)]
         return (*self.scenario.failure_spans, *((f.episode, f.end_episode) for f in left))
 
     @property
     def onset(self) -> int | None:
-        """Episode in which the first failure begins, if any does."""
+        """Episode in which the first failure begins; None without failures."""
         return min((begin for begin, _ in self.failure_spans), default=None)
 
     def acts_as(self, other: ConditionSettings) -> bool:
-        """Return whether topology, learner and perception are those of `other`."""
+        """Return whether topology, learner and perception equal those of `other`."""
         own = self.topology, self.learner, self.scenario.perception
         return own == (other.topology, other.learner, other.scenario.perception)
 
     def warnings(self) -> tuple[str, ...]:
-        """Return what of its topology says nothing to its learner, a line each."""
+        """Return a line for each key of the topology that the learner ignores."""
         learner = f"learner.kind = {self.learner.kind!r}"
         topology = self.topology
-        if _considers(self.learner):
+        if _looks_ahead(self.learner):
             return ()
         if not self.learner.uses_hierarchy:
             ignored = topology != parse("chain")
             return (f"topology: left out, {learner} passes no actions down",) if ignored else ()
-        ignored = topology.considers != "descendants"
-        return (f"topology.considers: left out, {learner} considers nobody",) if ignored else ()
+        ignored = topology.lookahead != "descendants"
+        return (f"topology.lookahead: left out, {learner} has no lookahead",) if ignored else ()
 
     def remarks(self) -> tuple[str, ...]:
-        """Return whose plans do not know whose weights, a line for each part of a mixed team.
+        """Return a line for each part of a mixed team that plans without weights of other parts.
 
-        A written value of nothing is named as well.
+        An empty hand-written value is reported, too.
         """
         learner = self.learner
         if isinstance(learner, WrittenSettings) and not learner.value:
-            return ("learner.value: nothing is worth anything, so that actions are random",)
-        if not isinstance(learner, MixedSettings) or self.topology.considers == "none":
+            return ("learner.value = {}: all states have the value 0, so that actions are random",)
+        if not isinstance(learner, MixedSettings) or self.topology.lookahead == "none":
             return ()
         return tuple(
-            f"learner.parts[{k}]: plans for agents of other parts by its own values alone: nobody "
-            "knows the weights of another part"
+            f"learner.parts[{k}]: plans for agents of other parts by its own values, because the "
+            "weights of other parts are unknown to it"
             for k, part in enumerate(learner.parts)
-            if len(learner.parts) > 1 and _considers(part.learner)
+            if len(learner.parts) > 1 and _looks_ahead(part.learner)
         )
 
     def canonical(self) -> str:
-        """Return the JSON text that equal settings share, whatever wrote them."""
+        """Return JSON text that is the same for equal settings."""
         return json.dumps(
             self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"), allow_nan=False
         )
 
 
-def _considers(learner: TeamSettings) -> bool:
-    """Return whether agents try actions of others before they decide."""
+def _looks_ahead(learner: TeamSettings) -> bool:
+    """Return whether agents search over the actions of other agents."""
     if isinstance(learner, MixedSettings):
-        return any(_considers(part.learner) for part in learner.parts)
+        return any(_looks_ahead(part.learner) for part in learner.parts)
     return isinstance(learner, LearnerSettings) and not learner.values_actions
 
 
 class Override(Settings):
-    """A named set of tables laid over those of a spec."""
+    """A named set of tables that override those of a spec."""
 
     name: Name
-    """How its conditions are called."""
+    """Name of its conditions."""
     preset: str | None = None
-    """The preset under its tables; none: the spec's."""
+    """Preset of its conditions. By default, the preset of the spec."""
     scenario: SpecTable = Field(default_factory=dict)
-    """Laid over the spec's scenario."""
+    """Changes of the scenario of the spec."""
     agents: Granularity | None = None
-    """In place of the spec's; none: the spec's."""
+    """One agent per actuator, per body, or for the team. By default, as in the spec."""
     topology: SpecTable = Field(default_factory=dict)
-    """Laid over the spec's topology."""
+    """Changes of the topology of the spec."""
     learner: SpecTable = Field(default_factory=dict)
-    """Laid over the spec's learner."""
+    """Changes of the learner of the spec."""
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
     """Lists of values by dotted key, for this override alone."""
     curriculum: Curriculum | None = None
-    """Stages in place of the spec's; none: the spec's."""
+    """Stages of training. By default, those of the spec."""
 
 
 class Condition(NamedTuple):
-    """What one part of a study's trials have in common."""
+    """One condition of a study; its trials differ in their seeds."""
 
     label: str
     """Short name, unique within its study."""
     columns: SpecTable
-    """What tells it from the others, as the columns of a result: `name` if there are overrides, the
-    swept keys (empty where an override does not sweep), `preset` if there is neither."""
+    """Columns that distinguish it in results: `name` if there are overrides, the swept keys (empty
+    where an override does not sweep), `preset` if there is neither."""
     settings: ConditionSettings
     """The resolved settings."""
     evaluations: tuple[tuple[str, ConditionSettings], ...] = ()
-    """Names and settings under which its trained teams are evaluated beside its own: other
-    scenarios, topologies, decisions."""
+    """Names and settings of further evaluations of its trained teams."""
     curriculum: tuple[Stage, ...] = ()
-    """What its teams are trained on before."""
+    """Stages in which its teams are trained first."""
     left_out: tuple[str, ...] = ()
-    """SpecTable of its preset, or of what the scenario lays over that, which its kinds have not or
+    """Keys of its preset, or of the scenario's changes of the preset, that its kinds do not have or
     refuse."""
     other_kinds: tuple[str, ...] = ()
-    """Which kinds these are, as ``learner.kind = 'fitted-q'``; where nothing is left out, none."""
+    """These kinds, as ``learner.kind = 'fitted-q'``."""
     same: tuple[str, ...] = ()
-    """Labels of controls that would be the same, and are left out."""
+    """Labels of equal controls, which are left out."""
 
     @property
     def tables(self) -> list[Any]:
-        """Its settings and those of its evaluations and stages, as tables."""
+        """Settings of the condition, its evaluations and its stages as tables."""
         others = [other.model_dump(mode="json") for _, other in self.evaluations]
         stages = [stage.table() for stage in self.curriculum]
         return [self.settings.model_dump(mode="json"), *others, *stages]

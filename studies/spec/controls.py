@@ -1,8 +1,8 @@
-"""Controls: conditions that learn nothing, beside which it is seen what learning is worth.
+"""Controls: conditions that learn nothing and show the effect of learning by comparison.
 
-A control differs from the team that it controls in learning alone. Where a preset of a control is
-laid under what a user has written (see `layers.for_control`), it keeps what says how agents decide
-and predict: the rule, whose value, the evaluator, the predictor, the horizon.
+A control differs from the team that it controls in learning alone. Under the tables of a spec (see
+`layers.for_control`) it keeps the keys that say how agents decide and predict: the rule, the value,
+the evaluator, the predictor and the horizon.
 
 Where predicted rewards count, *zero weights plan*: success of a team that has learned is then no
 sign of learning. Where they do not count, zero weights make all values equal, and as ties are

@@ -1,4 +1,4 @@
-"""Code of others that a study runs: modules that it names, what these import, and libraries.
+"""Code outside the toolkit that a study runs: modules that it names, their imports, libraries.
 
 Small packages are compared by the text of their files, large ones by their version.
 """
@@ -16,7 +16,7 @@ from ...core.plugins.syntax import imported
 from ...core.plugins.trust import modules_in
 
 LIBRARIES = ("llvmlite", "numba", "numpy", "scipy")
-"""Libraries on whose versions the results of every study may depend."""
+"""Libraries with versions on which the results of every study may depend."""
 
 MAX_FILES = 300
 """A package with more files counts as a library, which its version identifies."""
@@ -32,7 +32,7 @@ def library_versions() -> dict[str, str]:
 def foreign_code(
     table: Mapping[str, object], texts: Mapping[str, str]
 ) -> tuple[dict[str, Path], dict[str, str]]:
-    """Return the code of others that a study runs.
+    """Return the code outside the toolkit that a study runs.
 
     Parameters
     ----------

@@ -1,8 +1,7 @@
-"""Every key that a spec may have, read from the settings models and the text beside their fields.
+"""Keys of specs, read from the settings models and the docstrings of their fields.
 
-Nothing is written down twice: types, defaults and what is allowed come from the models by which a
-spec is validated, meanings and units from the docstrings of their fields. What registries offer is
-walked as well, so a new scenario or learner has its keys here from the first day.
+Types, defaults and allowed values come from the models that validate a spec, descriptions and units
+from the docstrings of their fields. Registered scenarios, learners and so on are included.
 """
 
 import ast
@@ -31,54 +30,53 @@ from .spec import Spec
 from .tables import SpecTable
 
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
-"""How the text beside a field names its unit."""
+"""Unit in the docstring of a field."""
 TYPES = {bool: "true or false", int: "whole number", float: "number", str: "text", Any: "any"}
 OWN_FUNCTION = "file.py:decide"
-"""What stands for functions of users, whose own keys are their keyword-only parameters."""
+"""Placeholder for functions of users; their keyword-only parameters are further keys."""
 GREATEST_BOUND = 10**9
-"""A bound beyond it is that of a machine's integers, and no help to anybody."""
+"""Bounds beyond it are those of machine integers and are not shown."""
 
 
 class Key(NamedTuple):
     """A key of a table."""
 
     name: str
-    """As it is written in a spec."""
+    """Name in a spec."""
     type: str
     """In words."""
     default: str
-    """As written in TOML; or ``none``, or ``required``."""
+    """Default in TOML; ``none`` or ``required``."""
     allowed: str
     """In words."""
     unit: str
-    """Empty where there is none."""
+    """Unit; empty if there is none."""
     meaning: str
     """The docstring of the field, in one line; empty if it has none."""
     preset: str
-    """What the preset `default`, which a spec begins from, has in place of the default; empty if
-    the same."""
+    """Value in the preset `default`, with which a spec starts; empty if it equals the default."""
 
     @property
     def value(self) -> str:
-        """Its value where a spec does not say, in words."""
+        """Value if the spec does not set the key, in words."""
         return f"{self.default} (preset default: {self.preset})" if self.preset else self.default
 
 
 class Table(NamedTuple):
-    """A table of a spec, or the part of it that things of one kind have."""
+    """A table of a spec, or its keys for one kind."""
 
     name: str
     """Dotted, as ``learner.rule_base``; empty for the top of a spec."""
     kind: str
-    """The ``kind`` that it must have for these keys; empty: any."""
+    """The ``kind`` of the table with these keys; empty for any."""
     within: str
-    """The ``kind`` of the table above that it belongs to; empty: any."""
+    """The ``kind`` of the table above it; empty for any."""
     summary: str
     """The first line of the docstring of its model."""
     model: type[Settings]
     """The settings model."""
     keys: tuple[Key, ...]
-    """What may stand in it."""
+    """Keys of the table."""
 
     @property
     def full_names(self) -> tuple[str, ...]:
@@ -87,7 +85,7 @@ class Table(NamedTuple):
 
     @property
     def heading(self) -> str:
-        """How it begins in a spec: ``[learner], kind = "frozen"``."""
+        """Heading in a spec, such as ``[learner], kind = "frozen"``."""
         kind = f', kind = "{self.kind}"' if self.kind else ""
         within = f', of "{self.within}"' if self.within else ""
         return (f"[{self.name}]" if self.name else "top of the spec") + kind + within
@@ -108,12 +106,12 @@ def tables() -> tuple[Table, ...]:
 
 
 def of_functions() -> Table:
-    """Return the table of a learner that is a function of a user's: what all such have."""
+    """Return the table of a learner that is a user's function."""
     return _table("learner", (OWN_FUNCTION, ""), FunctionSettings, {})
 
 
 def outline() -> dict[str, list[str]]:
-    """Return what each table of a spec can be or hold: its kinds, or else the names of its keys."""
+    """Return the kinds of each table of a spec, or the names of its keys if it has no kinds."""
     kinds = dict[str, list[str]]()
     keys = dict[str, list[str]]()
     for table in tables():
@@ -123,7 +121,7 @@ def outline() -> dict[str, list[str]]:
 
 
 def keys_below(prefix: str) -> tuple[Table, ...]:
-    """Return the tables whose name begins with a dotted prefix, with the keys that fit it.
+    """Return the tables with names that begin with a dotted prefix, and the matching keys.
 
     Examples
     --------
@@ -152,8 +150,8 @@ def _below(
 ) -> Iterator[Table]:
     """Yield the tables that the fields of a model hold, at any depth, each once.
 
-    What a registry offers is not listed again within what it offers itself: the parts of a team
-    have learners, as the team has one.
+    Things of a registry are not listed again inside things of the same registry, as the learners of
+    the parts of a team are.
     """
     for field, info in model.model_fields.items():
         place = f"{name}.{field}" if name else field
@@ -179,13 +177,13 @@ def settings_of(info: FieldInfo) -> list[type[Settings]]:
 
 
 def registry_of(info: FieldInfo) -> SettingsRegistry | None:
-    """Return the registry whose things a field holds, if it does."""
+    """Return the registry of a field, or None."""
     mark = kinds_at(info)
     return mark.registry if isinstance(mark, Plugged) else None
 
 
 def kinds_of(info: FieldInfo) -> dict[str, type[Settings]]:
-    """Return the models of a field that a table's ``kind`` tells apart, by kind."""
+    """Return the models of a field by kind."""
     registry = registry_of(info)
     if registry is not None:
         return {kind: registry.model(kind) for kind in registry.built_in}
@@ -194,10 +192,7 @@ def kinds_of(info: FieldInfo) -> dict[str, type[Settings]]:
 
 
 def _held(info: FieldInfo) -> Iterator[tuple[str, type[Settings], Mapping[str, FieldInfo]]]:
-    """Yield what a field may hold: kind, model, and fields of the model that it inherits.
-
-    What all kinds inherit comes first.
-    """
+    """Yield kind, model and inherited fields for each model of a field, the base model first."""
     registry = registry_of(info)
     kinds = kinds_of(info)
     inherited: Mapping[str, FieldInfo] = {}
@@ -212,19 +207,19 @@ def _held(info: FieldInfo) -> Iterator[tuple[str, type[Settings], Mapping[str, F
 
 
 def _base(models: Sequence[type[Settings]]) -> type[Settings]:
-    """Return the nearest model that all of some models inherit."""
+    """Return the nearest common base class of models."""
     ancestors = (cls for cls in models[0].__mro__[1:] if issubclass(cls, Settings))
     return next(cls for cls in ancestors if all(issubclass(m, cls) for m in models))
 
 
 def _kind(info: FieldInfo, kinds: Iterable[str]) -> Key:
-    """Return the key that says of which kind a field's table is."""
-    own = "; or one of your own, file.py:NAME" if registry_of(info) is not None else ""
+    """Return the key ``kind`` of a table."""
+    own = "; or your own, file.py:NAME" if registry_of(info) is not None else ""
     default = "required"
     value = None if info.is_required() else info.get_default(call_default_factory=True)
     if isinstance(value, Settings):
         default = json.dumps(value.model_dump().get("kind", ""))
-    meaning = "Which of them it is; what else may stand in the table depends on it."
+    meaning = "Kind of the table; the other keys depend on it."
     return Key("kind", "text", default, ", ".join(kinds) + own, "", meaning, "")
 
 
@@ -242,7 +237,7 @@ def _table(
 
 
 def _laid_by_preset(name: str, kind: str) -> SpecTable:
-    """Return the table of the preset `default` by name, if it is of this kind."""
+    """Return a table of the preset `default` if it has this kind."""
     table: Any = PRESETS["default"].table
     for part in name.split("."):
         table = table.get(part) if isinstance(table, Mapping) else None
@@ -252,7 +247,7 @@ def _laid_by_preset(name: str, kind: str) -> SpecTable:
 
 
 def nearest(prefix: str) -> str:
-    """Return which keys a prefix that begins none may stand for, in words.
+    """Return a hint at the keys that an unknown prefix may mean.
 
     Examples
     --------
@@ -278,9 +273,9 @@ def meaning(model: type[Settings], field: str) -> str:
 
 @cache
 def _docstrings(cls: type) -> Mapping[str, str]:
-    """Return the text beside the fields that a class declares; none if it was written nowhere.
+    """Return the docstrings of the fields that a class declares.
 
-    pydantic would read them whenever the class is imported, which takes a fifth of that time.
+    pydantic would read them at every import of the class, which makes the import slower by a fifth.
     """
     try:
         source = inspect.getsource(cls)
@@ -297,7 +292,7 @@ def _docstrings(cls: type) -> Mapping[str, str]:
 
 
 def _key(name: str, info: FieldInfo, meaning: str, laid: object) -> Key:
-    """Return a key; `laid` is what the preset has in place of its default, if anything."""
+    """Return a key; `laid` is the value in the preset, or None."""
     registry = registry_of(info)
     default = _default(info)
     unit = UNIT.search(meaning)
@@ -329,7 +324,7 @@ def _default(info: FieldInfo) -> str:
 
 
 def _type(annotation: Any) -> str:
-    """Return the type of a field in words: alternatives but None, annotations taken off."""
+    """Return the type of a field in words, without None and annotations."""
     origin = get_origin(annotation)
     given = get_args(annotation)
     if isinstance(annotation, TypeAliasType):
@@ -346,7 +341,7 @@ def _type(annotation: Any) -> str:
 
 
 def _allowed(annotation: Any) -> Iterator[str]:
-    """Yield what is allowed beside the type: the words of literals, and bounds, at any depth."""
+    """Yield further restrictions of a type: literals and bounds, at any depth."""
     origin = get_origin(annotation)
     given = get_args(annotation)
     if origin is Literal:

@@ -1,11 +1,11 @@
-"""How the settings of conditions come about: a preset, tables, overrides and sweeps, in layers.
+"""Layers of settings: defaults, preset, scenario, spec, override and sweep make a condition.
 
-Every override by name is crossed with its own sweep and with the spec's; without overrides the
-spec's tables alone are. Layers, each over the one before: the defaults of the settings, the preset,
-what the scenario lays over it, the spec's tables, the override's tables, the point of the sweeps.
+Each override is combined with its own sweep and with that of the spec. Each layer overrides the one
+before: the defaults of the settings, the preset, the changes of the preset by the scenario, the
+tables of the spec, the tables of the override, the point of the sweeps.
 
-Keys of the preset and of the scenario give way to a kind that a user has chosen and that has not,
-or refuses, what they say; keys that the user wrote are refused.
+Keys of the preset and of the scenario are dropped if a kind that the user has chosen does not have
+or refuses them. Keys that the user wrote are refused instead.
 """
 
 from __future__ import annotations
@@ -39,33 +39,33 @@ from .tables import SWEEP, SpecTable, TomlTable, flat, label, nested, overlay, s
 SECTIONS = ("scenario", "topology", "learner")
 
 Layer = SpecTable
-"""A table, or a point of a sweep, that is laid over what is below it."""
+"""A table or a point of a sweep that overrides the layers below."""
 Layers = Sequence[Layer]
-"""Tables, each over the one before."""
+"""Layers; each overrides the one before."""
 
 
 class Sections(Protocol):
-    """What has tables of its own: a spec, or an override."""
+    """A spec or an override, which have these tables."""
 
     @property
     def scenario(self) -> Layer:
-        """Laid over the scenario below."""
+        """Changes of the scenario."""
 
     @property
     def topology(self) -> Layer:
-        """Laid over the topology below."""
+        """Changes of the topology."""
 
     @property
     def learner(self) -> Layer:
-        """Laid over the learner below."""
+        """Changes of the learner."""
 
     @property
     def agents(self) -> Granularity | None:
-        """In place of those below; None: those below."""
+        """Granularity; None for that of the layers below."""
 
 
 def layer_of(own: Sections) -> TomlTable:
-    """Return what a spec or an override lays over what is below it: its sections and agents."""
+    """Return the layer of a spec or an override: its sections and agents."""
     layer: TomlTable = {
         "scenario": dict(own.scenario),
         "topology": dict(own.topology),
@@ -75,9 +75,9 @@ def layer_of(own: Sections) -> TomlTable:
 
 
 def below(table: Layer) -> tuple[type[Settings], TomlTable]:
-    """Return the model of conditions, and what they have at least of a spec's table and preset.
+    """Return the model of conditions, and the table that all conditions of a spec share.
 
-    Nothing is known of the kinds of an override's, whose table is empty here.
+    The table is empty for an override, because its kinds are unknown here.
     """
     preset = PRESETS.get(str(table.get("preset", "default")), PRESETS["default"])
     own = {name: table[name] for name in SECTIONS if isinstance(table.get(name), Mapping)}
@@ -97,18 +97,18 @@ def grid(
     Parameters
     ----------
     preset
-        Name of the preset under conditions that name none.
+        Name of the preset of conditions that do not name one.
     spec
-        What has sections of its own, which lie over the preset.
+        The spec, which overrides the preset.
     sweep
         Lists of values by dotted key.
     overrides
         Crossed with `sweep`; none: the tables as they are.
     evaluations
-        By name, what is laid over each condition's scenario, and under ``topology`` and
-        ``learner.decision`` over those.
+        Changes of the scenario of each condition by name; under ``topology`` and
+        ``learner.decision``, changes of these.
     curriculum
-        Stages before the training of conditions whose override names none.
+        Stages before the training of conditions without stages in their override.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def grid(
 
 
 def _leave_out(name: str, other: str, conditions: list[Condition]) -> None:
-    """Note in a control that one of another name, which would be the same, is left out."""
+    """Record in a control the name of an equal control, which is left out."""
     at = [condition.label for condition in conditions].index(other)
     same = (*conditions[at].same, name)
     conditions[at] = conditions[at]._replace(same=same)
@@ -179,7 +179,7 @@ def _points(
 
 
 class Resolved(NamedTuple):
-    """The settings of a condition, and what its preset says to no effect."""
+    """Settings of a condition, and ignored keys of its preset."""
 
     settings: ConditionSettings
     left_out: tuple[str, ...] = ()
@@ -205,7 +205,7 @@ def resolve(
     own = [_expand(layer) for layer in own]
     if "preset" in point:
         own = [for_control(name, layer) for layer in own]
-    elif own_preset is not None:  # what stands beside the preset is meant for it
+    elif own_preset is not None:  # the keys next to a preset are meant for it
         own[0] = for_control(name, own[0])
     given = PRESETS[name].table
     parts = _settle([_part("scenario", given)], [_part("scenario", t) for t in own], where)
@@ -221,7 +221,7 @@ def _part(name: str, table: Layer) -> TomlTable:
 
 
 def for_control(preset: str, layer: Layer) -> Layer:
-    """Return what a user laid over a preset, without what tunes learning if that is a control.
+    """Return a user's layer without the keys that tune learning, if the preset is a control.
 
     A control that is defined by its rule of decision, as ``random`` and ``planner`` are, keeps it.
     """
@@ -257,21 +257,21 @@ def _tunes_learning(key: str) -> bool:
 
 
 def _settle(given: Layers, own: Layers, where: str) -> Resolved:
-    """Return what layers come to, those that are given without what the kinds refuse of them.
+    """Return the settings of layers, without given keys that the kinds refuse.
 
     Parameters
     ----------
     given
-        What the user did not write: the preset, and what the scenario lays over it.
+        Layers of the preset and the scenario.
     own
-        What the user wrote; lies over what is given.
+        Layers of the user, which override the given ones.
     where
-        Which condition it is, for messages.
+        Name of the condition in messages.
 
     Raises
     ------
     SpecError
-        If what the user wrote is refused, or lacks something.
+        If a key of the user is refused or missing.
     """
     dropped: set[str] = set()
     while True:
@@ -294,19 +294,19 @@ def _settle(given: Layers, own: Layers, where: str) -> Resolved:
 
 
 def _key(keys: Sequence[int | str]) -> str:
-    """Return the dotted key of a value, or of the list that it stands in."""
+    """Return the dotted key of a value, or of the list that contains it."""
     names = itertools.takewhile(lambda key: isinstance(key, str), keys)
     return ".".join(map(str, names))
 
 
 def _says(layers: Layers, key: str) -> bool:
-    """Return whether any layer says something of a key, of what is in its table, or around it."""
+    """Return whether any layer sets a key, a key of its table, or a table around it."""
     written = (other for layer in layers for other, value in flat(layer) if value != {})
     return any(f"{key}.".startswith(f"{k}.") or f"{k}.".startswith(f"{key}.") for k in written)
 
 
 def _refused(learner: TeamSettings) -> Iterator[str]:
-    """Yield the keys of a learner whose values its kinds refuse when a team is built."""
+    """Yield the keys of a learner with values that its kinds refuse when a team is built."""
     if not isinstance(learner, LearnerSettings):
         return
     usual = dict(DecisionSettings())
@@ -338,7 +338,7 @@ def _left_out(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the keys of given layers that a table is without, and the kinds that are why.
 
-    A preset's scenario is of its own kind alone: what it says of that to no effect is expected.
+    Ignored keys of a preset's scenario of another kind are expected and not reported.
     """
     written = {key for layer in given for key, value in flat(layer) if value != {}}
     there = dict(flat(table))
@@ -354,20 +354,20 @@ def _left_out(
 
 
 def _cause(key: str, kinds: Iterable[str]) -> str | None:
-    """Return which of some kinds a key is left out for: of its table, or else of its section."""
-    around = [kind for kind in kinds if key.startswith(kind.removesuffix("kind"))]
+    """Return the kind that makes a key ignored: that of its table, or of its section."""
+    enclosing = [kind for kind in kinds if key.startswith(kind.removesuffix("kind"))]
     section_of_key = key.partition(".")[0]
-    beside = [kind for kind in kinds if kind.partition(".")[0] == section_of_key]
-    return max(around or beside, key=len, default=None)
+    same_section = [kind for kind in kinds if kind.partition(".")[0] == section_of_key]
+    return max(enclosing or same_section, key=len, default=None)
 
 
 def _expand(layer: Layer) -> TomlTable:
-    """Return a layer whose sections are tables."""
+    """Return a layer with tables as sections."""
     return {key: section(key, v) if key in SECTIONS else v for key, v in layer.items()}
 
 
 def _lay(layers: Layers) -> TomlTable:
-    """Return the table of layers, each over the one before, the first over the defaults."""
+    """Return the merged table of layers over the defaults."""
     table = ConditionSettings().model_dump()
     for layer in layers:
         table = overlay(table, layer, ConditionSettings)
@@ -375,13 +375,13 @@ def _lay(layers: Layers) -> TomlTable:
 
 
 def _stage(settings: ConditionSettings, changes: Layer, where: str) -> ScenarioSettings:
-    """Return a condition's scenario with changes laid over it."""
+    """Return the changed scenario of a condition."""
     table = overlay(settings.model_dump(), {"scenario": dict(changes)}, ConditionSettings)
     return _validated(table, where).scenario
 
 
 def _reevaluation(settings: ConditionSettings, changes: Layer, where: str) -> ConditionSettings:
-    """Return a condition's settings with changes laid over scenario, topology and decision."""
+    """Return the settings of a condition with a changed scenario, topology and decision."""
     parts: TomlTable = {"scenario": dict(changes)}
     for name in ("topology", "learner"):
         if name in parts["scenario"]:

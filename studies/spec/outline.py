@@ -1,4 +1,4 @@
-"""What a study consists of, as it was noted: read without running anything that it names.
+"""Outline of a kept study, read without running any code that it names.
 
 The installed code that computes results is noted, too, so that an edit of it is reported. Each
 module on which a trial's numbers depend has a digest of its text, to see at once whether it may
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 
 
 def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
-    """Return in words the episodes of training, stage by stage, that there are.
+    """Return the numbers of training episodes in words, stage by stage.
 
     Parameters
     ----------
     curricula
-        Of every condition, the episodes of its stages.
+        Episodes of each stage, for every condition.
     episodes
-        Those after them.
+        Episodes of training after the stages.
 
     Examples
     --------
@@ -53,15 +53,15 @@ class StudyOutline(NamedTuple):
     study: str
     """Name of the study."""
     seeds: tuple[int, ...]
-    """As in `Spec`."""
+    """Seeds of the trials of each condition."""
     episodes: int
-    """As in `Spec`."""
+    """Number of training episodes of a trial."""
     steps: int
-    """As in `Spec`."""
+    """Maximum number of decisions in an episode."""
     evaluation: int
-    """As in `Spec`."""
+    """Number of evaluation episodes after training."""
     columns: Mapping[str, SpecTable]
-    """By condition, what tells it from the others."""
+    """Columns that distinguish each condition from the others."""
     table: SpecTable
     """The whole spec as a table."""
 
@@ -116,10 +116,10 @@ def sources_of(store: Store) -> Sources:
 
 
 def other_spec(store: Store) -> str | None:
-    """Return how the copy of the spec beside a database differs from it, in one line.
+    """Return the difference between a study and the copy of the spec in its folder, in one line.
 
-    One of the two may have come from another study. None if they mean the same, or there is no
-    copy. Files of users are run only if they are trusted, and if the copy is written otherwise.
+    One of the two may have come from another study. None if they are equal or there is no copy.
+    Files of users run only if they are trusted and the copy differs.
     """
     path = store.directory / SPEC_FILE
     own = store.spec()
@@ -134,22 +134,22 @@ def other_spec(store: Store) -> str | None:
             copy = tomllib.loads(dumps(Spec.of(copy, sources_of(store)).table()))
             own = tomllib.loads(dumps(own))  # without what is None
     except OSError as error:
-        return f"{path}: is not the spec of {DATABASE} beside it: {error.strerror or error}"
+        return f"{path}: is not the spec of {DATABASE} in its folder: {error.strerror or error}"
     except (ValueError, RecursionError) as error:
-        return f"{path}: is not the spec of {DATABASE} beside it: {error}"
+        return f"{path}: is not the spec of {DATABASE} in its folder: {error}"
     for key in sorted(own.keys() | copy.keys()):
         here = copy.get(key, "absent")
         there = own.get(key, "absent")
         if here != there:
             return (
-                f"{path}: is not the spec of {DATABASE} beside it, whose results these are: "
+                f"{path}: is not the spec of {DATABASE} in its folder, which has the results: "
                 f"{key} = {show(here)} here, {show(there)} there"
             )
     return None
 
 
 PACKAGE = Path(__file__).parents[2]
-"""Where the package is installed."""
+"""Folder of the installed package."""
 COMPUTING = (
     "core/**/*.py",
     "topologies/**/*.py",
@@ -162,10 +162,10 @@ COMPUTING = (
 SILENT = ("checking", "pictures", "environments.py", "figure.py", "drawing.py")
 """Parts of them that do not."""
 GROUPS = "nested_agents."
-"""With what the names of entry-point groups begin under which packages offer things."""
+"""Prefix of the names of entry-point groups."""
 
 Code = dict[str, tuple[str, str]]
-"""By module, digests of its text and of its syntax tree."""
+"""Digests of the text and of the syntax tree of each module."""
 
 
 def modules() -> dict[str, str]:
@@ -260,6 +260,6 @@ def outdated(store: Store) -> str | None:
         return None
     more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"
     return (
-        f"{store.directory}: its results are of other code: {modules[0]}{more} changed "
-        "since; --accept-code goes on with it"
+        f"{store.directory}: {modules[0]}{more} changed since its trials were run; continue with "
+        "--accept-code"
     )

@@ -1,7 +1,8 @@
 """Named starting points of a spec: a scenario, a topology and a learner, see ``presets.toml``.
 
-A preset states where it departs from the defaults of the settings models; a spec's own tables are
-laid over it. `frozen`, `random` and `planner` are the controls of a learning curve.
+A preset lists the settings that differ from the defaults of the settings models. The tables of a
+spec override those of its preset. `frozen`, `random` and `planner` are the controls of a learning
+curve.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ class Preset(NamedTuple):
     """A named fragment of a spec."""
 
     summary: str
-    """What it is, in one line."""
+    """Description in one line."""
     table: SpecTable
-    """The `scenario`, `topology` and `learner` tables as they would stand in a spec."""
+    """The tables `scenario`, `topology` and `learner` as in a spec."""
     other_scenarios: SpecTable
-    """Laid over it where the scenario is of another kind than its own."""
+    """Changes for scenarios of another kind."""
 
 
 _TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))

@@ -1,8 +1,8 @@
-"""JSON schema of specs: what an editor completes and checks, with the text beside each field.
+"""JSON schema of specs, with which editors complete and check them.
 
-It is read from the models by which specs are validated, as `keys` is. Tables of a spec lie over a
-preset, so nothing is required in them that a preset may say. Without a ``kind`` a table may have
-the keys of any kind; with one that is built in, those of this kind; of a user's own, any.
+It is derived from the models that validate specs, like `keys`. Tables of a spec override a preset,
+so that they require no key that a preset may have. A table without a ``kind`` may have the keys of
+any kind, one with a built-in kind the keys of this kind, and one with a user's kind any keys.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Schema = dict[str, Any]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 OPEN = BeforeValidator, PlainValidator, WrapValidator
-"""What may take other values than the type of its field says."""
+"""Validators that may accept other values than the type of the field."""
 NUMBERS: Schema = {"type": "array", "items": {"type": "integer", "minimum": 0}}
 LISTS: Schema = {"$ref": "#/$defs/lists"}
 LIST: Schema = {"anyOf": [{"type": "array"}, LISTS]}
@@ -90,7 +90,7 @@ class SchemaWriter:
     def of_kinds(
         self, place: str, kinds: Mapping[str, type[Settings]], *, may_be_own: bool
     ) -> Schema:
-        """Return a reference to the schema of a table whose ``kind`` says what may stand in it."""
+        """Return a reference to the schema of a table with keys that depend on its ``kind``."""
         if place not in self.definitions:
             self.definitions[place] = {}
             names: Schema = {"enum": list(kinds)}
@@ -119,7 +119,7 @@ def _or_text(schema: Schema) -> Schema:
 
 
 def _bounds(info: FieldInfo) -> Schema:
-    """Return the bounds that stand beside a field's type."""
+    """Return the bounds in the metadata of a field."""
     bounds: Schema = {}
     for mark in info.metadata:
         if isinstance(mark, Ge):
@@ -167,7 +167,7 @@ def schema(kind: str = "spec") -> Schema:
 
 
 def _spec(writer: SchemaWriter) -> Schema:
-    """Return the schema of a whole spec, whose tables go to the writer's definitions."""
+    """Return the schema of a whole spec; the writer's definitions hold its tables."""
     layers = {
         name: writer.field(ConditionSettings, name, info)
         for name, info in ConditionSettings.model_fields.items()

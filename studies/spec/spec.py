@@ -1,146 +1,55 @@
-"""The spec of a study, as it stands in a TOML file, or in the objects of Python.
+"""The spec of a study, from a TOML file or from Python objects.
 
-``study``, ``preset``, ``seeds``, ``episodes``, ``steps``, ``evaluation``,
-``evaluation_steps``, ``keep_teams``, ``agents``, then the tables
-``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
-``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
-conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
-conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams. ``[tune]``
-are the values that `nested_agents.studies.api.tuning` tries. Objects are put in the words
-that a TOML file would have for them.
+The tables ``[scenario]``, ``[topology]`` and ``[learner]`` override those of the preset. Conditions
+are the combinations of ``[[overrides]]``, which are further tables by name, and ``[sweep]``, which
+has lists of values by dotted key. ``[[curriculum]]`` has stages of training before that of the
+conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams, and
+``[tune]`` the values that `nested_agents.studies.api.tuning` tries.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
 from ...core.agents.joint import Granularity
-from ...core.decision.exploration import EXPLORATIONS
-from ...core.evaluators import EVALUATORS
-from ...core.hierarchy.hierarchy import Hierarchy
-from ...core.learners import LEARNERS
-from ...core.numerics import nx
 from ...core.plugins.problems import explain
-from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, mentions
 from ...core.plugins.trust import modules_in
 from ...core.plugins.words import closest, expect
-from ...scenarios import SCENARIOS
-from ...topologies import TOPOLOGIES
 from ...topologies.builders import join_names
 from ..errors import SpecError, refused
 from ..store.database import DATABASE, SPEC_FILE
 from .conditions import Condition, Curriculum, Length, Name, Override
 from .controls import LEARN_NOTHING, planning_remark
 from .layers import below, expand, grid, section, tuning_keys
+from .objects import plain
 from .presets import PRESETS
 from .studies import STUDIES
 from .tables import SWEEP, SpecTable, TomlTable, assignment, overlay, spec_text
 
-REGISTRIES: dict[str, Registry] = {
-    "study": STUDIES,
-    "scenario": SCENARIOS,
-    "topology": TOPOLOGIES,
-    "learner": LEARNERS,
-    "exploration": EXPLORATIONS,
-    "evaluator": EVALUATORS,
-}
-"""The registry of what stands at a key."""
-
-
-def plain(value: Any, key: str = "") -> Any:
-    """Return a table in which classes and functions are names, and their settings tables.
-
-    Parameters
-    ----------
-    value
-        A spec's table, or a part of it.
-    key
-        Where it stands, the last part of its dotted key.
-
-    Raises
-    ------
-    SpecError
-        If an object is defined in no file, so that no worker could ever find it.
-    """
-    if isinstance(value, Mapping):
-        table = {k: plain(v, key if k == "kind" else str(k)) for k, v in value.items()}
-        kind = table.get("kind")
-        return table | kind if isinstance(kind, dict) else table
-    if isinstance(value, list | tuple):
-        return type(value)(plain(v, key) for v in value)
-    registry = REGISTRIES.get(key.rpartition(".")[2])
-    if isinstance(value, Hierarchy | nx.Graph):
-        return _edges(value)
-    settings = getattr(value, "settings", value)  # of something that was built
-    if isinstance(settings, Settings):
-        return _of_settings(settings, registry)
-    if isinstance(value, type) or callable(value) or hasattr(value, "function"):
-        name = _name(value, registry or Registry("state variable", {}))
-        return {"kind": name} if key in ("scenario", "learner", "topology") else name
-    return value
-
-
-def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
-    """Return the table of the topology of just these agents and edges, or neighbours."""
-    relations = {}
-    if isinstance(graph, Hierarchy):
-        if graph.edges and graph.neighbours:
-            raise SpecError("topology: a hierarchy of edges and neighbours has no table in a spec")
-        agents: list[str] = list(graph.agents)
-        pairs = [(agents[a], agents[b]) for a, b in graph.edges or graph.neighbours]
-        of_neighbours = bool(graph.neighbours)
-        relations = {"told": graph.told, "considers": graph.considers}
-    else:
-        agents = list(map(str, graph))
-        pairs = [(str(a), str(b)) for a, b in graph.edges]
-        of_neighbours = bool(pairs) and not graph.is_directed()
-    if of_neighbours:
-        return {"kind": "coordination-graph", "edges": tuple(pairs), **relations}
-    joined = {name for pair in pairs for name in pair}
-    alone = tuple(name for name in agents if name not in joined)
-    return {"kind": "edges", "edges": tuple(pairs), "alone": alone, **relations}
-
-
-def _of_settings(settings: Settings, registry: Registry | None) -> TomlTable:
-    """Return the table of settings; what is None leaves what lies below as it is."""
-    table = settings.model_dump(exclude_none=True)
-    if registry is not None and not table.get("kind"):
-        owner = type(settings)
-        outer = owner.__qualname__.rpartition(".")[0]
-        # A class's nested Settings stand for the class.
-        thing = resolve_name(f"{owner.__module__}:{outer}") if outer else owner
-        table["kind"] = _name(thing, registry)
-    return table
-
-
-def _name(thing: object, registry: Registry) -> str:
-    with refused(f"{registry.kind}: "):
-        return registry.reference_to(thing)
-
-
 MOST_TRIALS = 100_000
-"""A larger grid is taken for a mistake."""
+"""Maximum number of trials of a study."""
 
 MOST_KEYS = 6
-"""A remark names no more of them."""
+"""Maximum number of keys in a remark."""
 FEW_KEYS = 2
-"""Nor of those that are left out, of which most users have never heard."""
+"""Maximum number of ignored keys in a remark."""
 
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 
 
 class Spec(Settings):
-    """What a study measures: conditions x seeds, and for how long.
+    """A study: its conditions, seeds and lengths.
 
     Examples
     --------
@@ -148,8 +57,7 @@ class Spec(Settings):
     >>> spec.seeds, [condition.label for condition in spec.conditions()]
     ((0, 1, 2), ['default', 'frozen'])
 
-    Keywords do as well. Tables may be made by any Python, and hold settings, classes, functions and
-    hierarchies:
+    Keywords work, too. Tables may hold settings, classes, functions and hierarchies:
 
     >>> from nested_agents.core.learners.td import TDLambdaSettings
     >>> ridges = [{"name": f"ridge {r}", "learner": {"ridge": r}} for r in (1.0, 100.0)]
@@ -158,44 +66,46 @@ class Spec(Settings):
     ['ridge 1.0', 'ridge 100.0', 'online']
     """
 
+    title: str | None = None
+    """Title of the report. By default, the first sentence of the comment at the top of the file."""
     study: str = "learning-curve"
-    """Which study, by name."""
+    """Name of the study: what is measured and how it is analyzed."""
     preset: str = "default"
-    """The preset under the tables below."""
+    """Preset that the tables below override."""
     seeds: tuple[Seed, ...] = tuple(range(8))
-    """A list of seeds, or their number: n stands for 0 to n - 1."""
+    """List of seeds, or their number n for the seeds 0 to n - 1."""
     episodes: Length = 20
-    """Training episodes of a trial."""
+    """Number of training episodes of a trial."""
     decisions: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
-    """Joint decisions of a trial's training in place of `episodes`, where the study is
-    ``experience``; those of all environments count."""
+    """Joint decisions of training, counted over all environments. The study ``experience`` uses
+    them instead of `episodes`."""
     steps: Length = 450
-    """Most decisions in an episode."""
+    """Maximum number of decisions in an episode."""
     evaluation: Annotated[int, Field(ge=0, le=1_000_000)] = 10
-    """Episodes after training in which nothing is explored and nothing learned."""
+    """Number of evaluation episodes after training, without exploration and learning."""
     evaluation_steps: Length | None = None
-    """Most decisions in an episode of evaluation; as in training by default."""
+    """Maximum number of decisions in an evaluation episode. By default, as in training."""
     keep_teams: bool = False
-    """Whether trained teams are kept with their trials, to act, be explained and be re-evaluated
-    without training anew."""
+    """Whether trained teams are kept, so that they can act, be explained and be re-evaluated
+    without training again."""
     scenario: SpecTable = Field(default_factory=dict)
-    """Laid over the preset's scenario."""
+    """Changes of the scenario of the preset."""
     agents: Granularity | None = None
-    """What there is one agent for: each actuator (the default), each body, the team."""
+    """Granularity: one agent per actuator (the default), per body, or for the team."""
     topology: SpecTable = Field(default_factory=dict)
-    """Laid over the preset's topology; may be written as a string."""
+    """Changes of the topology of the preset; may be written as a string."""
     learner: SpecTable = Field(default_factory=dict)
-    """Laid over the preset's learner."""
+    """Changes of the learner of the preset."""
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
-    """Lists of values by dotted key; the conditions are all their combinations."""
+    """Lists of values by dotted key. The conditions are all their combinations."""
     tune: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
-    """Lists of values by dotted key that `nested-agents tune` draws from; nothing else reads it."""
+    """Lists of values by dotted key for `nested-agents tune`."""
     overrides: tuple[Override, ...] = ()
-    """Tables by name, each laid over those above and crossed with the sweep."""
+    """Tables by name. Each overrides those above and is combined with the sweep."""
     curriculum: Curriculum = ()
-    """Stages in which teams are trained before `episodes`, in scenarios laid over their own."""
+    """Stages of training before `episodes`, in changed scenarios."""
     evaluations: Mapping[Name, SpecTable] = Field(default_factory=dict)
-    """By name, changes of the scenario in which the trained teams are evaluated too; under
+    """Further evaluations of the trained teams by name: changes of the scenario and, under
     ``topology`` and ``learner.decision``, of how they decide."""
 
     _conditions: tuple[Condition, ...] = PrivateAttr(default=())
@@ -240,7 +150,7 @@ class Spec(Settings):
         Parameters
         ----------
         table
-            The spec. In place of names it may hold settings, classes and functions.
+            The spec. It may hold settings, classes and functions instead of names.
         sources
             The files that it may name; those below the working directory unless given.
 
@@ -281,7 +191,7 @@ class Spec(Settings):
             spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations, spec.curriculum
         )
         if spec.decisions is not None and [c.label for c in spec._conditions] == ["default"]:
-            (only,) = spec._conditions  # its learner says more, and no kept study has this yet
+            (only,) = spec._conditions
             spec._conditions = (only._replace(label=only.settings.learner.kind),)
         tables = [table for condition in spec._conditions for table in condition.tables]
         names = dict(mentions([{"study": spec.study}, *tables]))
@@ -329,10 +239,10 @@ class Spec(Settings):
     def load(
         cls, path: str | PathLike[str], changes: Iterable[str] = (), study: Path | None = None
     ) -> Spec:
-        """Read a TOML file and lay ``key=value`` changes over it.
+        """Read a TOML file and apply ``key=value`` changes.
 
-        Files of users are looked for beside it, then among the copies of a study. The copy of a
-        spec that stands beside a study's database may be somebody else's, see `trust`.
+        Files of users are searched for in its folder, then among the copies of a study. The copy of
+        a spec in the folder of a study may come from another person, see `trust`.
 
         Raises
         ------
@@ -354,7 +264,7 @@ class Spec(Settings):
         title: str = "spec",
         sources: Sources | None = None,
     ) -> Spec:
-        """Read TOML text and lay ``key=value`` changes over it; see `load`, `of`.
+        """Read TOML text and apply ``key=value`` changes; see `load`, `of`.
 
         Messages call the text by its `title`.
         """
@@ -364,6 +274,8 @@ class Spec(Settings):
             raise SpecError(f"{title}: is not valid TOML: {error}") from None
         except RecursionError:
             raise SpecError(f"{title}: is nested too deeply") from None
+        if comment := first_sentence(text):
+            table = {"title": comment, **table}
         for change in changes:
             with refused(f"--set {change}: "):
                 table = _changed(table, assignment(change))
@@ -378,10 +290,10 @@ class Spec(Settings):
         return Spec.of({**self.table(), **(update or {})}, self.sources)
 
     def warnings(self) -> tuple[str, ...]:
-        """Return what looks wrong and is not refused, a line each: sizes in another unit.
+        """Return a line for each suspicious value and each ignored key.
 
-        Also which keys are left out: of its learner for controls, see `conditions`, of its topology
-        for learners that pass nothing down, and of its preset for kinds that have none such.
+        Ignored are keys of the learner in controls, of the topology for learners without hierarchy,
+        and of the preset for kinds that do not have them.
         """
         lines = []
         left_out = dict.fromkeys(key for c in self.conditions() for key in c.left_out)
@@ -421,7 +333,7 @@ class Spec(Settings):
 
     @property
     def sources(self) -> Sources:
-        """The files of users that it names."""
+        """Files of users that the spec names."""
         return self._sources
 
     def table(self) -> TomlTable:
@@ -430,9 +342,20 @@ class Spec(Settings):
         table["overrides"] = [_filled(override) for override in table.get("overrides", ())]
         if self.seeds == tuple(range(len(self.seeds))):
             table["seeds"] = len(self.seeds)
-        if not self.keep_teams:  # studies of before there was a choice say no more
+        if not self.keep_teams:
             del table["keep_teams"]
         return {key: value for key, value in table.items() if value not in ([], ())}
+
+
+def first_sentence(text: str) -> str:
+    r"""Return the first sentence of the comment at the top of a TOML text; empty without one.
+
+    >>> first_sentence("# Do two robots learn? See Fig. 5.\nstudy = 'scaling'")
+    'Do two robots learn?'
+    """
+    lines = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    comment = " ".join(line[1:].strip() for line in lines if not line.startswith("#:"))
+    return re.split(r"(?<=[?!])\s|[.:](?:\s|$)", comment, maxsplit=1)[0].strip()
 
 
 def _changed(table: TomlTable, change: TomlTable) -> TomlTable:

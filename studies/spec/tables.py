@@ -1,6 +1,6 @@
-"""Tables of a spec: laid over each other, reached by dotted keys; and what conditions are called.
+"""Tables of a spec: merging, dotted keys, and labels of conditions.
 
-A *table* is a nested dictionary as TOML reads it. Laying one over another replaces values and
+A *table* is a nested dictionary as TOML reads it. Merging one over another replaces values and
 descends into tables. Where the two name a different `kind`, the lower one keeps only what both
 kinds inherit in common: a trace decay says nothing to a learner that has no trace.
 
@@ -32,7 +32,7 @@ SpecTable = Mapping[str, Any]
 
 
 def overlay(base: SpecTable, table: SpecTable, slot: Slot = None) -> TomlTable:
-    """Return `base` with `table` laid over it; neither is modified.
+    """Return `base` overridden by `table`; neither is modified.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def dumps(table: SpecTable) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return tables without what is None, and lists in place of tuples, at any depth."""
+    """Return tables without None values and with lists instead of tuples, at any depth."""
     if isinstance(value, Mapping):
         return {key: _plain(inner) for key, inner in value.items() if inner is not None}
     if isinstance(value, list | tuple):
@@ -265,7 +265,7 @@ def _checksum(text: str) -> str:
 
 
 def scalar(value: object) -> object:
-    """Return a value as it stands in a column: a number or text as it is, else in TOML."""
+    """Return a value for a column: numbers and text unchanged, others in TOML."""
     is_scalar = isinstance(value, int | float | str) and not isinstance(value, bool)
     return value if is_scalar else show(value, width=None)
 

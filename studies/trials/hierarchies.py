@@ -26,7 +26,7 @@ def hierarchies_of(spec: Spec) -> Iterator[HierarchyView]:
             scenario, hierarchy = settings.arrange(settings.scenario.build())
         n_actions = len(scenario.action_set)
         failures = settings.topology.failures
-        relations = hierarchy.told, hierarchy.considers
+        relations = hierarchy.communication, hierarchy.lookahead
         content = hierarchy.agents, hierarchy.edges, relations, failures, n_actions
         if content not in seen:
             seen.add(content)

@@ -201,7 +201,7 @@ def _check_same(store: Store, spec: Spec, notes: StudyNotes) -> None:
     if is_copy(copy, spec, notes):
         raise SpecError(
             f"{copy}: is not the spec of the study beside it: {mismatch}; if you did not edit it, "
-            f"it is damaged: {command_line('retry', store.directory)} goes on by the database"
+            f"it is damaged: {command_line('retry', store.directory)} continues from the database"
         )
     raise SpecError(f"{store.directory}: holds another study: {mismatch}")
 

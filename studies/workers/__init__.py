@@ -1,1 +1,1 @@
-"""Who runs the trials: processes of this machine, or of a Dask cluster."""
+"""Workers that run trials: processes of this machine or of a Dask cluster."""

@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster: one started here, or one whose scheduler has an address.
+"""Workers of a local Dask cluster, or of a running one.
 
 A cluster has an idea of its own of what to do when a worker dies: it hands the trial to another
 one, and gives up after some deaths (`allowed-failures` in its configuration; none in a cluster
@@ -25,10 +25,10 @@ from .nursery import Answer, call_for
 from .runner import ONE_THREAD, Outcome, RunTrial, Workers, beginning_processes, versions
 
 CONNECT = 10.0
-"""How long to try to reach a scheduler [s]."""
+"""Timeout for connecting to a scheduler [s]."""
 
 PATIENCE = 60.0
-"""How long to wait for the first worker, or for another one when all are gone [s]."""
+"""Timeout for the first worker, or for a new one when all have gone [s]."""
 
 
 class UnlikeWorkerError(Exception):
@@ -100,7 +100,7 @@ class DaskWorkers(Workers[Future]):
     @classmethod
     @contextmanager
     def at(cls, address: str, jobs: int | None) -> Iterator[DaskWorkers]:
-        """Use the cluster whose scheduler is at `address`, with at most `jobs` trials at a time.
+        """Use the cluster with its scheduler at `address`, with at most `jobs` trials at a time.
 
         Raises
         ------
@@ -119,7 +119,7 @@ class DaskWorkers(Workers[Future]):
 
     @property
     def processes(self) -> int:
-        """How many trials run at a time with the workers there are."""
+        """Number of trials that the present workers run at a time."""
         try:
             workers = len(self._client.nthreads())
         except (OSError, ValueError) as error:

@@ -33,16 +33,16 @@ if TYPE_CHECKING:
     from ..trials.trial import Trial
 
 LOOK = 0.2
-"""How often to look whether a trial's process has died without a word [s]."""
+"""Polling interval for processes that died without an answer [s]."""
 
 
 class Answer(NamedTuple):
-    """What came of a process."""
+    """Result of a process."""
 
     content: bytes
-    """What it said; nothing if it died before."""
+    """Answer of the process; empty if it died before."""
     death: str = ""
-    """How it died, in words."""
+    """Cause of its death in words."""
 
     def outcome(self, trial: Trial) -> Outcome:
         """Return what became of the trial that it ran."""
@@ -58,7 +58,7 @@ class Word(NamedTuple):
     outcome: bytes
     """Error, seconds and result of the trial, pickled."""
     warmth: Warmth
-    """What it had imported and loaded in the end."""
+    """Modules and kernels that it had loaded at the end."""
 
 
 def call_for(
@@ -107,7 +107,7 @@ def _begin(parent: int) -> tuple[subprocess.Popen[bytes], Connection]:
 
 
 def serve(descriptor: int) -> None:
-    """Fork a process for each trial that is asked for, until nobody asks any more."""
+    """Fork a process for each requested trial, until the connection closes."""
     worker = Connection(descriptor)
     restore_child_signal()
     importlib.import_module("nested_agents.studies.trials.session")
@@ -148,7 +148,7 @@ def _fork(worker: Connection, task: bytes, seed: int) -> tuple[Word | None, str]
 
 
 def _listen(worker: Connection, ours: Connection, child: int) -> tuple[Word | None, str]:
-    """Return the last word of a process, or how it died; end it if nobody waits any more."""
+    """Return the answer of a process or the cause of its death; end it if the connection closes."""
     status = None
     while True:
         ready = wait([ours, worker], LOOK)

@@ -1,6 +1,6 @@
-"""What makes a process quick that runs trials: modules it has imported, kernels it has loaded.
+"""Preloading: modules and kernels that a new process loads before it runs trials.
 
-One process tells what it has, another gets the same; it runs nothing of a user's for it.
+One process reports its modules and kernels, and another loads the same. No user code runs for this.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ LIBRARIES = frozenset(
         "torch",
     )
 )
-"""What may be imported for others: it changes nothing for those who do not use it."""
+"""Modules that may be preloaded, because their import has no side effects."""
 
 
 class Loaded(NamedTuple):
     """A kernel that has been loaded for arguments of some types."""
 
     module: str
-    """Where it is."""
+    """Module of the kernel."""
     name: str
-    """What it is called there."""
+    """Name in the module."""
     types: bytes
-    """Those of its arguments, pickled."""
+    """Pickled types of its arguments."""
 
 
 class Warmth(NamedTuple):
-    """What a process has imported and loaded."""
+    """Modules and kernels that a process has loaded."""
 
     modules: tuple[str, ...]
     """Names of modules of `LIBRARIES`, in the order in which they were imported."""
     kernels: tuple[Loaded, ...]
-    """Of this package."""
+    """Modules of this package."""
 
 
 def measure_warmth() -> Warmth:

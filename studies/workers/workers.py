@@ -1,8 +1,8 @@
-"""Who runs the trials: processes on this machine, or workers of a Dask cluster on many.
+"""Worker pools: processes on this machine, or workers of a Dask cluster.
 
-A family of siblings with one interface, distinguished by the name of their backend. Whoever runs a
-trial, its bits are the same: linear algebra uses one thread, and a trial that runs files of a user
-has a process to itself. Others may follow each other in one: nothing built in keeps state there.
+All backends have one interface and give the same bits: linear algebra uses one thread, and a trial
+that runs user files has its own process. Other trials may share a process, because built-in code
+keeps no state.
 """
 
 import os
@@ -46,7 +46,7 @@ def check_workers(backend: Backend, jobs: int | None, address: str | None) -> No
 
 
 def _check_semaphores() -> None:
-    """Refuse a machine whose processes cannot wait for each other, as all local workers do."""
+    """Refuse a machine without semaphores between processes, which all local workers need."""
     try:
         with safe_path():  # it starts a process that frees shared memory
             get_context("spawn").Semaphore()
@@ -102,16 +102,16 @@ QUIET = "ignore:resource_tracker:UserWarning"
 """The process that tidies up after a killed run would complain at length of what it tidies up."""
 
 REPLACED = "A worker stopped while some jobs were given to the executor"
-"""What loky says when it replaces a process that has grown by 300 MB, as PyTorch makes it grow."""
+"""Warning of loky when it replaces a process that has grown by 300 MB, as with PyTorch."""
 
 THREADS = ("BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-"""What tells other libraries to use one thread, beside `ONE_THREAD`."""
+"""Environment variables that limit other libraries to one thread, besides `ONE_THREAD`."""
 
 IDLE = 300
-"""How long a process without a trial is kept [s]."""
+"""Time after which an idle process ends [s]."""
 
 HANDED_ON = 2.0
-"""How long loky may take to hand a trial on to a process [s]; until then it cannot stop it."""
+"""Maximum time in which loky hands a trial to a process [s]; before, it cannot be stopped."""
 
 
 CODES = re.compile(r"\w+\((-?\d+)\)")

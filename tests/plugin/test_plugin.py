@@ -108,7 +108,7 @@ from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios import SCENARIOS
-from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
+from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.studies.spec.studies import STUDIES
 from nested_agents.topologies import TOPOLOGIES
 for registry in (

@@ -23,7 +23,7 @@ def test_every_published_condition_can_be_selected_as_a_spec(name):
         assert len(spec.get("overrides", [1])) == 1
 
 
-@pytest.mark.parametrize("name", ["ablation", "arms", "learning-curve", "transfer"])
+@pytest.mark.parametrize("name", ["ablation", "arms", "climbing", "learning-curve", "transfer"])
 def test_the_selected_spec_has_one_condition_with_the_seeds_that_fit(name):
     found = check.find_condition(name, 1e6)
     assert found is not None
@@ -31,7 +31,14 @@ def test_the_selected_spec_has_one_condition_with_the_seeds_that_fit(name):
     assert len(spec.conditions()) == 1
     assert tuple(spec.seeds) == found.seeds
     published = json.loads((RESULTS / f"{name}.json").read_text())
-    assert list(found.seeds) == published["seeds"][found.condition]
+    seeds = published["seeds"][found.condition]
+    assert list(found.seeds) == (list(range(seeds)) if isinstance(seeds, int) else seeds)
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_condition_of_every_table_is_found_or_none(name):
+    found = check.find_condition(name, 1.0)
+    assert found is None or len(found.seeds) >= check.MIN_SEEDS
 
 
 def test_no_condition_is_found_if_too_few_seeds_fit_into_the_time():

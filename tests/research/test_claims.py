@@ -415,7 +415,7 @@ REST = {
     '[[overrides]]\nname = "nested, observed"\nsweep.scenario.game = ["climbing"]',
     "edges": '[learner]\nweights = "role"\ndecision.evaluator = "best-response"\n'
     '[sweep]\nlearner.decision.value_of = ["own"]\n'
-    '[evaluations]\n"told only".topology.considers = "none"',
+    '[evaluations]\n"told only".topology.lookahead = "none"',
     "related": 'evaluations.star.box = "star"\n[[overrides]]\nname = "nested"\n'
     '[[overrides]]\nname = "pushing points, team"\n'
     f'scenario = {{ kind = "{POINTS}:PushingPoints", observed = "joint" }}',

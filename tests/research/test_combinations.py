@@ -33,7 +33,7 @@ def test_every_cell_runs_or_says_why_not_as_the_page_does() -> None:
     [
         ("messages", "reparented", "fitted-q", "yes"),
         ("messages", "lost", "mappo", "left out"),
-        ("considers", "none", "mixed", "yes"),
+        ("lookahead", "none", "mixed", "yes"),
         ("further", "kept team", "td-lambda", "yes"),
         ("neighbours", "simultaneous", "fitted-q", "no"),
     ],

@@ -117,7 +117,7 @@ scenario.kind = "spread"
 learner = { kind = "hierarchy-ppo", environments = 4, rollout = 25, batch_size = 50 }
 [[overrides]]
 name = "hierarchy-ppo, chain"
-topology = { kind = "chain", told = "ancestors" }
+topology = { kind = "chain", communication = "ancestors" }
 [[overrides]]
 name = "hierarchy-ppo, no edges"
 topology = "independent"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.checking.predictions import MOST_JOINT_ACTIONS
+from nested_agents.scenarios.checking.predictions import MAX_JOINT_ACTIONS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
@@ -48,7 +48,7 @@ def test_a_scenario_of_ones_own(
 
 def test_the_tables_that_the_checker_leaves_out() -> None:
     (most,) = re.findall(r"more than ([\d,]+) joint actions", TUTORIAL)
-    assert int(most.replace(",", "")) == MOST_JOINT_ACTIONS
+    assert int(most.replace(",", "")) == MAX_JOINT_ACTIONS
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ def test_the_rows_of_any_phase_can_be_asked_for(study, capsys):
 
 
 def test_a_team_is_trained_again_through_its_stages_to_be_explained(study, capsys):
-    text = said(capsys, "explain", study)
+    text = said(capsys, "explain", study, "--full")
     assert text.startswith("default, seed 0: the team after 2 + 1 + 3 episodes")
 
 

@@ -28,10 +28,10 @@ def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_results_are_of_the_specs() -> None:
-    steps = published.load(EXAMPLES / "pursuit_steps.json").outline
-    assert steps.table == Spec.load(EXAMPLES / "pursuit_steps.toml").table()
-    frozen = published.load(EXAMPLES / "pursuit_frozen.json").outline
-    assert frozen.table == Spec.load(EXAMPLES / "pursuit_frozen.toml").table()
+    for name in ("pursuit_steps", "pursuit_frozen"):
+        table = Spec.load(EXAMPLES / f"{name}.toml").table()
+        table.pop("title", None)  # the comment of the spec, which old results do not have
+        assert published.load(EXAMPLES / f"{name}.json").outline.table == table
     own = Spec.load(EXAMPLES / "pursuit.toml")
     for name, alike in (("pursuit_tuned", True), ("pursuit_tuned_as_written", False)):
         tuned = published.load(EXAMPLES / f"{name}.json").outline.table

@@ -151,9 +151,7 @@ def test_hierarchies_say_how_small_a_difference_they_could_find() -> None:
     from nested_agents.studies.catalogue.hierarchies import analyse
 
     chances = {("chain", "team", 2): 0.9, ("star", "team", 2): 0.8}
-    assert any(
-        "Power: with 20 seeds" in note for note in analyse(hierarchies(chances).frames()).notes
-    )
+    assert any("Power: 20 seeds" in note for note in analyse(hierarchies(chances).frames()).notes)
 
 
 @pytest.mark.parametrize(

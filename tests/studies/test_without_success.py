@@ -27,7 +27,7 @@ STUDIES = {
     "chain-order": {**FITTED, "sweep": {"topology": ["chain", "chain:reversed"]}},
     "hierarchies": {**FITTED, "sweep": {"topology": ["chain", "independent"]}},
     "scaling": {**FITTED, "sweep": {"scenario.particles": [2, 3]}},
-    "edges": {**FITTED, "evaluations": {"told only": {"topology": {"considers": "none"}}}},
+    "edges": {**FITTED, "evaluations": {"told only": {"topology": {"lookahead": "none"}}}},
     "experience": {**BESIDE_RANDOM, "decisions": 20},
 }
 
@@ -47,7 +47,7 @@ def test_studies_compare_returns(study, tmp_path, capsys) -> None:
     if len(kept.conditions) > 1:
         assert main(["compare", str(tmp_path / "kept")]) == 0
         out = capsys.readouterr().out
-        assert "evaluation return, less that of" in out
+        assert "evaluation return, minus that of" in out
         assert "success" not in out
     assert kept.figures
     assert main(["report", str(tmp_path / "kept")]) == 0
@@ -56,10 +56,10 @@ def test_studies_compare_returns(study, tmp_path, capsys) -> None:
 def test_a_plan_speaks_of_returns() -> None:
     table = {**SPREAD, **BESIDE_RANDOM, "seeds": 8}
     text = " ".join(str(na.plan(table, timed=False)).split())
-    assert "a difference of 1.2 standard deviations is found with probability 0.80" in text
+    assert "a difference of 1.2 standard deviations with power 0.80" in text
     assert "Differences of returns, as nothing is a success" in text
     text = " ".join(str(na.plan(table, timed=False, deviation=5.0, smallest=4.0)).split())
-    assert "a difference of 5.9 is found with probability 0.80. For a difference of 4 it" in text
+    assert "a difference of 5.9 with power 0.80. A difference of 4 needs" in text
     with pytest.raises(na.SpecError, match=r"--smallest 4: for returns, give --deviation, too"):
         na.plan(table, timed=False, smallest=4.0)
     with pytest.raises(na.SpecError, match=r"--deviation -1: must be above 0$"):
@@ -89,7 +89,7 @@ def test_rows_reports_and_tuning_leave_success_out(tmp_path, capsys) -> None:
     assert "success" not in capsys.readouterr().out
     assert main(["report", str(tmp_path / "kept")]) == 0
     page = (tmp_path / "kept" / "report.html").read_text(encoding="utf-8")
-    assert "Evaluation return: from " in page
+    assert "Evaluation return is highest with " in page
     alone = {**SPREAD, **FITTED, "tune": {"learner.ridge": [0.01, 1.0]}}
     tuned = na.tune(alone, tmp_path / "tuned", trials=3, seeds=2, jobs=1)
     assert "Nothing is a success: they are ranked by evaluation return." in tuned.lines

@@ -19,7 +19,7 @@ from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.td import TDLambdaSettings
-from nested_agents.core.rules.rule_base import RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBaseSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.topologies import TOPOLOGIES, Topology, build
 
@@ -84,7 +84,7 @@ def test_it_acts_learns_saves_and_loads(case: tuple[LineUp, Hierarchy], tmp_path
     assert np.isfinite(fuzzy(team).learner.theta).all()
     assert (np.abs(fuzzy(team).learner.theta).sum(axis=1) > 0).all()  # every agent learned
     assert fuzzy(team).evaluator is not None
-    assert fuzzy(team).evaluator.counts.joint_actions == 4 * hierarchy.joint_actions(4)
+    assert fuzzy(team).evaluator.counts.joint_actions == 4 * hierarchy.count_joint_actions(4)
     team.save(tmp_path / "team.npz")
     other = team_of(scenario, hierarchy)
     other.load(tmp_path / "team.npz")

@@ -115,9 +115,9 @@ def test_an_edge_may_repeat_the_direction_of_its_graph(tmp_path: Path) -> None:
 def test_an_undirected_node_link_graph_needs_an_orientation(tmp_path: Path) -> None:
     path = tmp_path / "line.json"
     path.write_text(json.dumps(nx.node_link_data(nx.path_graph(AGENTS), edges="edges")))
-    with pytest.raises(ValueError, match=r"who is above whom\? set topology\.oriented = 'listed'"):
+    with pytest.raises(ValueError, match=r"set topology\.decision_order"):
         build(str(path), AGENTS)
-    listed = build({"kind": "file", "path": str(path), "oriented": "listed"}, AGENTS)
+    listed = build({"kind": "file", "path": str(path), "decision_order": "listed"}, AGENTS)
     assert listed.edges == ((0, 1), (1, 2), (2, 3))
 
 

@@ -252,23 +252,23 @@ def test_a_file_without_a_graph_is_refused(
     assert "\n" not in str(refusal.value)
 
 
-RING = {"kind": "coordination-graph", "shape": "ring", "oriented": "listed"}
+RING = {"kind": "coordination-graph", "shape": "ring", "decision_order": "listed"}
 
 
-def test_undirected_edges_are_oriented_in_a_given_order() -> None:
+def test_undirected_edges_follow_the_decision_order() -> None:
     ring = (*AGENTS, "e")
     cycle = build(RING, ring)
     assert cycle.edges == ((0, 1), (0, 4), (1, 2), (2, 3), (3, 4))
-    assert (cycle.neighbours, cycle.order) == ((), (0, 1, 2, 3, 4))
-    assert build({**RING, "oriented": "reversed"}, ring).edges == (
+    assert (cycle.neighbors, cycle.order) == ((), (0, 1, 2, 3, 4))
+    assert build({**RING, "decision_order": "reversed"}, ring).edges == (
         (1, 0), (2, 1), (3, 2), (4, 0), (4, 3),
     )  # fmt: skip
-    assert build({**RING, "oriented": ["c", "a", "b", "d", "e"]}, ring).edges == (
+    assert build({**RING, "decision_order": ["c", "a", "b", "d", "e"]}, ring).edges == (
         (0, 1), (0, 4), (2, 1), (2, 3), (3, 4),
     )  # fmt: skip
-    filled = build({**RING, "fill_in": True, "told": "parents"}, ring)
+    filled = build({**RING, "fill_in": True, "communication": "parents"}, ring)
     assert filled.edges == ((0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4))
-    assert filled.above(4) == (0, 3)
+    assert filled.senders(4) == (0, 3)
 
 
 def test_other_edges_take_the_place_of_the_graphs() -> None:
@@ -281,10 +281,10 @@ def test_other_edges_take_the_place_of_the_graphs() -> None:
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [
-        ({"kind": "chain", "oriented": "listed"}, "the edges are directed already, leave it out"),
-        ({**RING, "oriented": ["a", "b"]}, "agent 'c' is missing from oriented"),
-        ({**RING, "oriented": ["a", "b", "c", "x"]}, "unknown agent 'x' in oriented"),
-        ({"kind": "coordination-graph", "fill_in": True}, "fill_in = true: needs oriented"),
+        ({"kind": "chain", "decision_order": "listed"}, "the graph is directed; leave the key out"),
+        ({**RING, "decision_order": ["a", "b"]}, "agent 'c' is missing from decision_order"),
+        ({**RING, "decision_order": ["a", "b", "c", "x"]}, "unknown agent 'x' in decision_order"),
+        ({"kind": "coordination-graph", "fill_in": True}, "fill_in = true: set decision_order"),
     ],
 )
 def test_an_orientation_that_does_not_fit_is_refused(settings: dict, problem: str) -> None:
@@ -295,7 +295,7 @@ def test_an_orientation_that_does_not_fit_is_refused(settings: dict, problem: st
 def test_an_undirected_file_needs_an_orientation(tmp_path: Path) -> None:
     path = tmp_path / "line.graphml"
     nx.write_graphml(nx.path_graph(AGENTS), path)
-    with pytest.raises(ValueError, match=r"who is above whom\? set topology\.oriented = 'listed'"):
+    with pytest.raises(ValueError, match=r"set topology\.decision_order"):
         build(f"file:{path}", AGENTS)
-    reversed_line = build({"kind": "file", "path": str(path), "oriented": "reversed"}, AGENTS)
+    reversed_line = build({"kind": "file", "path": str(path), "decision_order": "reversed"}, AGENTS)
     assert reversed_line.edges == ((1, 0), (2, 1), (3, 2))

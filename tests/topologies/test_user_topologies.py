@@ -53,7 +53,7 @@ def test_an_undirected_graph_is_one_of_neighbours(written) -> None:
     body = "import networkx as nx\n    return nx.cycle_graph(agents)"
     hierarchy = build(parse(written(f"def f(agents, groups):\n    {body}\n")), AGENTS)
     assert hierarchy.edges == ()
-    assert hierarchy.neighbours == ((0, 1), (0, 3), (1, 2), (2, 3))
+    assert hierarchy.neighbors == ((0, 1), (0, 3), (1, 2), (2, 3))
 
 
 MUTE = "class Mute:\n    def __str__(self): raise RuntimeError('no name')\n"

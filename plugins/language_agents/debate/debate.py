@@ -107,12 +107,12 @@ def exact(hierarchy, errors, speaks="most", rounds=1):
     drafts = (np.arange(2**n)[:, None] >> np.arange(n) & 1).astype(bool)  # whether they are wrong
     errors = np.asarray(errors)
     chance = np.where(drafts, errors, 1.0 - errors).prod(axis=1)
-    beside = [[a + b - i for a, b in hierarchy.neighbours if i in (a, b)] for i in range(n)]
+    beside = [[a + b - i for a, b in hierarchy.neighbors if i in (a, b)] for i in range(n)]
     before = None
     for _ in range(rounds):
         wrong = drafts.copy()
         for i in hierarchy.order:
-            heard = [drafts[:, i], *(wrong[:, j] for j in hierarchy.above(i))]
+            heard = [drafts[:, i], *(wrong[:, j] for j in hierarchy.senders(i))]
             heard += [] if before is None else [before[:, j] for j in beside[i]]
             votes = np.sum(heard, axis=0)
             tied = 2 * votes == len(heard)

@@ -5,10 +5,10 @@ and that all agents are Bayesian. A spec names them as a learner::
 
     learner.kind = "bayesian"
 
-An agent must receive every message that its senders received, as under ``told = "ancestors"``. It
-then knows the log odds by which each sender decided, and how much the sender's decision adds to its
-own log odds. In other hierarchies it would have to guess them; `theory.enumerated` has the exact
-numbers for a few agents.
+An agent must receive every message that its senders received, as with ``communication =
+"ancestors"``. It then knows the log odds by which each sender decided, and how much the sender's
+decision adds to its own log odds. In other hierarchies it would have to guess them;
+`theory.enumerated` has the exact numbers for a few agents.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class BayesianAgents(na.Agents[Beliefs]):
         if problem is not None:
             raise ValueError(
                 f"topology: {names[problem[0]]} hears {names[problem[1]]}, but not all agents that "
-                "this one hears; set topology.told = 'ancestors' or 'none'"
+                "this one hears; set topology.communication = 'ancestors' or 'none'"
             )
 
     def perceive(self, seen: na.Observation, *, explore: bool) -> Beliefs:

@@ -159,13 +159,13 @@ def unweighed(hierarchy: na.Hierarchy) -> tuple[int, int] | None:
 
     Examples
     --------
-    >>> unweighed(na.Hierarchy("abc", [("a", "b"), ("b", "c")], told="parents"))
+    >>> unweighed(na.Hierarchy("abc", [("a", "b"), ("b", "c")], communication="parents"))
     (2, 1)
     """
     for agent in hierarchy.order:
-        heard = {*hierarchy.above(agent)}
+        heard = {*hierarchy.senders(agent)}
         for sender in heard:
-            if not heard.issuperset(hierarchy.above(sender)):
+            if not heard.issuperset(hierarchy.senders(sender)):
                 return agent, sender
     return None
 
@@ -185,9 +185,9 @@ def expected(
     ([0.7, 0.7, 0.7], 0.784)
     """
     n = len(hierarchy)
-    places = [len(hierarchy.above(agent)) for agent in range(n)]
+    places = [len(hierarchy.senders(agent)) for agent in range(n)]
     lines = all(
-        sorted(places[sender] for sender in hierarchy.above(agent)) == list(range(places[agent]))
+        sorted(places[sender] for sender in hierarchy.senders(agent)) == list(range(places[agent]))
         for agent in range(n)
     )
     is_enumerated = n <= MAX_ENUMERATED and indifferent == "signal"
@@ -243,7 +243,7 @@ def enumerated(hierarchy: na.Hierarchy, accuracy: float) -> Expected:
     if_a = if_b[::-1]  # all signals are the others
     named = np.zeros_like(signals)
     for agent in hierarchy.order:
-        known = np.column_stack([named[:, list(hierarchy.above(agent))], signals[:, agent]])
+        known = np.column_stack([named[:, list(hierarchy.senders(agent))], signals[:, agent]])
         _, case = np.unique(known, axis=0, return_inverse=True)
         more = (np.bincount(case, if_b) - np.bincount(case, if_a))[case]
         is_tied = np.abs(more) <= EQUAL * np.bincount(case, if_a + if_b)[case]

@@ -75,6 +75,6 @@ def test_what_they_cannot_weigh_is_refused():
         team(LineUpSettings(carts=3).build())
     world = SignalsSettings(players=3).build()
     with pytest.raises(ValueError, match="agent3 hears agent2, but not all"):
-        team(world, {"kind": "chain", "told": "parents"})
+        team(world, {"kind": "chain", "communication": "parents"})
     with pytest.raises(ValueError, match=r"remove topology\.failures"):
         team(world, failures=(LostMessages(agents=("*",)),))

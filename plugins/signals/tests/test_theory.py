@@ -19,9 +19,9 @@ from nested_agents import Hierarchy
 ACCURACIES = st.floats(0.51, 0.97)
 
 
-def chain(n, told="ancestors"):
+def chain(n, communication="ancestors"):
     names = [f"agent{i}" for i in range(n)]
-    return Hierarchy(names, list(pairwise(names)), told=told)
+    return Hierarchy(names, list(pairwise(names)), communication=communication)
 
 
 def test_a_majority_of_three_by_hand():

@@ -1,4 +1,4 @@
-"""What a trained team does, by where a robot stands around the box.
+"""Map of a trained team's policy over the positions of a robot around the box.
 
 The box lies turned as at the goal, the goal 60 cm ahead of it. One robot is put on the points of a
 grid around it, at rest and looking at the box, the others stay behind the box; the team decides
@@ -28,19 +28,19 @@ from ..world.starts import place
 from .rendering import BOX_COLOUR, curve
 
 AHEAD = 0.6
-"""From the box to the goal [m]."""
+"""Distance from the box to the goal [m]."""
 AROUND = 0.25
-"""How far beyond the box the grid reaches [m]."""
+"""Distance by which the grid extends beyond the box [m]."""
 POINTS = 17
-"""Of the grid, along a side."""
+"""Number of grid points along a side."""
 LEAST_WAY = 0.002
-"""A shorter way is called none [m]."""
+"""Displacement below which a robot counts as resting [m]."""
 LEAST_TURN = radians(3.0)
-"""A smaller turn is called none [rad]."""
+"""Turn below which a robot counts as resting [rad]."""
 MOST_ROBOTS = 4
-"""Robots whose fields are computed."""
+"""Maximum number of robots for which a field is computed."""
 SIDES = ("behind", "right", "ahead", "left")
-"""Where a robot may stand, seen along the course from box to goal; counter-clockwise."""
+"""Sides of the box, seen along the course from box to goal; counter-clockwise."""
 MOVES = ("to the box", "away", "turns", "rests")
 COLOURS = dict(zip(MOVES, ("#0072B2", "#D55E00", "#009E73", "#999999"), strict=True))
 SHOWN = """\
@@ -51,18 +51,18 @@ What a robot does that stands at rest around the box and looks at it, the goal
 
 @dataclass(frozen=True)
 class Field:
-    """What one robot does from each point around the box."""
+    """Predicted motion of one robot from each point around the box."""
 
     robot: int
-    """Its number, from 0."""
+    """Index of the robot."""
     points: FloatArray
-    """``(m, 3)`` its poses in the frame of the box."""
+    """``(m, 3)`` poses of the robot in the frame of the box."""
     ways: FloatArray
-    """``(m, 2)`` how far it is predicted to move, in the frame of the box [m]."""
+    """``(m, 2)`` predicted displacements in the frame of the box [m]."""
     turns: FloatArray
-    """``(m,)`` how far it is predicted to turn [rad]."""
+    """``(m,)`` predicted turns [rad]."""
     others: FloatArray
-    """``(M - 1, 2)`` places of the others."""
+    """``(M - 1, 2)`` positions of the other robots."""
 
     @property
     def moves(self) -> list[str]:
@@ -82,17 +82,17 @@ class Field:
 
 @dataclass(frozen=True)
 class BoxPolicyMap(PolicyMap):
-    """What each of the first `MOST_ROBOTS` robots of a team does."""
+    """Fields of the first `MOST_ROBOTS` robots of a team."""
 
     fields: tuple[Field, ...]
-    """Robot by robot."""
+    """One field per robot."""
     box: BoxSpec
     """The box that they push."""
     robot: RobotSettings
-    """What the robots are."""
+    """The robots, which are all alike."""
 
     def lines(self) -> Iterator[str]:
-        """Yield, by robot and side of the box, how often it makes which move."""
+        """Yield the frequency of each move, by robot and side of the box."""
         yield from SHOWN.splitlines()
         yield ""
         head = "".join(move.rjust(12) for move in MOVES)
@@ -110,7 +110,7 @@ class BoxPolicyMap(PolicyMap):
             yield f"{left} more robots are not shown."
 
     def figure(self) -> Figure:
-        """Draw how each robot moves from where."""
+        """Draw the motion of each robot from every point."""
         columns = min(2, len(self.fields))
         rows = ceil(len(self.fields) / columns)
         figure = Figure(figsize=(4.1 * columns, 4.3 * rows + 0.9), layout="constrained")
@@ -140,15 +140,14 @@ def policy_of(
     robots: list[RobotSettings],
     start: str,
 ) -> BoxPolicyMap:
-    """Return what a team does around the box.
+    """Return the policy map of a team.
 
     Parameters
     ----------
     choose
-        Decides on a joint action by a prediction.
+        Returns a joint action, given a prediction.
     prediction
-        What it predicts of any situation of the scenario; the goal, wheels and beliefs are taken
-        from it.
+        A prediction of the scenario, from which goal, wheels and model are taken.
     box, robots
         Of the scenario.
     start
@@ -157,7 +156,7 @@ def policy_of(
     Raises
     ------
     ValueError
-        If the predictor needs a world that has really come to be as it predicts from.
+        If the predictor can predict from the current state of the simulation only.
     """
     if type(prediction) is not BoxPrediction:
         raise ValueError("its predictions are of one place only, and cannot begin anywhere")
@@ -175,8 +174,8 @@ def policy_of(
             placed[robot] = point + at
             seen = replace(situation, robots=placed)
             here = BoxPrediction(seen, prediction.model, prediction.premises)
-            view = here.poses(choose(here)[None])
-            moved.append(view.robots[0, robot] - placed[robot])
+            after = here.poses(choose(here)[None])
+            moved.append(after.robots[robot, :, 0] - placed[robot])
         ways, turns = np.split(np.array(moved), [2], axis=1)
         fields.append(Field(robot, points, ways, wrap(turns[:, 0]), others[:, :2]))
     return BoxPolicyMap(tuple(fields), box, robots[0])

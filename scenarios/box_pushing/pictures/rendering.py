@@ -6,8 +6,8 @@ A recording is a mapping of arrays: ``robot_poses (T + 1, M, 3)``, ``box_pose (T
 dimension: ``robot`` and ``box`` by name or described, ``dt`` [s], optionally ``infrared``
 described.
 
-Robots show their heading by a white nose, their wheels with the speed commanded, and turn solid in
-contact; failed wheels are crossed out, and a dashed ring is around robots whose messages fail. The
+A white nose shows the heading of a robot, and lines show the commanded wheel speeds. Robots in
+contact are solid. Failed wheels are crossed out; a dashed ring marks failing messages. The
 dashed outline is the goal pose; it and the box point ahead. Trails show where all have been. With
 ``sensors`` rays are drawn as far as infrared sensors see; those that meet something are violet and
 end there, the wider the stronger the reading. Robots too small to show wheels show a line ahead,
@@ -53,7 +53,7 @@ LEAST_RADIUS = 3.5
 WHEELS_FROM = 6.0
 """Radius of a robot in pixels from which on its wheels are drawn."""
 MARGIN = 0.04
-"""Around what is drawn, as a fraction of it."""
+"""Margin around the drawing, as a fraction of its size."""
 # Colour-blind-safe (Okabe and Ito 2008).
 ROBOT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 BOX_COLOUR = "#E69F00"
@@ -259,7 +259,7 @@ def animate(recording: Recording, path: Path, speed: float = 4.0, *, sensors: bo
 
 
 SCRIPT = Path(__file__).with_name("player.js")
-"""What draws an episode in a browser."""
+"""Script that draws an episode in a browser."""
 NEEDED = (
     "robot_poses",
     "box_pose",
@@ -271,20 +271,20 @@ NEEDED = (
     "robot",
     "box",
 )
-"""What the canvas draws."""
+"""Arrays of a recording that the canvas draws."""
 LEAST_SCALE = 1e-4
 """Positions are kept to a tenth of a millimetre, or coarser where they reach beyond 3 m [m]."""
 
 
 class Shapes(TypedDict):
-    """What is drawn, as the canvas takes it; lengths in metres."""
+    """Shapes that the canvas draws; lengths in meters."""
 
     radius: float
-    """Of a robot."""
+    """Radius of a robot."""
     speed: float
     """Greatest speed of a wheel [m/s]."""
     wheels: list[list[float]]
-    """Where the wheels of a robot stand."""
+    """Positions of the wheels of a robot."""
     agents: list[str]
     """Names of all wheels."""
     rings: list[list[list[float]]]

@@ -1,1 +1,1 @@
-"""Where joint actions lead: predictors of the push."""
+"""Predictors of the push."""

@@ -1,4 +1,4 @@
-"""Predictions of box pushing: what any joint action would lead to, computed when asked for.
+"""Predictions of box pushing: next states and rewards of joint actions, computed on request.
 
 The poses after a joint action come from the push predictor, at once for all robots. An agent's own
 block is predicted as if its robot pushed alone, so that it takes few values; in state spaces whose
@@ -18,11 +18,11 @@ from ....core.evaluators.best_response import RespondingPrediction, Responses, S
 from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
-from ....core.rules.rule_base import RuleBase
-from ..states.relational import View
-from ..states.relational_lanes import Columns
+from ....core.values.rule_base import RuleBase
+from ..states.situations import SituationBatch
 from ..states.state_spaces import BoxStateSpace
-from ..world.geometry import Outline
+from ..states.variables import progress_of
+from ..world.geometry import BoxShape
 from ..world.settings import InfraredSettings, Task, reward
 from .push import PushBelief, PushModel, outcomes, push
 from .responses import Outlook, respond
@@ -40,8 +40,8 @@ CONTACT_GAP = 0.002
 
 
 @dataclass(frozen=True)
-class Situation:
-    """The present, as far as prediction needs it."""
+class PresentState:
+    """Current state of robots and box, from which predictions start."""
 
     robots: FloatArray
     """Poses ``(M, 3)``."""
@@ -59,28 +59,28 @@ class Situation:
 
 @dataclass(frozen=True)
 class Premises:
-    """What all predictions of a scenario rest on."""
+    """Settings that all predictions of a scenario share."""
 
     belief: PushBelief
     """Push models by constants, for `outcomes`."""
     space: BoxStateSpace
-    """State variables."""
+    """State space of the agents."""
     action_set: ActionSet
-    """What actions tell the wheels."""
+    """Actions of a wheel."""
     increment: float
-    """By how much, as a fraction of `limits`."""
+    """Change of wheel speed by an action, as a fraction of `limits`."""
     limits: FloatArray
-    """``(n,)`` greatest wheel speeds [m/s]."""
+    """``(n,)`` maximum wheel speeds [m/s]."""
     task: Task
-    """What is rewarded."""
+    """Task, which defines the reward."""
     infrared: InfraredSettings
-    """What the sensors read."""
-    outline: Outline
-    """Of the box."""
+    """Response of the sensors."""
+    shape: BoxShape
+    """Outline of the box."""
     hold: float
-    """How long a decision stands [s]."""
+    """Decision period [s]."""
     seconds: float
-    """How far predictions look ahead [s]."""
+    """Prediction horizon [s]."""
 
 
 class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
@@ -89,26 +89,26 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
     Parameters
     ----------
     situation
-        The present.
+        Current state.
     model
-        What is believed of robots and box.
+        Model of robots and box.
     premises
-        What all predictions of the scenario rest on.
+        Settings that all predictions of the scenario share.
     """
 
     merges: ClassVar[bool] = True
     """Whether wheel commands of one twist are taken to lead to the same place."""
 
-    def __init__(self, situation: Situation, model: PushModel, premises: Premises) -> None:
+    def __init__(self, situation: PresentState, model: PushModel, premises: Premises) -> None:
         self.situation = situation
         self.model = model
         self.premises = premises
         self.groups = situation.groups
-        self._last: tuple[bytes, View] | None = None  # what was asked for last
+        self._last: tuple[bytes, SituationBatch] | None = None  # the last request
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:
-        """What the wheels may be commanded."""
+        """All commands that the wheels may receive."""
         speeds = self.situation.speeds
         actions = self.premises.action_set
         limits = self.premises.limits[:, None]
@@ -117,31 +117,26 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         ).reshape(len(self.groups), -1, len(actions))
         return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
 
-    def _after(self, choices: IntArray, seconds: float) -> View:
+    def _after(self, choices: IntArray, seconds: float) -> SituationBatch:
         now = self.situation
         twists = self.wheel_commands.twists
-        robots, box, gaps = push(now.robots, now.box, twists, choices, seconds, self.model)
-        return self._view_of(robots, box, gaps, seconds)
+        by_robot = np.ascontiguousarray(choices.T)
+        robots, box, gaps = push(now.robots, now.box, twists, by_robot, seconds, self.model)
+        return self._batch(robots, box, gaps, seconds)
 
-    def _view_of(
+    def _batch(
         self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float
-    ) -> View:
-        """Return a view of situations that the present one leads to in `seconds`."""
+    ) -> SituationBatch:
+        """Return the situations that the present one leads to in `seconds`."""
         now = self.situation
         premises = self.premises
-        return View(
-            robots,
-            box,
-            gaps,
-            now.goal,
-            now.box,
-            seconds / premises.hold,
-            premises.outline,
-            self.model.friction_radius,
+        periods = seconds / premises.hold
+        return SituationBatch(
+            robots, box, gaps, now.goal, now.box[:, None], periods, premises.shape
         )
 
-    def _view_again(self, joint_actions: IntArray) -> tuple[IntArray, View]:
-        """Return wheel commands ``(m, M)``, and their view: the last one, if they are the same."""
+    def _reached(self, joint_actions: IntArray) -> tuple[IntArray, SituationBatch]:
+        """Return wheel commands ``(m, M)``, and the situations that they lead to."""
         choices = self._choices(joint_actions)
         key = choices.tobytes()
         if self._last is None or self._last[0] != key:
@@ -163,13 +158,13 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         None where a state variable, or a rule base of all rules, is not of what is compiled.
         """
         space = self.premises.space
-        simple = space.is_built_in and not space.own_needs_pose and rules.compact
+        simple = space.is_built_in and not space.own_needs_pose and rules.is_triangular
         alone = len(self.situation.speeds) == 1
-        if space.columns is None or alone or not simple:
+        if alone or not simple:
             return None
-        return partial(self._respond, rules, space.columns)
+        return partial(self._respond, rules)
 
-    def _respond(self, rules: RuleBase, columns: Columns, search: Search) -> IntArray:
+    def _respond(self, rules: RuleBase, search: Search) -> IntArray:
         now = self.situation
         premises = self.premises
         commands = self.wheel_commands
@@ -179,7 +174,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
             robots=now.robots,
             box=now.box,
             goal=now.goal,
-            before=float(np.hypot(now.goal[0] - now.box[0], now.goal[1] - now.box[1])),
+            shape=premises.shape,
             seconds=premises.seconds,
             periods=premises.seconds / premises.hold,
             model=self.model,
@@ -188,48 +183,48 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
             which=commands.which,
             alike=self.alike,
             every=np.arange(len(self.groups)),
-            columns=columns.rows,
+            columns=premises.space.columns,
             weights=weights,
             agents=agents,
             firsts=firsts,
-            kinds=rules.kinds,
-            packed=rules.layout,
+            terms=rules.terms_by_owner,
+            variables=rules.layout[0],
         )
         order = search.order[::wheels] // wheels
         n_actions = len(premises.action_set)
-        wanted = columns.wanted
-        exploring = search.exploring
-        joint = respond(search.starts, order, n_actions, outlook, wanted, exploring, search.rng)
+        joint = respond(search.starts, order, n_actions, outlook, search.exploring, search.rng)
         if not len(joint):
-            raise ArithmeticError("no joint action is worth most: not all values are numbers")
+            raise ArithmeticError(
+                "no joint action has the greatest value: not all values are numbers"
+            )
         return joint
 
     @cached_property
-    def _table(self) -> tuple[View, IntArray]:
-        """Where all combinations of twists lead, and the row of every joint-action index."""
+    def _table(self) -> tuple[SituationBatch, IntArray]:
+        """Situations after all combinations of twists; the row of every joint-action index."""
         choices, row = twist_table(self.wheel_commands)
         return self._after(choices, self.premises.seconds), row
 
     @cached_property
     def _alone(self) -> list[FloatArray]:
-        """Per robot ``(K, 3)``: its pose after every wheel command if it pushed alone."""
+        """Poses of each robot ``(K, 3)`` after every wheel command, if it pushed alone."""
         now = self.situation
         model = self.model
         commands = self.wheel_commands
         poses = []
         for r, count in enumerate(commands.counts):
             only = slice(r, r + 1)
-            every = np.arange(count)[:, None]
+            every = np.arange(count)[None]
             alone = model._replace(radii=model.radii[only], compliance=model.compliance[only])
             twists = commands.twists[only]
             seconds = self.premises.seconds
-            poses.append(push(now.robots[only], now.box, twists, every, seconds, alone)[0][:, 0])
+            poses.append(push(now.robots[only], now.box, twists, every, seconds, alone)[0][0].T)
         return poses
 
     @cached_property
     def _shared(self) -> FloatArray:
         """The shared blocks ``(M, m, d - n_own)`` in the situations of the table."""
-        return self.premises.space.shared_of(self._table[0], range(len(self.groups)))
+        return self.premises.space.shared(self._table[0], range(len(self.groups)))
 
     def tables(self) -> Tables:
         """Return itself: it has tables of all joint actions."""
@@ -258,38 +253,39 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        choices, view = self._view_again(joint_actions)
+        choices, batch = self._reached(joint_actions)
         r, wheel = divmod(agent, len(self.groups[0]))
         space = self.premises.space
         speeds = self.wheel_commands.speeds[r, choices[:, r], wheel]
-        own = space.own(view.robots[:, r], speeds, self.situation.goal)
-        return np.concatenate([own, space.shared_of(view, [r])[0]], axis=1)
+        own = space.own(batch.robots[r].T, speeds, self.situation.goal)
+        return np.concatenate([own, space.shared(batch, [r])[0]], axis=1)
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the next own variables of all agents and the shared ones of all robots.
 
         ``(n, m, n_own)`` and ``(M, m, d - n_own)``, for joint actions ``(m, n)``.
         """
-        choices, view = self._view_again(joint_actions)
+        choices, batch = self._reached(joint_actions)
         space = self.premises.space
         by_robot = np.ascontiguousarray(choices.T)
         speeds = speeds_of(by_robot, self.wheel_commands.speeds)
         poses: FloatArray = np.zeros((0, 3))
         if space.own_needs_pose:
-            of_robots = view.robots.transpose(1, 0, 2)
+            of_robots = batch.robots.transpose(0, 2, 1)
             poses = np.repeat(of_robots, len(speeds) // len(of_robots), axis=0).reshape(-1, 3)
         own = space.own(poses, speeds.reshape(-1), self.situation.goal)
-        return own.reshape(*speeds.shape, -1), space.shared_of(view, range(choices.shape[1]))
+        return own.reshape(*speeds.shape, -1), space.shared(batch, range(choices.shape[1]))
 
-    def poses(self, joint_actions: IntArray) -> View:
+    def poses(self, joint_actions: IntArray) -> SituationBatch:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""
         return self._after(self._choices(joint_actions), self.premises.hold)
 
     def after(self, joint_action: IntArray) -> BoxPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
-        view = self.poses(joint_action[None])
+        batch = self.poses(joint_action[None])
         speeds = self.commands(joint_action)
-        reached = replace(self.situation, robots=view.robots[0], box=view.box[0], speeds=speeds)
+        robots, box = batch.robots[:, :, 0].copy(), batch.boxes[:, 0].copy()
+        reached = replace(self.situation, robots=robots, box=box, speeds=speeds)
         return BoxPrediction(reached, self.model, self.premises)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
@@ -298,19 +294,19 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         return self.wheel_commands.speeds[np.arange(len(choices)), choices].ravel()
 
     def slips(self, joint_action: IntArray) -> FloatArray:
-        """Return by how much contact is predicted to change the robots' twists, ``(M, 3)``.
+        """Return the predicted change of the robots' twists by contact, ``(M, 3)``.
 
-        Over the decision period, to be held against what is measured in it.
+        They are means over the decision period, to be compared with measurements.
         """
         choices = self._choices(joint_action[None])
-        after = self._after(choices, self.premises.hold).robots[0]
+        after = self._after(choices, self.premises.hold).robots[:, :, 0]
         free = self.wheel_commands.twists[np.arange(len(after)), choices[0]]
         return mean_twists(self.situation.robots, after, self.premises.hold) - free
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return mean twists ``(k, M + 1, 3)``, the box's first, under constants ``(k, 3)``.
 
-        Over the decision period, to be held against what is measured in it.
+        They are means over the decision period, to be compared with measurements.
         """
         choices = self._choices(joint_action[None])[0]
         twists = self.wheel_commands.twists[np.arange(len(choices)), choices]
@@ -321,18 +317,20 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""
-        return self._rewards(self._view_again(joint_actions)[1])
+        return self._rewards(self._reached(joint_actions)[1])
 
     def reward_table(self) -> FloatArray:
         """Return the predicted rewards ``(A ** n,)`` of all joint actions."""
-        view, row = self._table
-        return self._rewards(view)[row]
+        batch, row = self._table
+        return self._rewards(batch)[row]
 
-    def _rewards(self, view: View) -> FloatArray:
-        contact = view.gaps < CONTACT_GAP
-        readings = self.premises.infrared.reading(view.gaps)
-        of_box = view.distance, -view.approach, view.turn
-        return reward(self.premises.task, *of_box, contact, readings).mean(axis=1)
+    def _rewards(self, batch: SituationBatch) -> FloatArray:
+        gaps = batch.gaps.T
+        contact = gaps < CONTACT_GAP
+        readings = self.premises.infrared.reading(gaps)
+        distance, approach, turn = progress_of(batch)
+        gained = reward(self.premises.task, distance, -approach, turn, contact, readings)
+        return gained.mean(axis=1)
 
 
 def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:

@@ -21,13 +21,13 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray
-from ....core.rules.rule_base import RuleBase
-from ..states.relational import View
+from ....core.values.rule_base import RuleBase
+from ..states.situations import SituationBatch
 from ..world.boxes import BoxSpec
 from ..world.robots import compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
-from .prediction import BoxPrediction, Premises, Situation
+from .prediction import BoxPrediction, Premises, PresentState
 from .push import PushModel
 from .settings import BeliefSettings
 
@@ -41,11 +41,10 @@ def push_model(
     box: BoxSpec,
     belief: BeliefSettings = BeliefSettings(),  # noqa: B008 - frozen
 ) -> PushModel:
-    """Return what a predictor believes of robots and box, with the given errors of constants."""
+    """Return the model of a predictor, with the given errors of constants."""
     model = PushModel(
         edges=box.outline.edges,
         rounding=box.outline.rounding,
-        reach=box.reach,
         radii=np.array([robot.radius for robot in robots]),
         compliance=np.stack([compliance(robot) for robot in robots]) / belief.stiffness,
         friction_force=box.friction_force * belief.load,
@@ -59,14 +58,14 @@ def push_model(
 
 @dataclass(frozen=True)
 class Future:
-    """Where a world goes from a saved state."""
+    """Simulation that continues from a saved state."""
 
     world: World
-    """A world built alike, to play in; modified."""
+    """World with the same robots and box, for playing; modified."""
     state: WorldState
-    """The present."""
+    """State to start from."""
     failures: WheelFailures
-    """Those of the scenario; left as they are."""
+    """Failures of the scenario; not modified."""
     step: int
     """Number of the step to come."""
     hold: int
@@ -93,34 +92,36 @@ class Future:
 
 
 class ExactPrediction(BoxPrediction):
-    """Predicts by playing; but for own blocks in tables, which are those of a robot alone.
+    """Prediction by simulation; own blocks in tables are those of a robot alone.
 
     Parameters
     ----------
     situation, model, premises
-        As of `BoxPrediction`.
+        See `BoxPrediction`.
     future
-        What is played.
+        The simulation.
     """
 
     merges: ClassVar[bool] = False  # wheels that command one twist may yet slip differently
 
     def __init__(
-        self, situation: Situation, model: PushModel, premises: Premises, future: Future
+        self, situation: PresentState, model: PushModel, premises: Premises, future: Future
     ) -> None:
         super().__init__(situation, model, premises)
         self.future = future
 
     def best_responses(self, rules: RuleBase) -> None:
-        """Return that every joint action is to be played."""
+        """Return None, because every joint action must be simulated."""
 
-    def _after(self, choices: IntArray, seconds: float) -> View:
+    def _after(self, choices: IntArray, seconds: float) -> SituationBatch:
         periods = round(seconds / CONTROL_PERIOD)
         rows, which = np.unique(choices, axis=0, return_inverse=True)
         commands = self.wheel_commands.speeds[np.arange(rows.shape[1]), rows]
         played = [self.future.after(each.ravel(), periods) for each in commands]
         poses, gaps = (np.array(part)[which] for part in zip(*played, strict=True))
-        return self._view_of(poses[:, 1:], poses[:, 0], gaps, seconds)
+        situations_last = np.ascontiguousarray(poses.transpose(1, 2, 0))
+        gaps = np.ascontiguousarray(gaps.T)
+        return self._batch(situations_last[1:], situations_last[0], gaps, seconds)
 
     def after(self, joint_action: IntArray) -> ExactPrediction:
         """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""

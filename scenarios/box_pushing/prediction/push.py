@@ -1,7 +1,7 @@
-"""Where robots and box will be after a decision period: quasi-static pushing.
+"""Quasi-static pushing: poses of robots and box after a decision period.
 
-Robots are soft velocity servos: a robot whose wheels ask for the twist v* and that pushes with the
-wrench w moves with v* - W w, where W is its compliance. The box rests on distributed Coulomb
+Robots are soft velocity servos: a robot with commanded twist v* that pushes with the wrench w moves
+with v* - W w, where W is its compliance. The box rests on distributed Coulomb
 friction, described by the limit surface (Goyal, Ruina & Papadopoulos 1991) taken as an ellipsoid:
 under sliding its wrench is F D v / sqrt(v' D v) with D = diag(1, 1, rho^2), F the greatest
 friction force and rho the mean distance of the friction from the centre. At a contact the robot
@@ -29,36 +29,19 @@ from ..world.geometry import LANES, SIDE, SQUARE
 from ..world.robots import resistance
 from ..world.settings import RobotSettings
 from . import push_lanes as lanes
-from .push_lanes import BODY_SIZE, BOX_SIZE, FIXED, MARGIN
+from .push_lanes import BODY_SIZE, BOX_SIZE
 
 SUBSTEPS = 4
 SWEEPS = 4
-VECTOR = 8
-"""Lanes are used by so many at a time."""
-ASKED = (
-    lanes.AHEAD,
-    lanes.LEFT,
-    lanes.TURN,
-    lanes.WANT_N,
-    lanes.WANT_T,
-    lanes.FORCE_N,
-    lanes.FORCE_T,
-    lanes.ACTIVE,
-)
-"""The rows of a robot that hang on what it is asked for; there are no forces at first."""
-ROUNDED = 1e-9
-"""What rounding may make of a gap, or a way [m]."""
 
 
 class PushModel(NamedTuple):
-    """What the push predictor believes of robots and box; ``M`` robots."""
+    """Model of ``M`` robots and a box."""
 
     edges: FloatArray
-    """Of the outline of the box, see `box_pushing.world.geometry.Outline`."""
+    """Edges of the box, see `box_pushing.world.geometry.Outline`."""
     rounding: float
-    """Of that outline [m]."""
-    reach: float
-    """Distance from the centre of the box within which all of it lies [m]."""
+    """Margin around these edges [m]."""
     radii: FloatArray
     """``(M,)`` robot radii [m]."""
     compliance: FloatArray
@@ -71,56 +54,7 @@ class PushModel(NamedTuple):
     """Coefficient of friction between robot and box."""
 
 
-class Contacts(NamedTuple):
-    """How robots stand and may touch the box at first, which is the same in all combinations."""
-
-    rows: FloatArray
-    """``(M, FIXED)`` one number for each of the first rows of `push_lanes`."""
-    gaps: FloatArray
-    """``(M,)`` [m]."""
-    asked: FloatArray
-    """``(M, K, 9)`` the rows `ASKED` under every twist, and the greatest way in a substep [m]."""
-
-
 @njit(cache=True)
-def contacts_of(
-    robots: FloatArray, box: FloatArray, twists: FloatArray, seconds: float, model: PushModel
-) -> Contacts:
-    """Return the contacts of robots ``(M, 3)``, each asked for twists ``(M, K, 3)``."""
-    n, count = twists.shape[:2]
-    rows, gaps, asked = np.empty((n, FIXED)), np.empty(n), np.empty((n, count, len(ASKED) + 1))
-    bodies, shared = np.zeros((n, BODY_SIZE)), np.zeros((1, BOX_SIZE))
-    box_rows, nearest, dt = shared[0], shared[0, lanes.NEAREST :], seconds / SUBSTEPS
-    radii, compliance, rounding = model.radii, model.compliance, model.rounding
-    for first in range(0, count, LANES):
-        used = min(LANES, count - first)
-        width = (used + VECTOR - 1) // VECTOR * VECTOR
-        for j in range(3):
-            for k in range(width):
-                shared[0, j * LANES + k] = box[j]
-        lanes.head(shared, 0, width)
-        for r in range(n):
-            for j in range(3):
-                for k in range(width):
-                    bodies[r, j * LANES + k] = robots[r, j]
-                for k in range(used):
-                    bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, first + k, j]
-            lanes.head(bodies, r, width)
-            lanes.locate(bodies, r, box_rows, nearest, model.edges, width)
-            lanes.touch(bodies, r, box_rows, radii[r], rounding, compliance, dt, width)
-            for k in range(used):
-                for j in range(len(ASKED)):
-                    asked[r, first + k, j] = bodies[r, ASKED[j] + k]
-                ahead, left, turn = twists[r, first + k]
-                half = 0.5 * dt * turn  # makes chords longer, see `lanes.move`
-                square = (1.0 + 0.25 * half**4) * (ahead * ahead + left * left)
-                asked[r, first + k, len(ASKED)] = dt * np.sqrt(square)
-            for j in range(FIXED):
-                rows[r, j] = bodies[r, j * LANES]
-            gaps[r] = np.sqrt(nearest[SQUARE]) * nearest[SIDE] - rounding - radii[r]
-    return Contacts(rows, gaps, asked)
-
-
 def push(
     robots: FloatArray,
     box: FloatArray,
@@ -129,80 +63,49 @@ def push(
     seconds: float,
     model: PushModel,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Predict poses after `seconds` for many combinations of robot twists.
+    """Predict poses after `seconds` for ``m`` combinations of robot twists.
 
     Parameters
     ----------
     robots
-        ``(M, 3)`` present poses.
+        ``(M, 3)`` current poses.
     box
-        ``(3,)`` present pose.
+        ``(3,)`` current pose.
     twists
-        ``(M, K, 3)`` twists that each robot may be asked for, in its own frame [m/s, m/s, rad/s].
+        ``(M, K, 3)`` possible commanded twists of each robot, in its frame [m/s, m/s, rad/s].
     choices
-        ``(m, M)`` which of its twists each robot takes.
+        ``(M, m)`` index of the twist of each robot.
     seconds
-        Decision period [s].
+        Duration of the push [s].
     model
-        What is believed of robots and box.
+        Model of robots and box.
 
     Returns
     -------
-    tuple
-        Robot poses ``(m, M, 3)``, box poses ``(m, 3)`` and gaps ``(m, M)`` [m]; in memory the
-        combinations stand next to each other.
+    robots, box, gaps : FloatArray
+        Robot poses ``(M, 3, m)``, box poses ``(3, m)`` and gaps ``(M, m)`` [m].
     """
-    by_robot = np.ascontiguousarray(choices.T)
-    after, boxes, gaps = pushed(robots, box, twists, by_robot, seconds, model)
-    return after.transpose(2, 0, 1), boxes.T, gaps.T
-
-
-@njit(cache=True)
-def pushed(
-    robots: FloatArray,
-    box: FloatArray,
-    twists: FloatArray,
-    choices: IntArray,
-    seconds: float,
-    model: PushModel,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what `push` does with the combinations last: ``(M, 3, m)``, ``(3, m)``, ``(M, m)``.
-
-    So are the choices, ``(M, m)``. Transposing within a kernel would take as long to compile as
-    half of the arithmetic.
-    """
-    contacts = contacts_of(robots, box, twists, seconds, model)
-    return pushed_on(contacts, box, choices, seconds, model)
-
-
-@njit(cache=True)
-def pushed_on(
-    contacts: Contacts, box: FloatArray, choices: IntArray, seconds: float, model: PushModel
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what `pushed` does, by the contacts of the robots."""
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     dt = seconds / SUBSTEPS
-    bodies, shared = np.empty((n, BODY_SIZE)), np.zeros((1, BOX_SIZE))
-    way, spare, near = np.empty(n), np.empty(n), np.empty(n, np.bool_)
+    bodies, shared, near = np.zeros((n, BODY_SIZE)), np.zeros((1, BOX_SIZE)), np.empty(n, np.bool_)
     nearest = shared[0, lanes.NEAREST :]
     for first in range(0, m, LANES):
         used = min(LANES, m - first)
-        # Whole vectors are faster than their ends: lanes beyond repeat the last one.
-        width = (used + VECTOR - 1) // VECTOR * VECTOR
         for j in range(3):
-            for k in range(width):
+            for k in range(LANES):
                 shared[0, j * LANES + k] = box[j]
         for r in range(n):
-            way[r] = _begin(bodies, r, contacts, choices, first, used, width)
-            spare[r] = contacts.gaps[r] - 2.0 * way[r] - MARGIN - ROUNDED
-        moved = 0.0
-        for substep in range(SUBSTEPS):
-            moved = _substep(bodies, shared, near, substep, way, spare, moved, dt, model, width)
-        lanes.head(shared, 0, width)
+            for k in range(LANES):  # lanes without a combination repeat the last one
+                choice = choices[r, first + min(k, used - 1)]
+                for j in range(3):
+                    bodies[r, j * LANES + k] = robots[r, j]
+                    bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, choice, j]
+        for _ in range(SUBSTEPS):
+            _substep(bodies, shared, near, dt, model)
+        lanes.head(shared, 0)
         for r in range(n):
-            lanes.move(bodies, r, model.radii[r], model.compliance, dt, width)
-            lanes.locate(bodies, r, shared[0], nearest, model.edges, width)
+            lanes.locate(bodies, r, shared[0], nearest, model.edges)
             for k in range(used):
                 gap = np.sqrt(nearest[SQUARE + k]) * nearest[SIDE + k]
                 out_gaps[r, first + k] = gap - model.rounding - model.radii[r]
@@ -216,75 +119,26 @@ def pushed_on(
 
 
 @njit(cache=True)
-def _begin(
-    bodies: FloatArray,
-    r: int,
-    contacts: Contacts,
-    choices: IntArray,
-    first: int,
-    used: int,
-    width: int,
-) -> float:
-    """Let a robot stand as it does at first; return how far at most it moves in a substep."""
-    rows, asked = contacts.rows, contacts.asked
-    for j in range(FIXED):
-        row = rows[r, j]
-        for k in range(width):
-            bodies[r, j * LANES + k] = row
-    chosen, others = choices[r, first + used - 1], 0
-    for k in range(used):
-        others += 1 if choices[r, first + k] != chosen else 0
-    mixed = used if others > 0 else 0
-    for j in range(len(ASKED)):
-        row = asked[r, chosen, j]
-        for k in range(width):
-            bodies[r, ASKED[j] + k] = row
-        for k in range(mixed):
-            bodies[r, ASKED[j] + k] = asked[r, choices[r, first + k], j]
-    way = asked[r, chosen, len(ASKED)]
-    for k in range(mixed):
-        way = max(way, asked[r, choices[r, first + k], len(ASKED)])
-    return way
-
-
-@njit(cache=True)
 def _substep(
-    bodies: FloatArray,
-    shared: FloatArray,
-    near: BoolArray,
-    substep: int,
-    way: FloatArray,
-    spare: FloatArray,
-    moved: float,
-    dt: float,
-    model: PushModel,
-    width: int,
-) -> float:
-    """Find the contacts of all robots, their forces, and move the box for `dt` seconds.
-
-    The robots are moved when they are next looked at, which saves to go through them once more.
-    Taken and returned is by how much the surface of the box may have `moved` in all.
-    """
+    bodies: FloatArray, shared: FloatArray, near: BoolArray, dt: float, model: PushModel
+) -> None:
+    """Find the contact forces of all robots, and move robots and box for `dt` seconds."""
     rho2, box, nearest = model.friction_radius**2, shared[0], shared[0, lanes.NEAREST :]
-    radii, compliance, rounding = model.radii, model.compliance, model.rounding
-    lanes.head(shared, 0, width)
-    lanes.rest(box, rho2, model.friction_force, width)
+    lanes.head(shared, 0)
+    lanes.rest(box, rho2, model.friction_force)
     touching = False
     for r in range(len(bodies)):
-        if substep > 0:
-            lanes.move(bodies, r, radii[r], compliance, dt, width)
-            lanes.head(bodies, r, width)
-        near[r] = spare[r] <= substep * way[r] + moved
-        if near[r] and substep > 0:
-            lanes.locate(bodies, r, box, nearest, model.edges, width)
-            count = lanes.touch(bodies, r, box, radii[r], rounding, compliance, dt, width)
-            near[r] = count > 0
+        lanes.head(bodies, r)
+        lanes.locate(bodies, r, box, nearest, model.edges)
+        near[r] = lanes.touch(bodies, r, box, model.radii[r], model.rounding, model.compliance, dt)
         touching = touching or near[r]
     if touching:
         for _ in range(SWEEPS):
-            lanes.answer(bodies, near, box, model.contact_friction, width)
-            lanes.drag(box, rho2, model.friction_force, width)
-    return moved + lanes.carry(box, model.reach, dt, width)
+            lanes.answer(bodies, near, box, model.contact_friction)
+            lanes.drag(box, rho2, model.friction_force)
+    for r in range(len(bodies)):
+        lanes.move(bodies, r, model.radii[r], model.compliance, dt)
+    lanes.carry(box, dt)
 
 
 CONSTANTS = ("load per stiffness", "load per grip", "contact friction")
@@ -309,7 +163,7 @@ class PushBelief(NamedTuple):
 
     @classmethod
     def of(cls, model: PushModel, robots: Sequence[RobotSettings], stiffness: float) -> PushBelief:
-        """Return what is believed of robots whose wheels are taken to be so much stiffer."""
+        """Return the belief about robots, with an assumed factor on their stiffness."""
         parts = [
             stiffness * np.stack([resistance(robot, *part) for robot in robots])
             for part in ((1.0, 0.0), (0.0, 1.0))
@@ -331,7 +185,6 @@ def believing(belief: PushBelief, constants: FloatArray) -> PushModel:
     return PushModel(
         model.edges,
         model.rounding,
-        model.reach,
         model.radii,
         compliance,
         model.friction_force,
@@ -374,7 +227,7 @@ def outcomes(
     requested, choices = np.expand_dims(twists, 1), np.zeros((n, 1), np.int64)
     for p in range(len(constants)):
         model = believing(belief, constants[p])
-        after, boxes, _ = pushed(robots, box, requested, choices, seconds, model)
+        after, boxes, _ = push(robots, box, requested, choices, seconds, model)
         _twist(box, boxes[:, 0], seconds, moved[p, 0])
         for r in range(n):
             _twist(robots[r], after[r, :, 0], seconds, moved[p, r + 1])

@@ -19,7 +19,7 @@ CREEP = 0.002
 START_SPEED = 0.05
 """Speed of the box [m/s] from which the sweeps start."""
 MARGIN = 0.01
-"""How far [m] a moving box may carry its surface towards a robot within a substep."""
+"""Maximum motion of the box's surface towards a robot within a substep [m]."""
 
 # Where the rows of a robot begin: pose and heading, the twist that it is asked for, and its
 # contact. In the frame of the contact, n is into the box, t to its left.
@@ -34,8 +34,6 @@ MARGIN = 0.01
     ACTIVE,  # 1 if the robot may touch the box within the substep, else 0
 ) = range(0, 20 * LANES, LANES)  # fmt: skip
 BODY_SIZE = ACTIVE + LANES
-FIXED = YIELD_TT // LANES + 1
-"""How many of the first rows are the same whatever a robot is asked for, but for that itself."""
 
 # Those of the box: pose and heading as for a robot, velocity, how readily it moves, the wrench of
 # all contacts on it.
@@ -50,17 +48,17 @@ LOCAL_X, LOCAL_Y, SQUARE, NEAR_X, NEAR_Y, SIDE, EDGE_X, EDGE_Y = range(
 BOX_SIZE = NEAREST + NEAREST_SIZE
 
 _EXACT = {"contract", "nsz"}
-"""What the compiler may do: multiply and add in one rounding, ignore the sign of zero."""
+"""Floating-point liberties: fused multiply-add, and zeros without sign."""
 
 
 @njit(cache=True, fastmath=_EXACT)
-def head(bodies: FloatArray, n: int, lanes: int) -> None:
+def head(bodies: FloatArray, n: int) -> None:
     """Write cosine and sine of a heading: to the last bit but one, for any sane angle.
 
     The angle is reduced to an eighth of a turn on either side of a quarter, in two steps for
     accuracy, and the polynomials there are those of Sun's fdlibm.
     """
-    for k in range(lanes):
+    for k in range(LANES):
         x = bodies[n, PSI + k]
         quarters = np.floor(x * 0.6366197723675814 + 0.5)
         r = x - quarters * 1.57079632673412561417 - quarters * 6.07710050650619224932e-11
@@ -88,18 +86,18 @@ def head(bodies: FloatArray, n: int, lanes: int) -> None:
 
 @njit(cache=True, fastmath=_EXACT)
 def locate(
-    bodies: FloatArray, n: int, box: FloatArray, rows: FloatArray, edges: FloatArray, lanes: int
+    bodies: FloatArray, n: int, box: FloatArray, rows: FloatArray, edges: FloatArray
 ) -> None:
     """Write where a robot is in the frame of the box, and the point of the box next to it.
 
     `rows` are those of `nearest_points`.
     """
-    for k in range(lanes):
+    for k in range(LANES):
         dx, dy = bodies[n, X + k] - box[X + k], bodies[n, Y + k] - box[Y + k]
         cos, sin = box[COS + k], box[SIN + k]
         box[LOCAL_X + k] = cos * dx + sin * dy
         box[LOCAL_Y + k] = cos * dy - sin * dx
-    nearest_points(edges, rows, lanes)
+    nearest_points(edges, rows, LANES)
 
 
 @njit(cache=True, fastmath=_EXACT)
@@ -111,14 +109,13 @@ def touch(
     rounding: float,
     compliance: FloatArray,
     dt: float,
-    lanes: int,
-) -> int:
-    """Write the contact rows of a robot that is located; return in how many lanes it may touch."""
+) -> bool:
+    """Write the contact rows of a robot that is located; return whether it may touch the box."""
     c00, c01, c02 = compliance[n, 0, 0], compliance[n, 0, 1], compliance[n, 0, 2]
     c10, c11, c12 = compliance[n, 1, 0], compliance[n, 1, 1], compliance[n, 1, 2]
     c20, c21, c22 = compliance[n, 2, 0], compliance[n, 2, 1], compliance[n, 2, 2]
     touching = 0
-    for k in range(lanes):
+    for k in range(LANES):
         ahead, left, turn = (
             bodies[n, AHEAD + k],
             bodies[n, LEFT + k],
@@ -155,13 +152,13 @@ def touch(
         bodies[n, YIELD_TT + k] = t0 * yt0 + t1 * yt1 + radius * yt2
         bodies[n, WANT_N + k] = n0 * ahead + n1 * left - gap / dt
         bodies[n, WANT_T + k] = t0 * ahead + t1 * left + radius * turn
-    return touching
+    return touching > 0
 
 
 @njit(cache=True, fastmath=_EXACT)
-def rest(box: FloatArray, rho2: float, force: float, lanes: int) -> None:
+def rest(box: FloatArray, rho2: float, force: float) -> None:
     """Begin the sweeps: no forces, and a box that moves as readily as at `START_SPEED`."""
-    for k in range(lanes):
+    for k in range(LANES):
         box[U_X + k] = box[U_Y + k] = box[U_W + k] = 0.0
         box[FORCE_X + k] = box[FORCE_Y + k] = box[TORQUE + k] = 0.0
         mobility = START_SPEED / force
@@ -169,12 +166,10 @@ def rest(box: FloatArray, rho2: float, force: float, lanes: int) -> None:
 
 
 @njit(cache=True, fastmath=_EXACT)
-def answer(
-    bodies: FloatArray, near: BoolArray, box: FloatArray, friction: float, lanes: int
-) -> None:
+def answer(bodies: FloatArray, near: BoolArray, box: FloatArray, friction: float) -> None:
     """Let each robot near the box find its contact force in turn, the others' given."""
     for n in range(len(bodies)):
-        for k in range(lanes if near[n] else 0):
+        for k in range(LANES if near[n] else 0):
             ix, iy = bodies[n, NX + k], bodies[n, NY + k]
             pn, pt = bodies[n, LEVER_N + k], bodies[n, LEVER_T + k]
             before_n, before_t = bodies[n, FORCE_N + k], bodies[n, FORCE_T + k]
@@ -211,9 +206,9 @@ def answer(
 
 
 @njit(cache=True, fastmath=_EXACT)
-def drag(box: FloatArray, rho2: float, force: float, lanes: int) -> None:
+def drag(box: FloatArray, rho2: float, force: float) -> None:
     """Let the box move as the contact forces have it."""
-    for k in range(lanes):
+    for k in range(LANES):
         mobility = box[MOBILITY + k]
         ux, uy = mobility * box[FORCE_X + k], mobility * box[FORCE_Y + k]
         uw = mobility * box[TORQUE + k] / rho2
@@ -224,14 +219,12 @@ def drag(box: FloatArray, rho2: float, force: float, lanes: int) -> None:
 
 
 @njit(cache=True, fastmath=_EXACT)
-def move(
-    bodies: FloatArray, n: int, radius: float, compliance: FloatArray, dt: float, lanes: int
-) -> None:
+def move(bodies: FloatArray, n: int, radius: float, compliance: FloatArray, dt: float) -> None:
     """Move a robot for one substep under its twist and its contact force, which then ends."""
     c00, c01, c02 = compliance[n, 0, 0], compliance[n, 0, 1], compliance[n, 0, 2]
     c10, c11, c12 = compliance[n, 1, 0], compliance[n, 1, 1], compliance[n, 1, 2]
     c20, c21, c22 = compliance[n, 2, 0], compliance[n, 2, 1], compliance[n, 2, 2]
-    for k in range(lanes):
+    for k in range(LANES):
         cos, sin = bodies[n, COS + k], bodies[n, SIN + k]
         ahead, left = bodies[n, AHEAD + k], bodies[n, LEFT + k]
         turn = bodies[n, TURN + k]
@@ -254,13 +247,9 @@ def move(
 
 
 @njit(cache=True, fastmath=_EXACT)
-def carry(box: FloatArray, reach: float, dt: float, lanes: int) -> float:
-    """Move the box for one substep; return how far at most what lies within its reach moves."""
-    farthest = 0.0
-    for k in range(lanes):
-        ux, uy, uw = box[U_X + k], box[U_Y + k], box[U_W + k]
-        box[X + k] += ux * dt
-        box[Y + k] += uy * dt
-        box[PSI + k] += uw * dt
-        farthest = max(farthest, (np.sqrt(ux * ux + uy * uy) + reach * abs(uw)) * dt)
-    return farthest
+def carry(box: FloatArray, dt: float) -> None:
+    """Move the box for one substep."""
+    for k in range(LANES):
+        box[X + k] += box[U_X + k] * dt
+        box[Y + k] += box[U_Y + k] * dt
+        box[PSI + k] += box[U_W + k] * dt

@@ -1,10 +1,9 @@
 """Best responses of all robots in one compiled call.
 
-A joint action is worth the same whenever it is asked for: what the actions of a robot are worth is
-kept until another robot's wheel commands change, and in the round of decisions it is often known
-from the round before. Otherwise the robots that come next are valued with it, the more of them the
-more in a row have kept to the plan. The very joint actions of `BestResponse` come out, by the same
-random numbers; `tests/scenarios/box_pushing/prediction` holds one against the other.
+The value of a joint action is the same in both rounds: the values of a robot's actions are kept
+until another robot's wheel commands change. Robots are evaluated in batches, which grow while
+robots keep to the plan. The result and the random numbers equal those of `BestResponse`;
+`tests/scenarios/box_pushing/prediction` compares the two.
 """
 
 from __future__ import annotations
@@ -13,19 +12,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.evaluators.best_response import MOST_AHEAD
 from ....core.evaluators.drawing import draw, explored
 from ....core.interface.prediction import Exploring
 from ....core.numerics import FloatArray, IntArray, njit
-from ....core.rules.kernels.compact_states import total_compact
-from ....core.rules.kernels.fuzzy import Packed
-from ..states.relational_lanes import Wanted, relational
-from .push import Contacts, PushModel, contacts_of, pushed_on
+from ....core.values.triangular import summed_values
+from ..states.situations import SituationBatch
+from ..states.variables import evaluate
+from ..world.geometry import BoxShape
+from .push import PushModel, push
 from .wheel_commands import choices_of, speeds_of
+
+MAX_BODIES_AHEAD = 4
+"""Maximum number of robots evaluated in one batch while most of them keep to the plan."""
 
 
 class Outlook(NamedTuple):
-    """What is predicted, and what that is worth; M robots of w wheels with A actions each."""
+    """Model and value function; M robots of w wheels with A actions each."""
 
     robots: FloatArray
     """``(M, 3)`` present poses."""
@@ -33,14 +35,14 @@ class Outlook(NamedTuple):
     """``(3,)`` pose."""
     goal: FloatArray
     """``(3,)`` pose."""
-    before: float
-    """Distance of the box from the goal [m]."""
+    shape: BoxShape
+    """Outline of the box."""
     seconds: float
-    """How far it is predicted [s]."""
+    """Prediction horizon [s]."""
     periods: float
-    """How many decision periods that is."""
+    """Prediction horizon in decision periods."""
     model: PushModel
-    """What is believed of robots and box."""
+    """Model of robots and box."""
     twists: FloatArray
     """``(M, K, 3)`` of every wheel command [m/s, m/s, rad/s]."""
     speeds: FloatArray
@@ -52,53 +54,44 @@ class Outlook(NamedTuple):
     every: IntArray
     """``(M,)`` numbers of all robots."""
     columns: IntArray
-    """Of the state variables, see `Columns`."""
+    """Columns of `evaluate`."""
     weights: tuple[FloatArray, FloatArray, FloatArray]
-    """Consequent weights, see `total_compact`, as what follows."""
+    """Consequent weights, see `summed_values`, as what follows."""
     agents: IntArray
     firsts: IntArray
-    kinds: tuple[IntArray, IntArray, IntArray]
-    packed: Packed
+    terms: tuple[IntArray, IntArray, IntArray]
+    variables: FloatArray
 
 
 class _Plan(NamedTuple):
-    """What all robots are to do."""
+    """Plan of all robots."""
 
     commands: IntArray
-    """``(M,)`` their wheel commands."""
+    """``(M,)`` wheel commands."""
     worths: FloatArray
-    """``(M, A ** w)`` what the actions of each robot were worth when last computed."""
+    """``(M, A ** w)`` last computed values of each robot's actions."""
     around: IntArray
-    """``(M, M)`` the wheel commands of all robots then; -1 before."""
+    """``(M, M)`` wheel commands of all robots at that time; -1 before."""
 
 
 @njit(cache=True)
-def _worths(choices: IntArray, contacts: Contacts, outlook: Outlook, wanted: Wanted) -> FloatArray:
-    """Return what wheel commands ``(M, m)`` are worth to the mean agent ``(m,)``."""
-    robots, box, gaps = pushed_on(contacts, outlook.box, choices, outlook.seconds, outlook.model)
-    shared = relational(
-        robots,
-        box,
-        gaps,
-        outlook.goal,
-        outlook.box,
-        outlook.before,
-        outlook.periods,
-        outlook.model.edges,
-        outlook.model.friction_radius,
-        outlook.every,
-        outlook.columns,
-        *wanted,
+def _values_of(choices: IntArray, outlook: Outlook) -> FloatArray:
+    """Return the mean value ``(m,)`` of wheel commands ``(M, m)`` over the agents."""
+    robots, box, gaps = push(
+        outlook.robots, outlook.box, outlook.twists, choices, outlook.seconds, outlook.model
     )
+    origins = np.expand_dims(outlook.box, 1)
+    batch = SituationBatch(robots, box, gaps, outlook.goal, origins, outlook.periods, outlook.shape)
+    shared = evaluate(batch, outlook.every, outlook.columns)
     own = np.expand_dims(speeds_of(choices, outlook.speeds), 2)
     weights, agents, firsts = outlook.weights, outlook.agents, outlook.firsts
-    total = total_compact(weights, agents, firsts, outlook.kinds, own, shared, outlook.packed)
+    total = summed_values(weights, agents, firsts, outlook.terms, own, shared, outlook.variables)
     return total / len(agents)
 
 
 @njit(cache=True)
 def _holds(plan: _Plan, robot: int) -> bool:
-    """Return whether it was valued, and no other robot's wheel command is another since then."""
+    """Return whether the values of a robot's actions are still valid."""
     around = plan.around[robot]
     same = around[robot] >= 0
     for i in range(len(around)):
@@ -108,7 +101,7 @@ def _holds(plan: _Plan, robot: int) -> bool:
 
 @njit(cache=True)
 def _varied(robots: IntArray, plan: _Plan, outlook: Outlook) -> IntArray:
-    """Return the wheel commands ``(M, m)`` in which one of some robots departs from a plan."""
+    """Return wheel commands ``(M, m)`` that differ from the plan in one of some robots."""
     n_actions = outlook.which.shape[1]
     who, commands = np.empty((2, len(robots) * n_actions), np.int64)
     m = 0
@@ -128,7 +121,7 @@ def _varied(robots: IntArray, plan: _Plan, outlook: Outlook) -> IntArray:
 def _value(
     robots: IntArray, value: float, worths: FloatArray, plan: _Plan, outlook: Outlook
 ) -> None:
-    """Value the actions of robots, by what their departures from a plan of a value are worth."""
+    """Store the values of robots' actions, given those of commands that differ from the plan."""
     m = 0
     for r in robots:
         plan.around[r] = plan.commands
@@ -145,7 +138,7 @@ def _value(
 
 @njit(cache=True)
 def _improve(worths: FloatArray, alike: IntArray, rng: np.random.Generator) -> int:
-    """Return the best of the actions that come to different commands; -1 if there is none."""
+    """Return the best action among those with different commands; -1 if there is none."""
     distinct = np.empty(len(worths), np.int64)
     count = 0
     for a in range(len(worths)):
@@ -165,7 +158,7 @@ def _decide(
     exploring: Exploring,
     rng: np.random.Generator,
 ) -> int:
-    """Let the wheels of a robot decide, one after the other; return its action, -1 if none is."""
+    """Let the wheels of a robot decide in turn; return its action, -1 if no value is greatest."""
     wheels = len(joint)
     values = np.empty(n_actions)
     action = 0
@@ -189,7 +182,6 @@ def respond(
     order: IntArray,
     n_actions: int,
     outlook: Outlook,
-    wanted: Wanted,
     exploring: Exploring,
     rng: np.random.Generator,
 ) -> IntArray:
@@ -203,8 +195,8 @@ def respond(
         ``(M,)`` the robots in the order of decision.
     n_actions
         A.
-    outlook, wanted
-        What is predicted, and which state variables, see `Columns`.
+    outlook
+        Model and value function.
     exploring
         How agents explore.
     rng
@@ -213,18 +205,16 @@ def respond(
     Returns
     -------
     IntArray
-        ``(n,)`` the joint action, empty where none is worth most: not all values are numbers.
+        ``(n,)`` the joint action; empty if not all values are numbers.
     """
     n, n_indices = outlook.which.shape
     wheels = starts.shape[1] // n
     choices = choices_of(starts, outlook.which, n_actions)
-    robots, twists, model = outlook.robots, outlook.twists, outlook.model
-    contacts = contacts_of(robots, outlook.box, twists, outlook.seconds, model)
     by_robot = np.empty(choices.shape[::-1], np.int64)
     for i in range(n):
         for c in range(len(choices)):
             by_robot[i, c] = choices[c, i]
-    worths = _worths(by_robot, contacts, outlook, wanted)
+    worths = _values_of(by_robot, outlook)
     best = draw(worths, rng)
     joint = starts[best].copy()
     plan = _Plan(choices[best], np.empty((n, n_indices)), np.full((n, n), -1))
@@ -237,11 +227,11 @@ def respond(
                 return joint[:0]
             r = order[k]
             if not _holds(plan, r):
-                depth = min(2 * depth, MOST_AHEAD) if k == reach else 1
+                depth = min(2 * depth, MAX_BODIES_AHEAD) if k == reach else 1
                 reach = min(k + depth, n)
                 ahead = order[k:reach]
-                # A kernel more between this and `_worths` would take three seconds to compile.
-                worths = _worths(_varied(ahead, plan, outlook), contacts, outlook, wanted)
+                # A kernel more between this and `_values_of` would take three seconds to compile.
+                worths = _values_of(_varied(ahead, plan, outlook), outlook)
                 _value(ahead, value, worths, plan, outlook)
             if decides:
                 own = joint[r * wheels : (r + 1) * wheels]

@@ -1,10 +1,10 @@
-"""What the wheels of every robot may be commanded next, and how the robots would move under it.
+"""Possible wheel commands of every robot in the next decision, and their twists.
 
-Several actions often command one speed (a resting wheel is maintained or zeroed, one at its limit
-is maintained or increased), so that the distinct *wheel commands* of a robot, the speeds of all its
-wheels, are far fewer than ``A ** w``. Wheels on one side of a skid-steer do the same to its motion,
-so that its distinct *twists* are fewer still. A *robot-action index* is the actions of a robot's
-wheels read as one number in base ``A``; a *joint-action index*, those of all wheels.
+Several actions often command the same speed: a resting wheel is maintained or zeroed, and one at
+its limit is maintained or increased. Therefore a robot has far fewer distinct *wheel commands*, the
+speeds of all its wheels, than ``A ** w``. Wheels on one side of a skid-steer have the same effect
+on its motion, so that its distinct *twists* are fewer still. A *robot-action index* is the actions
+of a robot's wheels read as one number in base ``A``; a *joint-action index*, those of all wheels.
 """
 
 from typing import NamedTuple

@@ -1,1 +1,1 @@
-"""What a wheel agent perceives: state variables and state spaces."""
+"""State variables and state spaces of wheel agents."""

@@ -1,27 +1,22 @@
-"""State spaces of the box-pushing scenario: what a wheel agent perceives.
+"""State spaces of box pushing.
 
-A state space pairs the description that learners see (`StateSpace`) with what computes it: the own
-block a function of the pose of the agent's robot and the speed of its wheel, the shared block
-variables, each a function of the whole `View`. They serve sensing and prediction alike and work on
-many situations at once. A further state space is one `BoxStateSpace` and one line in
-`STATE_SPACES`; a spec may also list state variables by name, one's own among them, see `variables`.
-
-The shared blocks of many predicted situations are computed by `relational_lanes`, compiled.
+The own variables of an agent are functions of its robot's pose and of its wheel speed. The shared
+variables are those of `variables`. A spec chooses a state space of `STATE_SPACES` by name, or lists
+shared variables, built in or of its own.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property
 from math import pi
 
 import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
-from ....core.numerics import FloatArray, wrap
-from ...state_variables import StateVariable, find_variable, sense, space_of
-from .relational import STATE_VARIABLES, View
-from .relational_lanes import Columns
-from .sensing import sensed
+from ....core.numerics import FloatArray, IntArray, wrap
+from ...state_variables import StateVariable, find_variable, space_of
+from .situations import SituationBatch, whole_batch
+from .variables import STATE_VARIABLES, columns_of, evaluate
 
 
 @dataclass(frozen=True)
@@ -29,47 +24,44 @@ class BoxStateSpace:
     """A state space and how to compute it."""
 
     space: StateSpace
-    """Names, ranges and membership centres."""
+    """Names, ranges and membership centers."""
     own: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
     """``own(poses (m, 3), speeds (m,), goal (3,)) -> (m, n_own)``."""
     own_needs_pose: bool
-    """Whether `own` reads the poses; if not, none need be predicted for it."""
-    functions: tuple[StateVariable, ...]
+    """Whether `own` depends on the poses."""
+    variables: tuple[StateVariable, ...]
     """The shared variables, in order."""
-    columns: Columns | None = None
-    """Computes the built-in ones fast for many situations; none: the functions do."""
 
-    def sense(self, view: View, robots: Sequence[int]) -> FloatArray:
-        """Return the shared blocks ``(k, m, d - n_own)`` of k robots, by the functions alone."""
-        return sense(self.functions, view, robots)
-
-    def observe(self, view: View) -> FloatArray:
-        """Return the shared blocks ``(m, M, d - n_own)`` of all robots, fast for few situations.
-
-        They have the bits of `sense`.
-        """
-        robots = range(view.gaps.shape[1])
-        if self.columns is None:
-            return self.sense(view, robots).swapaxes(0, 1)
-        shared = sensed(view, self.columns)
-        if not self.is_built_in:
-            users = [c for c, thing in enumerate(self.functions) if not thing.trusted]
-            of_users = sense([self.functions[c] for c in users], view, robots)
-            shared[:, :, users] = of_users.swapaxes(0, 1)
-        return shared
+    @cached_property
+    def columns(self) -> IntArray:
+        """Columns of `evaluate`, one for each shared variable."""
+        return columns_of(self.variables)
 
     @property
     def is_built_in(self) -> bool:
-        """Whether no variable is a user's."""
-        return all(thing.trusted for thing in self.functions)
+        """Whether all shared variables are built in."""
+        return all(variable.trusted for variable in self.variables)
 
-    def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
-        """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
-        compiled = None if self.columns is None else self.columns.of(view, robots)
-        return sense(self.functions, view, robots, compiled)
+    def shared(self, batch: SituationBatch, robots: Sequence[int]) -> FloatArray:
+        """Return the shared variables ``(k, m, d - n_own)`` of k robots in m situations.
+
+        Raises
+        ------
+        ValueError
+            If a user's function returns anything but a finite number for each situation.
+        """
+        out = evaluate(batch, np.fromiter(robots, np.int64), self.columns)
+        if not self.is_built_in:
+            situation = whole_batch(batch)
+            for column, variable in enumerate(self.variables):
+                if not variable.trusted:
+                    for k, robot in enumerate(robots):
+                        values = variable.function(situation, situation.robots[robot])
+                        out[k, :, column] = variable.checked(values, batch.boxes.shape[1])
+        return out
 
 
-def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
+def _own_of_paper(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
     x, y = (goal[:2] - poses[:, :2]).T
     heading = poses[:, 2]
     bearing = wrap(np.arctan2(y, x) - heading)
@@ -77,100 +69,82 @@ def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> Float
 
 
 _EVEN = tuple(float(c) for c in np.linspace(-pi, pi, 5, endpoint=False))
-_MAX_SPEED = 0.13  # the e-Puck's; `state_space_for` lays it over that of other robots
+_E_PUCK_SPEED = 0.13
 _SPEED = Variable(
     "wheel_speed",
     "m/s",
-    -_MAX_SPEED,
-    _MAX_SPEED,
+    -_E_PUCK_SPEED,
+    _E_PUCK_SPEED,
     centres=(-0.13, -0.065, 0.0, 0.065, 0.13),
     labels=("fast back", "back", "still", "forward", "fast forward"),
     mirrored="same",
 )
 
 
-def _angle(name: str, centres: tuple[float, ...] = ()) -> Variable:
-    return Variable(name, "rad", -pi, pi, True, centres, mirrored="opposite")
-
-
-_shared = partial(StateVariable, common=True, trusted=True)
-
-
 def build_space(name: str, *shared: str) -> BoxStateSpace:
-    """Return a state space of variables by name, behind the speed of the own wheel.
+    """Return a state space of the own wheel speed and of shared variables by name.
 
     Raises
     ------
     ValueError
         If there is none, one is unknown or named twice.
     """
-    functions = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
+    variables = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
     return BoxStateSpace(
-        space_of(name, _SPEED, functions),
+        space_of(name, _SPEED, variables),
         lambda poses, speeds, goal: speeds[:, None],
         own_needs_pose=False,
-        functions=functions,
-        columns=Columns(shared),
+        variables=variables,
     )
 
 
-_PAPER = (
-    _shared(_angle("box_orientation", _EVEN), lambda view, robot: wrap(view.box[:, 2])),
-    _shared(
-        _angle("box_goal_bearing", _EVEN), lambda view, robot: wrap(view.course - view.box[:, 2])
-    ),
-    _shared(
-        Variable("box_distance", "m", 0.0, 1.2, mirrored="same"), lambda view, robot: view.distance
-    ),
-)
+def _space_of_paper() -> BoxStateSpace:
+    """Return the state of Eq. 1, in the order of its own and its shared part."""
+    orientation, bearing, distance = (
+        find_variable(STATE_VARIABLES, name)
+        for name in ("box_orientation", "box_goal_bearing", "box_distance")
+    )
+    coarse = Variable("box_distance", "m", 0.0, 1.2, mirrored="same")
+    shared = (orientation, bearing, replace(distance, variable=coarse))
+    angles = (
+        Variable(name, "rad", -pi, pi, True, centres, mirrored="opposite")
+        for name, centres in (("heading", _EVEN), ("goal_bearing", ()))
+    )
+    goal_distance = Variable("goal_distance", "m", 0.0, 1.5, mirrored="same")
+    described = (*angles, goal_distance, _SPEED, *(each.variable for each in shared))
+    common = tuple(each.variable.name for each in shared)
+    space = StateSpace("paper", described, n_own=4, common=common)
+    return BoxStateSpace(space, _own_of_paper, own_needs_pose=True, variables=shared)
 
-_ON_THE_WAY = ("box_distance", "approach")
-_PUSHING = ("gap", "box_bearing", "side", "others_gap", "cross_track_error", *_ON_THE_WAY)
-_BESIDE_OTHERS = ("gap", "face_bearing", "side", "others_away")
+
+_PROGRESS = ("box_distance", "approach")
+_PUSHING = ("gap", "box_bearing", "side", "others_gap", "cross_track_error", *_PROGRESS)
+_TEAM = ("gap", "face_bearing", "side", "others_away")
 
 STATE_SPACES: dict[str, BoxStateSpace] = {
-    # Eq. 1, in the order of its own and its shared part.
-    "paper": BoxStateSpace(
-        StateSpace(
-            "paper",
-            (
-                _angle("heading", _EVEN),
-                _angle("goal_bearing", _EVEN),
-                Variable("goal_distance", "m", 0.0, 1.5, mirrored="same"),
-                _SPEED,
-                *(function.variable for function in _PAPER),
-            ),
-            n_own=4,
-            common=tuple(function.variable.name for function in _PAPER),
-        ),
-        _paper_own,
-        own_needs_pose=True,
-        functions=_PAPER,
-    ),
+    "paper": _space_of_paper(),
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
     "relational": build_space("relational", *_PUSHING),
     "pose": build_space("pose", *_PUSHING, "bend", "box_turn"),
     # The same for boxes that are wide for a robot, and for any number of robots.
     "crowd": build_space(
-        "crowd", *_BESIDE_OTHERS, "contact_push_bearing", "contact_cross_track_error", *_ON_THE_WAY
+        "crowd", *_TEAM, "contact_push_bearing", "contact_cross_track_error", *_PROGRESS
     ),
-    # For boxes so wide that they hardly turn on the way: where the box goes, not how it is pushed.
-    "wide": build_space(
-        "wide", *_BESIDE_OTHERS, "path_bearing", "path_cross_track_error", *_ON_THE_WAY
-    ),
+    # For boxes so wide that they hardly turn on the way: the path of the box, not the push.
+    "wide": build_space("wide", *_TEAM, "path_bearing", "path_cross_track_error", *_PROGRESS),
 }
 """State spaces by the name that specs use."""
 
 
 def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxStateSpace:
-    """Return a state space, its wheel speeds laid over those of a robot.
+    """Return a state space, with the range of wheel speeds adapted to a robot.
 
     Parameters
     ----------
     chosen
         Key in `STATE_SPACES`, or names of state variables.
     max_speed
-        Greatest wheel speed of the robot [m/s].
+        Maximum wheel speed of the robot [m/s].
 
     Examples
     --------
@@ -180,7 +154,7 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
     space = (
         STATE_SPACES[chosen] if isinstance(chosen, str) else build_space("+".join(chosen), *chosen)
     )
-    factor = max_speed / _MAX_SPEED
+    factor = max_speed / _E_PUCK_SPEED
     if factor == 1.0:
         return space
     centres = tuple(factor * centre for centre in _SPEED.centres)

@@ -30,7 +30,7 @@ from shapely.validation import explain_validity
 
 from ....core.numerics import FloatArray, nx
 from ....core.plugins.words import closest
-from .geometry import Moments, Outline, moments, ring_edges
+from .geometry import BoxShape, Moments, Outline, moments, ring_edges
 from .settings import GRAVITY, BoxSettings
 
 Vertices = Sequence[tuple[float, float]]
@@ -38,15 +38,15 @@ Vertices = Sequence[tuple[float, float]]
 UNIT = 10.0
 """Box2D units per metre."""
 MAX_VERTICES = 8
-"""Of a convex piece; b2_maxPolygonVertices."""
+"""Maximum number of vertices of a convex piece in Box2D, b2_maxPolygonVertices."""
 MOST_VERTICES = 1000
-"""Of an outline and its holes; a drawing with more is to be simplified."""
+"""Maximum number of vertices of an outline and its holes."""
 LEAST_EDGE = 1e-6
 """Shortest edge [m]."""
 LEAST_PIECE = 1.1921e-9
 """Smallest area of a convex piece [m2]: Box2D takes none below the epsilon of single precision."""
 LARGEST = 100.0
-"""Greatest distance of a vertex from another one [m]."""
+"""Maximum distance between two vertices [m]."""
 FAR = 10.0
 """Distance from the origin, in lengths of a polygon, beyond which its vertices are taken relative
 to its first one: moments about a far origin lose all digits."""
@@ -149,8 +149,8 @@ def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
     """Return convex counter-clockwise pieces ``(<= 8, 2)`` that together are the polygon.
 
     Constrained Delaunay triangles, merged greedily as long as the union of two is convex: always
-    the first two in their order. What neighbours a piece is kept, so that the time grows hardly
-    faster than the number of vertices.
+    the first two in their order. A graph of neighbors keeps the time nearly linear in
+    the number of vertices.
     """
     ring = np.asarray(polygon.exterior.coords)[:-1]
     if not polygon.interiors and len(ring) <= MAX_VERTICES and (_turns(ring) > 0).all():
@@ -158,12 +158,12 @@ def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
     triangles = shapely.constrained_delaunay_triangles(polygon).geoms
     rings = [np.asarray(orient(t).exterior.coords)[:-1] for t in triangles if t.area > 0]
     pieces = dict(enumerate(rings))
-    beside = _neighbours(rings)
-    pairs = [(min(edge), max(edge)) for edge in beside.edges]
+    graph = _neighbours(rings)
+    pairs = [(min(edge), max(edge)) for edge in graph.edges]
     heapify(pairs)
     while pairs:
         i, j = heappop(pairs)
-        if not beside.has_edge(i, j):  # one of them has been merged since
+        if not graph.has_edge(i, j):  # one of the two was merged
             continue
         shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
         union = _merge(pieces[i], pieces[j]) if len(shared) >= 2 else None
@@ -171,8 +171,8 @@ def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
             continue
         pieces[i] = union
         del pieces[j]
-        nx.contracted_nodes(beside, i, j, self_loops=False, copy=False)
-        for other in beside[i]:
+        nx.contracted_nodes(graph, i, j, self_loops=False, copy=False)
+        for other in graph[i]:
             heappush(pairs, (min(i, other), max(i, other)))
     return tuple(pieces.values())
 
@@ -196,9 +196,9 @@ def _neighbours(rings: Sequence[FloatArray]) -> nx.Graph:
 
 
 AREA = 0.04
-"""Of every box in the table [m2]: that of a square of 20 cm."""
+"""Area of every named box: that of a square of 20 cm [m2]."""
 ROBOTS_PER_BOX = 2
-"""Robots for which the boxes of the table are made."""
+"""Number of robots for which the named boxes are made."""
 
 
 @dataclass(frozen=True)
@@ -218,15 +218,15 @@ class BoxSpec:
     """
 
     name: str
-    """The name under which specs know it."""
+    """Name in specs."""
     vertices: Vertices = ()
     """Outline [m], anywhere in the plane; the frame of the box is centred afterwards."""
     holes: tuple[Vertices, ...] = ()
     """Outlines of holes [m]."""
     radius: float = 0.0
-    """Of a disc [m]; 0 for a polygon."""
+    """Radius of a disc [m]; 0 for a polygon."""
     mass: float = 0.4
-    """[kg]."""
+    """Mass [kg]."""
     friction: float = 0.2
     """Coefficient of friction with the ground."""
     contact_friction: float = 0.3
@@ -288,7 +288,7 @@ class BoxSpec:
 
     @property
     def area(self) -> float:
-        """[m2]."""
+        """Area [m2]."""
         return self.moments.area
 
     @property
@@ -313,6 +313,12 @@ class BoxSpec:
         Ground friction resists pure turning with `friction_force` times this lever.
         """
         return self.moments.radial / self.area
+
+    @cached_property
+    def shape(self) -> BoxShape:
+        """Outline and friction radius, for kernels."""
+        outline = self.outline
+        return BoxShape(outline.edges, outline.rounding, self.friction_radius)
 
     @cached_property
     def friction_points(self) -> FloatArray:
@@ -374,7 +380,7 @@ def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
 
 
 def growth(box: str | BoxSettings, robots: int) -> float:
-    """Return by what factor a box is larger for some robots than for two; 1: it does not grow.
+    """Return the size of a box relative to that for two robots; 1 if it does not grow.
 
     Raises
     ------
@@ -420,7 +426,7 @@ def _shape(name: str, *vertices: tuple[float, float]) -> BoxSpec:
 
 
 def _star(name: str, points: int, depth: float) -> BoxSpec:
-    """Return a star with a point ahead whose hollows reach `depth` of the way to the centre."""
+    """Return a star with a point ahead and hollows of `depth`, relative to its radius."""
     corners = [(1.0, 2 * pi * i / points) for i in range(points)]
     hollows = [(1.0 - depth, angle + pi / points) for _, angle in corners]
     ring = [corner for pair in zip(corners, hollows, strict=True) for corner in pair]

@@ -26,10 +26,10 @@ ON_SURFACE = 1e-12
 CLEAR = 1e-9
 """Distance [m] from which a point is clearly before an edge, and the square of the distance from
 its ends, over that from the edge: rounding can neither move it behind nor make an end nearer."""
-LANES = 32
+LANES = 16
 """Points side by side, see `nearest_points`."""
 LOCAL_X, LOCAL_Y, SQUARE, NEAR_X, NEAR_Y, SIDE, EDGE_X, EDGE_Y = range(0, 8 * LANES, LANES)
-"""Where the rows of `nearest_points` begin."""
+"""Offsets of the rows of `nearest_points`."""
 NEAREST_SIZE = EDGE_Y + LANES
 
 
@@ -55,6 +55,17 @@ class Outline:
         """Distance of the farthest surface point from the origin [m]."""
         ends = self.edges.reshape(-1, 2)
         return float(np.hypot(ends[:, 0], ends[:, 1]).max()) + self.rounding
+
+
+class BoxShape(NamedTuple):
+    """Outline of a box, and how it resists turning, for kernels."""
+
+    edges: FloatArray
+    """Edges of the `Outline` ``(n_edges, 4)`` [m]."""
+    rounding: float
+    """Margin by which the outline is grown [m]."""
+    friction_radius: float
+    """Lever with which ground friction resists turning [m]."""
 
 
 def ring_edges(vertices: FloatArray) -> FloatArray:
@@ -392,7 +403,7 @@ class Moments(NamedTuple):
     """Area and its moments about the origin."""
 
     area: float
-    """[m2]."""
+    """Area [m2]."""
     first: FloatArray
     """``(2,)`` integrals of x and y [m3]."""
     second: FloatArray

@@ -1,4 +1,4 @@
-"""What a kernel needs to work with objects of Box2D: their memory, and one function of theirs.
+"""Access of kernels to Box2D: the memory of bodies, and ``b2World::Step``.
 
 numba is imported with this module, so that nothing imports it before a kernel is compiled.
 """

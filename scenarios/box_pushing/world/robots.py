@@ -62,7 +62,7 @@ def resistance(robot: RobotSettings, ahead: float = 1.0, sideways: float = 1.0) 
 
 
 def compliance(robot: RobotSettings) -> FloatArray:
-    """Return by how much a pushed robot yields, below its traction limit.
+    """Return the compliance of a pushed robot, below its traction limit.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def compliance(robot: RobotSettings) -> FloatArray:
 
 
 def nominal_effect(robot: RobotSettings) -> FloatArray:
-    """Return what the wheel speeds do to the motion of a free, healthy robot.
+    """Return the effect of the wheel speeds on the twist of a free robot without failures.
 
     The twist at which the wheel forces balance. For two wheels on one axle it is the kinematics of
     a differential drive; a skid-steer turns as if its axle were longer, as its wheels scrub. (The
@@ -119,7 +119,7 @@ def robot_for(robot: str | RobotSettings) -> RobotSettings:
 
 
 def _check(robot: RobotSettings) -> None:
-    """Refuse a robot whose wheels share a name, stand outside its body, or cannot hold it."""
+    """Refuse a robot with equal wheel names, wheels outside its body, or too few wheels."""
     name = f"robot {robot.name or 'own'!r}"
     if len(set(robot.wheel_names)) != len(robot.wheels):
         raise ValueError(f"{name}: wheels {list(robot.wheel_names)}, must be of different names")

@@ -5,13 +5,13 @@ is within range then some robot is not. They are tested from the most specific t
 C1 and C2 (all in contact), C3 (all within range), C5 (none), C4 (some not). The paper has one
 penalty term per robot, R2 and R3 for its two; here every robot has one, with the same constants.
 
-Of a large team one robot is hardly ever out of contact with nobody else, and one that has lost
-touch is not distinguished from those that have not. So every robot may be paid by itself
-(`RewardSettings.of`): the conditions then hold for its own contact and its own reading.
+In a large team nearly always some robot is out of contact, and the conditions do not distinguish
+it from the others. Therefore each robot can be rewarded separately (`RewardSettings.of`): the
+conditions then apply to its own contact and its own reading.
 
-A learner takes a terminal state for one that is entered for ever. By the conditions a goal that is
-reached while one of the robots has lost touch would be punished for ever, so reaching it pays c1,
-what R1 is there, whatever the robots do (`RewardSettings.pays_at_goal`).
+A learner treats a terminal state as if it lasted forever. If the goal is reached while one robot is
+out of contact, the conditions would punish this forever. Therefore reaching the goal always pays
+c1, the value of R1 there (`RewardSettings.pays_at_goal`).
 """
 
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, Self, Union, get_args
@@ -31,17 +31,18 @@ CONTROL_PERIOD = 0.064
 Quantity = Annotated[float, Field(ge=1e-9, le=1e9)]
 """In SI units; the physics engine computes in single precision."""
 Coefficient = Annotated[float, Field(ge=0, le=1e6)]
-"""Of friction."""
+"""Coefficient of friction."""
 Periods = Annotated[int, Field(ge=1, le=10_000)]
 """Control periods: ten minutes at most."""
 
 
 class RewardSettings(Settings):
-    """The constants of the reward (Eq. 15-17); distances in metres, angles in radians."""
+    """Constants of the reward (Eq. 15-17); distances in meters, angles in radians."""
 
     of: Literal["team", "robot"] = "team"
-    """Whose contact and infrared readings the conditions ask for: those of all robots, as in the
-    paper, one reward for all agents; or those of each robot, a reward for the agents of each."""
+    """Recipient of the reward. With ``team`` the conditions depend on the contact and the infrared
+    readings of all robots, as in the paper, and all agents receive one reward. With ``robot`` they
+    depend on one robot's, and the agents of each robot receive their own reward."""
     c1: NonNegative = 0.01
     """Weight of R1 (Eq. 16), the reward for the box being near the goal."""
     r1: NonNegative = 1.5
@@ -53,8 +54,8 @@ class RewardSettings(Settings):
     c4: NonNegative = 0.0003
     """Penalty per radian of the box's orientation error (Eq. 16)."""
     least_approach: NonNegative = 0.001
-    """By how much the box must have come nearer in a decision period for a negative Delta D [m];
-    with 0 a box that creeps by rounding errors is paid as one that is pushed."""
+    """Minimum decrease of the box's distance in a decision period for a negative Delta D [m]. With
+    0, motion by rounding errors would be rewarded."""
     receding: float = 0.000001
     """Reward under Condition 2."""
     some_out_of_range: float = -0.0015
@@ -88,16 +89,16 @@ Vertices = Annotated[tuple[tuple[float, float], ...], Field(min_length=3)]
 
 
 class Described(Settings):
-    """Something of one's own, described by a table that may say what it is called."""
+    """User-defined object, described by a table that may give it a name."""
 
     name: Annotated[
         Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None, unwritten(None)
     ] = None
-    """What labels call it; nothing depends on it."""
+    """Name in labels; nothing else depends on it."""
 
 
 class BoxSettings(Described):
-    """A box of one's own: ``box = { vertices = [[0, 0], [0.2, 0], [0.2, 0.1]] }``."""
+    """User-defined box: ``box = { vertices = [[0, 0], [0.2, 0], [0.2, 0.1]] }``."""
 
     vertices: Vertices
     """Outline, counter-clockwise [m]; concave outlines are allowed."""
@@ -129,7 +130,7 @@ class RobotSettings(Described):
     """A robot; what is not given is the e-Puck's."""
 
     wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1, max_length=6)]
-    """Its wheels, one agent each; predictions make a table of all that they may do together."""
+    """Wheels, one agent each; at most six, because predictions enumerate their joint actions."""
     radius: Annotated[float, Field(ge=0.001, le=10)] = 0.037
     """Radius of the round body [m]."""
     mass: Quantity = 0.15
@@ -165,7 +166,7 @@ Normalisation = Literal["exponential", "linear", "binary"]
 
 
 class InfraredSettings(Settings):
-    """How the infrared sensors of all robots read; the default is the e-Puck's.
+    """Response of the infrared sensors of all robots; the default is the e-Puck's.
 
     Examples
     --------
@@ -176,13 +177,13 @@ class InfraredSettings(Settings):
     reach: Positive = 0.06
     """Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6 cm."""
     normalisation: Normalisation = "exponential"
-    """How a distance within reach becomes a reading in [0, 1], 1 when touching: exp(-distance /
-    decay), 1 - distance / reach, or 1."""
+    """Reading in [0, 1] at a distance within reach: exp(-distance / decay), 1 - distance / reach,
+    or 1. When touching, it is 1."""
     decay: Positive = 0.015
     """Distance over which an exponential reading falls to 1/e [m]."""
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Standard deviation of a normal error, as a fraction of the reading (as in lookup tables of
-    Webots); drawn anew for every sensor and decision, the result cut to [0, 1]."""
+    Webots); drawn independently for every sensor and decision; the result is clipped to [0, 1]."""
 
     @model_validator(mode="after")
     def _decays(self) -> Self:
@@ -221,7 +222,7 @@ def label(thing: str | Settings) -> str:
 
 
 class Task(NamedTuple):
-    """What the robots are asked for, and paid."""
+    """Task of the robots: reward, and tolerances of the goal."""
 
     reward: RewardSettings
     tolerance: float

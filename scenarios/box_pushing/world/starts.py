@@ -1,4 +1,4 @@
-"""Where robots, box and goal are when an episode begins.
+"""Initial poses of robots, box and goal.
 
 The goal pose is always (1 m, 0, 0): one metre away in the easier starts' mean direction, unless
 distances are in units of the box. *Bearing* is the direction from box to goal, *behind* the back of
@@ -25,7 +25,7 @@ CLEARANCE = 0.002
 GRID = 64
 """Points of a ray at which the surface of the box is looked for."""
 PRECISION = 1e-9
-"""Of the gap to the box [m]."""
+"""Precision of the gap to the box [m]."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Start:
     """A start distribution; all quantities uniform and independent."""
 
     distance: float
-    """From the box to the goal [m]."""
+    """Distance from the box to the goal [m]."""
     bearing: float
     """Greatest absolute bearing of the goal from the box [rad]; pi: any."""
     angle: float
@@ -70,7 +70,7 @@ def place(
     rng
         Random numbers.
     robots, box
-        What is to be placed.
+        Robots and box to place.
     unit
         Multiplies the distance from the box to the goal; robots are as near to the box as ever,
         since they do not grow.
@@ -146,7 +146,7 @@ def _behind(
             f"robots: {len(robots)} of {spans.sum():.3f} m in all do not fit side by side behind "
             f"box {box.name!r} of {most - least:.3f} m"
         )
-    # Sorted uniform numbers share out the free room evenly between and beside the robots.
+    # Sorted uniform numbers distribute the free space evenly between and around the robots.
     offsets = most - np.sort(rng.uniform(0, room, len(robots))) - np.cumsum(spans) + spans / 2
     poses = np.empty((len(robots), 3))
     for r, robot in enumerate(robots):

@@ -1,4 +1,4 @@
-"""A whole decision of the physical world in one compiled call.
+"""Simulation of a whole decision period in one compiled call.
 
 From Python a step of Box2D takes a pose, a force and a torque for each body, calls that take
 several times as long as the step itself. Here a kernel reads and writes the bodies where they lie
@@ -30,9 +30,9 @@ VELOCITY = 64
 TURNING = 72
 FORCE = 76
 TORQUE = 84
-"""Where a ``b2Body`` of Box2D 2.3 has them [bytes]; vectors are two numbers."""
+"""Offsets of the members of a ``b2Body`` of Box2D 2.3 [bytes]; vectors are two numbers."""
 AWAKE = 2
-"""The flag of bodies that have not come to rest; whoever pushes one wakes it."""
+"""Flag of bodies that have not come to rest; it must be set when a force is applied."""
 STEP = "_ZN7b2World4StepEfii"
 """Symbol of ``b2World::Step(float, int, int)``."""
 VELOCITY_ITERATIONS = 8
@@ -40,7 +40,7 @@ POSITION_ITERATIONS = 3
 PUSH = (0.3, -0.7, 0.11)
 SECONDS = 0.016
 AT_REST = 60
-"""The force and torque, the step [s] and the number of steps by which it is seen what holds."""
+"""Force and torque, step [s] and number of steps of the check in `step_address`."""
 
 
 @njit(cache=True, names_of="memory")
@@ -161,8 +161,8 @@ def advance_many(
 def step_address() -> int | None:
     """Return the address of ``b2World::Step``; None if bodies are not to be written to.
 
-    Two worlds alike are stepped, one through Box2D's own functions and one through memory: all that
-    is read must be what these functions say, and both must come to the same bits.
+    The check simulates two equal worlds, one through Box2D's own functions and one through memory.
+    All values read from memory must equal those of the functions, to the bit.
     """
     from .memory import config  # numba takes its time
 
@@ -180,7 +180,7 @@ def step_address() -> int | None:
     memory = (ctypes.c_float * (TORQUE // 4 + 1)).from_address(int(written.this))
     flags = ctypes.c_uint16.from_address(int(written.this) + FLAGS)
     places = (POSITION, POSITION + 4, ANGLE, VELOCITY, VELOCITY + 4, TURNING)
-    for push in (True, *[False] * AT_REST, True, False):  # in between they come to rest
+    for push in (True, *[False] * AT_REST, True, False):  # meanwhile they come to rest
         if push:
             pushed.ApplyForceToCenter(tuple(PUSH[:2]), True)
             pushed.ApplyTorque(PUSH[2], True)
@@ -190,7 +190,7 @@ def step_address() -> int | None:
         official.Step(SECONDS, VELOCITY_ITERATIONS, POSITION_ITERATIONS)
         step(int(other.this), SECONDS, VELOCITY_ITERATIONS, POSITION_ITERATIONS)
         seen = [memory[place // 4] for place in places]
-        if not seen == _told(pushed) == _told(written) or pushed.awake != written.awake:
+        if not seen == _state_of(pushed) == _state_of(written) or pushed.awake != written.awake:
             return None
     return address
 
@@ -204,9 +204,9 @@ def _world() -> tuple[Box2D.b2World, Box2D.b2Body]:
     return world, body
 
 
-def _told(body: Box2D.b2Body) -> list[float]:
-    """Return position, angle and velocities as Box2D's own functions tell them."""
+def _state_of(body: Box2D.b2Body) -> list[float]:
+    """Return position, angle and velocities, read through Box2D's own functions."""
     position = body.position
     velocity = body.linearVelocity
-    told = [position.x, position.y, body.angle]
-    return [*told, velocity.x, velocity.y, body.angularVelocity]
+    pose = [position.x, position.y, body.angle]
+    return [*pose, velocity.x, velocity.y, body.angularVelocity]

@@ -70,7 +70,7 @@ class WorldState(NamedTuple):
     wrenches: FloatArray
     """``(M, 3)`` what it remembers of wrenches, in units of Box2D."""
     contact_time: FloatArray
-    """As in `World`."""
+    """Attribute of `World`."""
 
 
 class World:
@@ -140,7 +140,7 @@ class World:
         self._wheels = wheel_model(self.robots, self.dt, self._grip, UNIT)
 
     def place(self, robot_poses: FloatArray, box_pose: FloatArray) -> None:
-        """Start afresh, everything at rest: robots ``(M, 3)`` and the box ``(3,)``."""
+        """Reset the world to the poses of robots ``(M, 3)`` and box ``(3,)``, all at rest."""
         n = len(self.robots)
         poses = np.vstack([box_pose, robot_poses])
         rest = np.zeros((n, 3))
@@ -149,8 +149,8 @@ class World:
     def state(self) -> WorldState:
         """Return all that the future depends on.
 
-        The world itself goes on from the saved state as a restored one does, so that both have the
-        same future to the last bit. (Otherwise Box2D might visit contacts in another order.)
+        The world is restored from this state, too. Otherwise Box2D might process its contacts in
+        another order than those of a restored world, and the last bits would differ.
         """
         state = WorldState(
             poses=np.vstack([self.box_pose, self.robot_poses]),
@@ -163,7 +163,7 @@ class World:
         return state
 
     def restore(self, state: WorldState) -> None:
-        """Go back to a saved state (of this world or of one built alike)."""
+        """Restore a saved state of this world or of an equal one."""
         self._world = Box2D.b2World(
             gravity=(0, 0), doSleep=False, warmStarting=False, continuousPhysics=False
         )
@@ -188,8 +188,8 @@ class World:
                 mass=robot.mass, center=(0, 0), I=robot.inertia * UNIT**2
             )
         for body in (self._box, *self._bodies):
-            # Box2D frees bodies with their world; touching one that is gone crashes Python. Whoever
-            # takes a body out of here keeps its world by it.
+            # Box2D frees bodies with their world, and access to a freed body crashes Python.
+            # Therefore each body keeps its world alive.
             body.world_kept = self._world
         self._handles = [_handles(body) for body in (self._box, *self._bodies)]
         self._addresses: IntArray = np.array([int(body) for body, _, _ in self._handles])
@@ -201,7 +201,7 @@ class World:
         self.contact_time = state.contact_time.copy()
 
     def advance(self, wheel_speeds: FloatArray, periods: int) -> None:
-        """Let control periods pass with wheel speeds [m/s].
+        """Simulate control periods with wheel speeds [m/s].
 
         They are held, ``(n_wheels,)``, or those of each period, ``(periods, n_wheels)``.
         """
@@ -230,7 +230,7 @@ class World:
         self._know(poses)
 
     def _advance_by_steps(self, speeds: FloatArray) -> None:
-        """Let control periods pass with speeds ``(periods, n_wheels)``, step by step."""
+        """Simulate control periods with speeds ``(periods, n_wheels)``, step by step."""
         touched = np.zeros(len(self.robots))
         for of_period in speeds:
             for _ in range(SUBSTEPS):
@@ -241,9 +241,9 @@ class World:
 
     @property
     def addresses(self) -> IntArray:
-        """Where the world, the box and the robots lie in memory ``(M + 2,)``, till it begins anew.
+        """Addresses of the world, the box and the robots ``(M + 2,)``, valid until `restore`.
 
-        What is changed there, see `advance_many`, the world does not know.
+        The world does not notice changes there, see `advance_many`.
         """
         return np.array([int(self._world.this), *self._addresses])
 
@@ -251,7 +251,7 @@ class World:
         self, addresses: IntArray, wheel_speeds: FloatArray, periods: int,
         last: FloatArray, wrenches: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
-        """Let control periods pass in many worlds alike, none of which fails, as in `advance`.
+        """Simulate control periods in many equal worlds without failures, as `advance` does.
 
         Parameters
         ----------
@@ -300,9 +300,10 @@ class World:
         )
 
     def infrared(self) -> FloatArray:
-        """Return what the infrared sensors would read ``(2, M, S)``, free of noise.
+        """Return the noise-free readings of the infrared sensors ``(2, M, S)``.
 
-        Of the box alone, and of the other robots alone; a sensor reads the greater one.
+        The first are of the box alone, the second of the other robots alone; a sensor reads the
+        maximum of both.
         """
         outline = self.box.outline
         return infrared_readings(
@@ -343,7 +344,7 @@ class World:
         self._know(poses)
 
     def _know(self, poses: FloatArray) -> None:
-        """Take poses ``(M + 1, 3)`` of box and robots for the present ones."""
+        """Set the current poses ``(M + 1, 3)`` of box and robots."""
         self.poses = poses
         self.contact: BoolArray = self.gaps < TOUCHING
         self.box_pose = poses[0]
@@ -381,7 +382,7 @@ class WheelFailures(Failures[FailureSettings]):
 
     @property
     def grip(self) -> FloatArray:
-        """What multiplies the drive stiffness of every wheel ``(n,)``: 0 for free ones, else 1."""
+        """Factor on the drive stiffness of every wheel ``(n,)``: 0 for free wheels, else 1."""
         grip = np.ones(len(self.failed))
         for failure, wheels in self.active():
             if isinstance(failure, Free):
@@ -389,7 +390,7 @@ class WheelFailures(Failures[FailureSettings]):
         return grip
 
     def advance(self, world: World, commands: FloatArray, step: int, periods: int) -> None:
-        """Let a world go on through (a part of) a step, its wheels being commanded `commands`."""
+        """Simulate control periods of a step with the given wheel speeds, subject to failures."""
         if self.strike(step):
             world.set_grip(self.grip)
         world.advance(self.driven(commands, periods) if self._settings else commands, periods)

@@ -1,30 +1,30 @@
-"""The ablation study: what each ingredient of the default contributes.
+"""Ablation study: contribution of each ingredient of the default learner.
 
-The first condition is the reference; every other one differs from it in one ingredient, removed or
-replaced. All meet the same worlds, seed by seed. Two measures were fixed beforehand: how fast a
-team learns (success over all of training) and how well it ends (evaluation success).
-The differences are tested by permutation of signs, and p is adjusted by Holm's method over all
-conditions and both measures.
+The first condition is the reference. Each other condition removes or replaces one ingredient.
+Conditions share initial states by seed. The measures are success over training, which reflects the
+speed of learning, and evaluation success. Differences are tested by permutation of signs; p-values
+are adjusted by Holm's method over all conditions and both measures.
 """
 
 from collections.abc import Sequence
 
-from ...results.analysis import Analysis, Figures, Pair, Summary, estimate_of, judged, phases_of
+from ...results.analysis import Analysis, Figures, Summary, estimate_of, judged, phases_of
+from ...results.differences import Pair
 from ...results.results import Results
 from ...results.statistics import exactly
 from ..study import measure as measure
 
 PUBLISHED = ("success",)
-"""Measures of an episode that published results keep."""
+"""Measures in published results."""
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95% intervals, seeds as the unit of sampling."""
+    """Estimate and compare with 95% intervals, with seeds as the unit of sampling."""
     return compared_with_first(results, results.of_phase("training"))
 
 
 def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
-    """Return the analysis with conditions under these names, as many as have been trained."""
+    """Return the analysis of the trained conditions under these names."""
     conditions = dict(zip(names, results.of_phase("training"), strict=True))
     phases = phases_of(results)
     main = results.main

@@ -15,15 +15,8 @@ import numpy as np
 
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import (
-    EVALUATED,
-    Analysis,
-    Figures,
-    Summary,
-    differences,
-    estimate_of,
-    verdicts,
-)
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, verdicts
+from ...results.differences import differences
 from ...results.results import CPU, Results
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, stack_estimates
 from ...spec.spec import Spec
@@ -33,7 +26,7 @@ from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated
 
 AFTER = "after "
-"""With what the phase of such an evaluation begins; how much came before follows."""
+"""Prefix of the phases of evaluations during training; the number of decisions follows."""
 FIRST = 1000
 """Decisions before the first evaluation."""
 DECISIONS = "decisions"
@@ -141,7 +134,7 @@ def analyse(results: Results) -> Analysis:
     means = [results.means(condition, "evaluation", measure.name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
     compared = differences({title: pairs[1:]}, measure)
-    heads = {f"{title}, less that of {conditions[0]}": compared[title]}
+    heads = {f"{title}, minus that of {conditions[0]}": compared[title]}
     notes = [
         "after N: when evaluated after N joint decisions of training, of all environments.",
         *verdicts(heads, measure),

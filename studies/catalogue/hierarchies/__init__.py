@@ -1,15 +1,14 @@
-"""The hierarchies study: which hierarchy it takes, at which size, at what cost.
+"""Hierarchies study: success and cost of hierarchies at several team sizes.
 
-Conditions are topologies, crossed with whose value decides and with the number of robots; all meet
-the same worlds, seed by seed. One measure was fixed beforehand: evaluation success, or the return
-in tasks in which nothing is one. For each number of robots and each choice of whose value decides,
-every hierarchy is compared with the chain (with the first hierarchy if there is no chain) by
-permutation of signs; p is adjusted by Holm's method over all of these comparisons. Few seeds cannot
-give a small p whatever the outcome: how many it takes is printed.
+Conditions are topologies, crossed with the value that decides and with the number of robots. They
+share initial states by seed. The measure is evaluation success, or the return in tasks without a
+success. In each setting, every hierarchy is compared with the chain (with the first hierarchy if
+there is no chain) by permutation of signs; p-values are adjusted by Holm's method over all
+comparisons. The notes say how many seeds a small p-value needs.
 
-A trial is measured as one of the scaling study, messages included: one for every edge of the
-hierarchy's transitive closure. Decisions to the goal are those of successful episodes alone: a
-hierarchy that succeeds only where it is easy looks quick.
+Trials are measured as in the scaling study. The number of messages is that of the edges in the
+transitive closure of the hierarchy. Decisions to the goal include successful episodes only, so
+they favor hierarchies that succeed only in easy episodes.
 """
 
 from collections.abc import Sequence
@@ -23,13 +22,14 @@ from ...results.analysis import (
     NOTHING,
     Analysis,
     Figures,
-    Pair,
     Summary,
     estimate_of,
     judged,
     steps_estimate,
 )
-from ...results.results import Results, Sizes
+from ...results.differences import Pair
+from ...results.results import Results
+from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exactly
 from ...spec.spec import Spec
 from ...spec.tables import label_but
@@ -43,16 +43,16 @@ if TYPE_CHECKING:
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
 VALUE_OF = "learner.decision.value_of"
-"""What is swept to vary whose value decides."""
+"""Key that is swept to vary the value that decides."""
 REFERENCE = "chain"
-"""The hierarchy that others are compared with, if it is there."""
+"""Reference of comparisons, if it is among the hierarchies."""
 DECIDING = "decision [ms]"
-"""Title of the time that a decision takes."""
-MESSAGES = "Messages: decisions told. States that are broadcast, to predict by, come on top."
+"""Title of the time of a decision."""
+MESSAGES = "Messages: communicated decisions, without the states broadcast for prediction."
 
 
 def check(spec: Spec) -> None:
-    """Raise `SpecError` unless there are hierarchies to compare and episodes to compare them by."""
+    """Raise `SpecError` unless there are two hierarchies and evaluation episodes."""
     check_evaluated(spec)
     settings = [condition.settings for condition in spec.conditions()]
     if len({(one.agents, one.topology.model_dump_json()) for one in settings}) < 2:
@@ -63,9 +63,9 @@ def check(spec: Spec) -> None:
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95% intervals, seeds as the unit of sampling.
+    """Estimate and compare evaluation results, with seeds as the unit of sampling.
 
-    Cases are sorted by number of robots, whose value decides, and hierarchy. Times are of one
+    Cases are sorted by number of robots, value that decides, and hierarchy. Times are those of one
     decision of the whole team.
     """
     conditions = results.of_phase("evaluation")
@@ -85,9 +85,9 @@ def analyse(results: Results) -> Analysis:
 
 
 def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str) -> Analysis:
-    """Compare cases with those of the reference hierarchy; of the first one if it is missing."""
-    whose = distinct(case.value_of for case in cases)
-    cases = sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of)))
+    """Compare cases with the reference hierarchy, or with the first if it is missing."""
+    values_of = distinct(case.value_of for case in cases)
+    cases = sorted(cases, key=lambda case: (case.robots, values_of.index(case.value_of)))
     table = [Summary(c.label, len(results.seeds(c.condition)), c.values) for c in cases]
     if not cases:
         return Analysis(())
@@ -103,14 +103,14 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
             pairs[case.setting].append((case.hierarchy, title, own, bases[case.setting]))
     judgement, lines = judged(pairs, reference, main, title)
     compared = {setting: own for setting, own in judgement.items() if own}
-    notes = ["Rows: what else is swept, hierarchy."] * any(case.value_of for case in cases)
+    notes = ["Rows: setting, hierarchy."] * any(case.value_of for case in cases)
     return Analysis(tuple(table), (*notes, MESSAGES, "", *(lines or [NOTHING])), cases, compared)
 
 
 def estimates(
     results: Results, condition: str, phase: str, deciding: Array, messages: Array
 ) -> dict[str, Estimate]:
-    """Return by title `Results.main`, decisions to the goal, time of a decision [s], messages."""
+    """Return estimates of `Results.main`, decisions to the goal, decision time and messages."""
     success = results.success(condition, phase)
     main = results.main
     values = {f"evaluation {main.heading}": estimate_of(results, condition, phase, main)}
@@ -123,7 +123,7 @@ def estimates(
 
 
 def to_the_goal(success: Array, steps: Array) -> Array:
-    """Return the mean decisions of successful episodes, of each seed that has any.
+    """Return the mean number of decisions of successful episodes, for seeds that have any.
 
     Examples
     --------
@@ -135,17 +135,17 @@ def to_the_goal(success: Array, steps: Array) -> Array:
 
 
 def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
-    """Draw success and messages of a decision of one size, a row for every hierarchy."""
+    """Draw success and messages for one team size, with a row for every hierarchy."""
     from ...presentation import figures
 
     main = next(iter(cases[0].values))
     rows = distinct(case.hierarchy for case in cases)
-    whose = distinct(case.value_of for case in cases)
-    offsets = figures.beside(len(whose))
+    values_of = distinct(case.value_of for case in cases)
+    offsets = figures.beside(len(values_of))
     figure, panels = figures.panels(1, 2, (7.2, 1.3 + 0.36 * len(rows)), sharey=True)
     for axes, title in zip(panels[0], (main, "messages"), strict=True):
         for case in cases:
-            i = whose.index(case.value_of)
+            i = values_of.index(case.value_of)
             row = rows.index(case.hierarchy) + offsets[i]
             colour = figures.COLOURS[i]
             figures.draw_row(
@@ -156,19 +156,18 @@ def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
     if main == EVALUATED:
         figures.as_rates(panels[0, 0], "x")
     figures.name_rows(panels[0, 0], rows)
-    if len(whose) > 1:
-        names = [f"value of: {value_of}" for value_of in whose]
+    if len(values_of) > 1:
+        names = [f"value of: {value_of}" for value_of in values_of]
         figures.name_points(figure, names, "means over seeds, bars: 95% intervals")
     return figure
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: success and time of a decision by number of robots.
+    """Return the figure: success and decision time against the number of robots.
 
-    Of one size it is a chart of success and messages, with a row for each hierarchy. Otherwise
-    there is a column of panels for each choice of whose value decides. Points are means over seeds,
-    bars their 95% intervals; hierarchies differ by colour and marker, and stand a little beside
-    each other.
+    For a single size it is a chart of success and messages with a row for each hierarchy. Otherwise
+    it has a column of panels for each value that decides. Points are means over seeds with 95%
+    intervals; hierarchies differ by color and marker and are slightly offset.
     """
     from ...presentation import figures  # matplotlib takes its time
 
@@ -177,10 +176,10 @@ def draw(analysis: Analysis) -> Figures:
         return {"hierarchies": _draw_dots(cases)}
     main = next(iter(cases[0].values))
     hierarchies = distinct(case.hierarchy for case in cases)
-    whose = distinct(case.value_of for case in cases)
-    size = (max(5.6, 0.6 + 2.8 * len(whose)), 5.2)
-    figure, panels = figures.panels(2, len(whose), size, sharex=True, sharey="row")
-    for column, value_of in zip(panels.T, whose, strict=True):
+    values_of = distinct(case.value_of for case in cases)
+    size = (max(5.6, 0.6 + 2.8 * len(values_of)), 5.2)
+    figure, panels = figures.panels(2, len(values_of), size, sharex=True, sharey="row")
+    for column, value_of in zip(panels.T, values_of, strict=True):
         for index, hierarchy in enumerate(hierarchies):
             own = [c for c in cases if (c.hierarchy, c.value_of) == (hierarchy, value_of)]
             for axes, title in zip(column, (main, DECIDING), strict=True):

@@ -1,35 +1,35 @@
-"""What is compared: teams under a hierarchy, in a setting that others share."""
+"""Cases of the hierarchies study: a hierarchy within a setting."""
 
 from typing import NamedTuple
 
-from ...results.results import Sizes
+from ...results.sizes import Sizes
 from ...results.statistics import Estimate
 
 
 class HierarchyCase(NamedTuple):
-    """One hierarchy under which teams are evaluated."""
+    """A hierarchy in a setting, such as a number of robots."""
 
     condition: str
-    """Its label."""
+    """Label of the condition."""
     hierarchy: str
-    """Its label without the number of robots and whose value decides."""
+    """Label without the number of robots and the value that decides."""
     value_of: str
-    """Whose value decides; empty if that is not swept."""
+    """Value that decides; empty if it is not swept."""
     robots: int
     """Number of bodies."""
     sizes: Sizes
-    """Those of all cases, and what bodies are called."""
+    """Numbers of bodies of all cases, and the name of bodies."""
     values: dict[str, Estimate]
     """Estimates by title."""
     phase: str = "evaluation"
-    """Of its episodes."""
+    """Phase of the evaluated episodes."""
 
     @property
     def setting(self) -> str:
-        """What it has in common with those that it is compared with."""
+        """Setting in words, which compared cases share."""
         return f"{self.sizes.shown(self.robots)}, {self.value_of}".strip(", ")
 
     @property
     def label(self) -> str:
-        """How its line of the table is called."""
+        """Label of its row in the table."""
         return f"{self.setting}, {self.hierarchy}".removeprefix(", ")

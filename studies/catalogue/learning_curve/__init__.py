@@ -1,7 +1,7 @@
 """The learning-curve study: how the agents fare from episode to episode (Fig. 5 and 6).
 
-Every claim of learning needs its controls beside it: one whose weights stay frozen tells learning
-from luck, one that has the reward function tells it from what the predictor alone achieves.
+Every claim of learning needs controls: one with frozen weights distinguishes learning from luck,
+one that has the reward function distinguishes it from planning with the predictor.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
-from ...results.contrasts import mean_estimate, values_by_seed
+from ...results.comparison import mean_estimate, values_by_seed
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rates
 from ..study import measure as measure
@@ -28,7 +28,7 @@ BLOCKS = {"first": slice(BLOCK), "last": slice(-BLOCK, None), "evaluation": slic
 """The episodes that the table averages over, of training or of evaluation, by name."""
 UNEQUAL = "Seeds trained for different numbers of episodes; curves end with the shortest."
 COLUMNS = 3
-"""Panels of the figure that stand beside each other, but for four, which are a square."""
+"""Panels in a row of the figure; four panels are a square."""
 
 
 def check(spec: Spec) -> None:

@@ -1,8 +1,7 @@
-"""The scaling study: how the number of robots bears on success, time, memory and messages.
+"""Scaling study: success, time, memory and messages as functions of the number of robots.
 
-Conditions differ in the number of robots and in how joint actions are evaluated; those of a spec of
-one's own may differ in anything, also in the kind of agents. Of every trial it keeps, besides the
-episodes: numbers that are a function of it, and what it took, which is not.
+Conditions usually differ in the number of robots and in the evaluator. In addition to episodes, a
+trial keeps reproducible numbers, and its usage of time and memory.
 
 Messages of a step are counted as Section V has agents talk: every agent passes the action it has
 decided to each agent below it, so there is one message for every edge of the hierarchy's transitive
@@ -18,17 +17,11 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.numerics import FloatArray, pd
-from ...results.analysis import (
-    EVALUATED,
-    Analysis,
-    Figures,
-    Summary,
-    estimate_of,
-    evaluated,
-    select_shared,
-)
+from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
+from ...results.differences import select_shared
 from ...results.notation import format_estimate
-from ...results.results import Results, Sizes
+from ...results.results import Results
+from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly
 from ...spec.tables import label_but
 from ...trials.session import Session
@@ -36,11 +29,11 @@ from ...trials.trial import Trial, TrialResult
 from ..study import distinct
 
 NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median")
-"""What of whole trials the analysis rests on."""
+"""Numbers of whole trials that the analysis needs."""
 PUBLISHED = ("success",)
-"""Measures of an episode that published results keep."""
+"""Measures in published results."""
 TIMES = {"deciding": "decision [ms]", "learning": "learning [ms]"}
-"""Times whose growth with the number of agents is estimated, by what they are of."""
+"""Titles of times for which the growth with the number of agents is estimated."""
 PANELS = (
     ("decision [ms]", "deciding, per step [ms]", "log"),
     ("learning [ms]", "learning, per step [ms]", "log"),
@@ -48,16 +41,15 @@ PANELS = (
     ("process [MB]", "process, peak [MB]", "linear"),
     ("messages", "messages passed down, per step", "symlog"),
 )
-"""What the figure shows beside evaluation, its titles, and the scale of the axis; agents may pass
-no messages."""
+"""Panels of the figure after that of evaluation: measure, title and scale of the axis."""
 MEMORY = Path("/proc/self/status")
 CLEAR = Path("/proc/self/clear_refs")
 
 
 def measure(trial: Trial) -> TrialResult:
-    """Train and evaluate a team, and note what it takes; imported by name in workers."""
+    """Train and evaluate a team, and measure its time and memory."""
     session = Session.compiled(trial)
-    if CLEAR.exists():  # the peak of the process's memory is counted from now on, in Linux
+    if CLEAR.exists():  # reset the peak memory of the process in Linux
         CLEAR.write_text("5")
     session.train(trial.episodes)
     peak = _peak()
@@ -67,7 +59,7 @@ def measure(trial: Trial) -> TrialResult:
     numbers = {
         "robots": float(len(session.world.groups)),
         "agents": float(len(hierarchy)),
-        "messages": float(hierarchy.messages),
+        "messages": float(hierarchy.n_messages),
         "joint_actions": tried / len(session.deciding),
         "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
         "weight_bytes": float(team.weight_bytes),
@@ -79,7 +71,7 @@ def measure(trial: Trial) -> TrialResult:
     least: list[float] = []
 
     def note(record: StepRecord) -> None:
-        """Note of an episode the least time that a robot is in contact, of that which any is."""
+        """Record the minimum share of contact time of a robot in each episode."""
         if "contact_time" in record.transition.info:
             touching.append(record.transition.info["contact_time"])
             if record.last:
@@ -102,32 +94,32 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def _peak() -> int | None:
-    """Return the peak of this process's resident memory [bytes], where Linux tells it."""
+    """Return the peak resident memory of the process [bytes]; None except in Linux."""
     match = re.search(r"VmHWM:\s+(\d+) kB", MEMORY.read_text()) if MEMORY.exists() else None
     return None if match is None else 1024 * int(match[1])
 
 
 class Point(NamedTuple):
-    """One condition."""
+    """Results of one condition."""
 
     evaluator: str
-    """Its label without the number of robots: the evaluator, and whatever else differs."""
+    """Label without the number of robots, usually the evaluator."""
     bodies: str
-    """What is counted: ``robots``, or what a spec sweeps in place of them."""
+    """Name of the swept size, such as ``robots``."""
     robots: int
     """Number of robots."""
     agents: int
     """Number of agents."""
     period: float | None
-    """What a decision may take to keep up with the robots [s]; none: the scenario has no hurry."""
+    """Decision period of the scenario [s], if it has one."""
     values: dict[str, Estimate]
-    """Estimates by title, see `analyse`."""
+    """Estimates by title."""
     times: dict[str, pd.Series]
-    """By title, times of single seeds."""
+    """Times of single seeds by title."""
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate; 95% intervals, seeds as the unit of sampling. Times are per step."""
+    """Estimate with 95% intervals, with seeds as the unit of sampling; times are per step."""
     conditions = results.of_phase("training")
     sizes = Sizes.of(results, conditions)
     points = [_point(results, c, sizes) for c in conditions]
@@ -175,7 +167,7 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
 
 
 def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:
-    """Return by evaluator the exponent of each of `TIMES` in the number of agents.
+    """Return the exponents of `TIMES` in the number of agents, by evaluator.
 
     A line through the logarithms is fitted for each seed that ran at all sizes.
     """
@@ -192,10 +184,9 @@ def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure.
+    """Return the figure: means over seeds with 95% intervals against the number of robots.
 
-    Points are means over seeds, bars their 95% intervals; evaluators differ by colour and marker,
-    and stand a little beside each other.
+    Evaluators differ by color and marker and are slightly offset.
     """
     from ...presentation import figures  # matplotlib takes its time
 

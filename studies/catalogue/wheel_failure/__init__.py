@@ -1,15 +1,15 @@
-"""The wheel-failure study: what a failing wheel costs, and how a team comes back.
+"""Wheel-failure study: performance loss and recovery after the failure of a wheel.
 
-Agents that leave, ``kind = "left"`` of ``topology.failures``, are a failure of their own.
+Agents that leave (``kind = "left"`` of ``topology.failures``) also count as a failure.
 
-Training goes on through the failure. At its onset the team is also copied: the copy meets the same
-worlds under the same exploration with its weights kept as they are. Conditions that are swept over
-``learner.self_model.enabled`` give all four cases, by what adapts: nothing, the weights, the
-self-model (by which predictions know the wheel has changed), or both.
+Training continues through the failure. At its onset the team is copied, and the copy continues with
+fixed weights under the same initial states and exploration. A sweep over
+``learner.self_model.enabled`` gives four cases of adaptation: nothing, the weights, the self-model,
+which corrects predictions, or both.
 
-Levels are success rates over `BLOCK` episodes: before the failure, just after it, after its end if
-it ends, and at the end of training. Recovery and loss are measured against the level of each seed,
-see `nested_agents.studies.results.recovery`.
+Levels are success rates over `BLOCK` episodes: before the failure, just after its onset, after its
+end if it ends, and at the end of training. Recovery and loss are relative to the level of each
+seed, see `nested_agents.studies.results.recovery`.
 """
 
 from __future__ import annotations
@@ -27,14 +27,8 @@ from ....core.learners.td import FrozenSettings
 from ....core.numerics import pd
 from ....core.plugins.settings import FailureSpan
 from ...errors import SpecError
-from ...results.analysis import (
-    Analysis,
-    Figures,
-    Pair,
-    Summary,
-    estimate_over_seeds,
-    judged,
-)
+from ...results.analysis import Analysis, Figures, Summary, estimate_over_seeds, judged
+from ...results.differences import Pair
 from ...results.notation import wrapped
 from ...results.recovery import BLOCK, FailureCourse, bounded, failure_course
 from ...results.results import KEPT, Results
@@ -50,32 +44,32 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 NUMBERS = ("onset",)
-"""What of whole trials the analysis rests on."""
+"""Numbers of whole trials that the analysis needs."""
 PUBLISHED = ("success",)
-"""Measures of an episode that published results keep."""
+"""Measures in published results."""
 AT_END = "success at the end"
-"""What is compared."""
+"""Title of the compared measure."""
 SWEPT = "learner.self_model.enabled"
-"""What is swept to have every condition with a self-model and without."""
+"""Key that is swept to run each condition with and without a self-model."""
 ADAPTS = {
     ("false", KEPT): "nothing",
     ("false", "training"): "weights",
     ("true", KEPT): "self-model",
     ("true", "training"): "both",
 }
-"""What adapts, by whether the self-model is enabled, and phase."""
+"""Adapting parts, by the value of `SWEPT` and the phase."""
 COLUMNS = 3
-"""Panels of the figure that stand beside each other."""
+"""Maximum number of panels in a row of the figure."""
 FAILING = "#888888"
 """Color of failures in the figure."""
 SHADE = 0.18
 """Opacity of the area of a transient failure."""
 SMOOTHED = 3
-"""Episodes that a point of a curve averages over."""
+"""Number of episodes in the running mean of curves."""
 
 
 def measure(trial: Trial) -> TrialResult:
-    """Train a team through a failure, and a copy that keeps its weights from there on."""
+    """Train a team through a failure, and run a copy with fixed weights from its onset on."""
     onset = trial.settings.onset
     assert onset is not None, "see check"
     session = Session(trial)
@@ -87,8 +81,8 @@ def measure(trial: Trial) -> TrialResult:
 
 
 def check(spec: Spec) -> None:
-    """Raise `SpecError` unless a wheel fails in every condition, after and before some training."""
-    check_rule_bases(spec, "of which a copy keeps its weights")
+    """Raise `SpecError` unless a wheel fails during training in every condition."""
+    check_rule_bases(spec, "because a copy keeps its weights")
     for condition in spec.conditions():
         onset = condition.settings.onset
         if onset is None:
@@ -110,7 +104,7 @@ def check(spec: Spec) -> None:
 
 
 def _keeping_weights(session: Session) -> Team:
-    """Return a copy of the session's team that explores and models itself but keeps its weights."""
+    """Return a copy of the team with fixed weights that explores and updates its self-model."""
     settings = session.trial.settings
     shared = LearnerSettings.model_fields.keys() - {"kind"}
     common = {name: value for name, value in settings.learner if name in shared}
@@ -123,28 +117,28 @@ def _keeping_weights(session: Session) -> Team:
 
 
 class Course(NamedTuple):
-    """Course of a fault with what adapts to it."""
+    """Course of success after a fault, for one case of adaptation."""
 
     fault: str
     """Label of the condition without `SWEPT`."""
     adapts: str
-    """What adapts, see `ADAPTS`; `training` or `KEPT` if self-models were not swept."""
+    """Adapting parts, see `ADAPTS`; the phase if self-models are not swept."""
     spans: tuple[FailureSpan, ...]
-    """Episodes in which failures begin and end, the first failure first."""
+    """First episode of each failure and of the time after it, sorted."""
     measured: FailureCourse
     """Outcomes of the episodes."""
     longest: int | None
-    """Longest episode that is allowed [decisions]."""
+    """Maximum length of an episode [decisions]."""
 
     @property
     def end(self) -> int | None:
-        """Episode from which on nothing fails any more, before training ends; None: never."""
+        """First episode without failures; None if failures last until training ends."""
         ends = [math.inf if end is None else end for _, end in self.spans]
         return int(max(ends)) if max(ends) < self.measured.success.shape[1] else None
 
     @property
     def summary(self) -> Summary:
-        """Line of the table."""
+        """Row of the table."""
         course = self.measured
         estimates = {
             "before": rate(course.before),
@@ -154,7 +148,7 @@ class Course(NamedTuple):
             estimates["failure ends [episode]"] = exactly(self.end)
             estimates["after its end"] = rate(course.from_episode(self.end))
         estimates["end"] = rate(course.end)
-        if course.before.any():  # else there is nothing to lose or to regain
+        if course.before.any():  # otherwise loss and recovery are undefined
             for name, values in course.measured.items():
                 measure = bounded(name, [course], self.longest)
                 estimates[measure.heading] = estimate_over_seeds(values, measure)
@@ -162,30 +156,29 @@ class Course(NamedTuple):
 
 
 def analyse(results: Results) -> Analysis:
-    """Estimate and compare; 95% intervals, seeds as the unit of sampling.
+    """Estimate and compare with 95% intervals, with seeds as the unit of sampling.
 
-    Differences are success at the end of every case minus that of the same fault when nothing
-    adapts.
+    The compared measure is success at the end, relative to the case without adaptation.
     """
     courses = courses_of(results)
     gains, lines = judged({AT_END: _gains(courses)}, "nothing adapting")
-    notes = ["Named after the colon is what adapts to the failure."] if courses else []
+    notes = ["Rows: fault, then the parts that adapt to it."] if courses else []
     if not all(course.measured.before.any() for course in courses):
-        notes.append("No recovery is measured where no episode before the failure succeeded.")
+        notes.append("Recovery is not measured without successes before the failure.")
     idle = max((int((~c.measured.before.any(axis=1)).sum()) for c in courses), default=0)
     if idle:
         notes += wrapped(
-            f"Seeds without a success in the {BLOCK} episodes before the failure have nothing to "
-            f"regain and count as recovered at once. Here there are {idle} at most in a line."
+            f"Seeds without a success in the {BLOCK} episodes before the failure count as "
+            f"recovered at once. A row has at most {idle} of them."
         )
     if any(course.end is not None for course in courses):
-        notes.append("A failure that has ended is over: what comes back then is no adaptation.")
+        notes.append("Recovery after the end of a failure is not adaptation.")
     table = tuple(course.summary for course in courses)
     return Analysis(table, (*notes, *lines), courses, gains)
 
 
 def courses_of(results: Results) -> list[Course]:
-    """Return the cases of all conditions, fault by fault."""
+    """Return the courses of all conditions, sorted by fault."""
     courses = []
     for condition in results.of_phase(KEPT):
         columns = results.columns.get(condition, {})
@@ -202,7 +195,7 @@ def courses_of(results: Results) -> list[Course]:
 
 
 def _numbers_of(spans: Iterable[FailureSpan]) -> dict[str, float]:
-    """Return when failures begin and end as numbers of a trial, see `_spans`.
+    """Return the begin and end of failures as numbers of a trial.
 
     >>> _numbers_of([(20, None), (5, 9)])
     {'onset': 5.0, 'failure_end': 9.0, 'onset.2': 20.0}
@@ -217,7 +210,7 @@ def _numbers_of(spans: Iterable[FailureSpan]) -> dict[str, float]:
 
 
 def _spans(numbers: Mapping[str, Array]) -> tuple[FailureSpan, ...]:
-    """Return when failures begin and end, of numbers that `_numbers_of` made."""
+    """Return the begin and end of failures from numbers of a trial, see `_numbers_of`."""
     spans = []
     for name, values in numbers.items():
         if name.startswith("onset"):
@@ -227,7 +220,7 @@ def _spans(numbers: Mapping[str, Array]) -> tuple[FailureSpan, ...]:
 
 
 def _gains(courses: Sequence[Course]) -> Iterator[Pair]:
-    """Yield every case with that of the same fault in which nothing adapts."""
+    """Yield each case paired with that of the same fault without adaptation."""
     ends = {
         (c.fault, c.adapts): pd.Series(c.measured.end.mean(axis=1), c.measured.seeds)
         for c in courses
@@ -238,11 +231,10 @@ def _gains(courses: Sequence[Course]) -> Iterator[Pair]:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: success from episode to episode, fault by fault.
+    """Return the figure of success by episode with a panel for each fault.
 
-    There is a panel for every fault and a line for what adapts: running means over seeds and
-    episodes with bands for their 95% intervals. Gray lines are where failures begin; gray areas
-    end where transient failures end.
+    Lines are running means over seeds and episodes for each case of adaptation, with bands of 95%
+    intervals. Gray lines mark the onset of failures, gray areas transient failures.
     """
     from ...presentation import figures as f  # matplotlib takes its time
 
@@ -272,13 +264,13 @@ def draw(analysis: Analysis) -> Figures:
     if any(course.end is not None for course in courses):
         handles.append(f.handle("transient failure", color=FAILING, alpha=SHADE, linewidth=8))
     seeds = f.count_seeds(len(course.measured.success) for course in courses)
-    title = f"what adapts\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95% bands"
+    title = f"adapting\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95% bands"
     f.add_legend(figure, handles, title, ncols=4 if len(handles) == 4 else 3)
     return {"wheel-failure": figure}
 
 
 def _mark_failures(axes: Axes, course: Course) -> None:
-    """Draw a line where a failure begins, and an area from there to its end if it ends."""
+    """Mark onsets of failures by lines, and transient failures by areas."""
     for begin, end in course.spans:
         axes.axvline(begin - 0.5, color=FAILING, linewidth=0.8)
         if end is not None:
@@ -286,7 +278,7 @@ def _mark_failures(axes: Axes, course: Course) -> None:
 
 
 def _smoothed(success: Array, cuts: Sequence[int]) -> Array:
-    """Return means over the episode and those before it, but not across the `cuts`."""
+    """Return running means over the last episodes that do not extend across `cuts`."""
     means = []
     for episode in range(success.shape[1]):
         earliest = max((cut for cut in cuts if cut <= episode), default=0)

@@ -1,4 +1,4 @@
-"""The command ``check``: whether scenarios keep what they promise."""
+"""Command ``check``: contract test of scenarios."""
 
 from __future__ import annotations
 
@@ -21,37 +21,37 @@ if TYPE_CHECKING:
     from ...trials.trial import Trial
 
 SHORT = "{:.2g}".format
-"""How numbers are printed."""
+"""Format of the numbers in tables: two significant digits."""
 LESSONS = 8
-"""Episodes from which a predictor has learned when its errors are shown."""
+"""Number of training episodes before the errors of a learned predictor are shown."""
 
 
 class ScenarioCase(NamedTuple):
-    """A scenario that is checked."""
+    """A scenario and the episodes in which it is checked."""
 
     label: str
-    """What it is called."""
+    """Name in the printed lines: the condition, or the function or class."""
     build: Callable[[], object]
-    """Makes it anew."""
+    """Build a new instance of the scenario."""
     episodes: list[int]
-    """Numbers of the episodes that are played: the first, and those in which failures begin."""
+    """Indices of the episodes that are played: the first, and those in which failures begin."""
 
 
 @click.command()
 @click.argument("source", metavar="SPEC.toml|FILE.py:NAME")
-@options.number("--steps", "N", 40, "Most steps of the episodes that are played for it.")
+@options.number("--steps", "N", 40, "Maximum number of steps of each episode.")
 @options.trust
 @options.changes
 def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int:
-    """Check what every scenario must promise, such as equal bits for equal seeds.
+    """Check the contract of scenarios, such as equal results for equal seeds.
 
-    A table shows the values met of every variable beside its range, and the root mean square error
-    of its prediction beside that of persistence, as if all stayed as it is. Where agents learn to
-    predict, a second table shows the errors of that after a few episodes.
+    A table shows the range and the observed values of every variable, and the root mean square
+    errors of its prediction and of persistence. If agents learn a model, a second table shows
+    its errors after a few episodes.
 
-    SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
-    file that makes a scenario of one's own. A class with a nested class Settings is given these
-    with their defaults.
+    With SPEC.toml, the scenario of each condition is checked. With FILE.py:NAME, the scenario that
+    this function or class of a Python file builds is checked. A class with a nested class Settings
+    gets the default settings.
     """
     from pandas import DataFrame
 
@@ -60,30 +60,32 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
 
     is_spec = not source.partition(":")[0].endswith(".py")
     if not is_spec and changes:
-        raise SpecError("--set: lays values over a spec, not over a Python file")
+        raise SpecError("--set: changes a spec, and a Python file is none; allowed with SPEC.toml")
     if is_spec and trust:
         trust_beside(Path(source))
     cases = _cases_of_spec(source, changes) if is_spec else [_case_of_file(source)]
     faults = 0
     for case in cases:
         try:
-            findings = check_scenario(case.build, steps=steps, episodes=case.episodes)
+            report = check_scenario(case.build, steps=steps, episodes=case.episodes)
         except ScenarioError as error:
             faults += 1
             print_text(f"FAULT   {case.label}: {error}")
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            for kind, text in findings.remarks():
+            for kind, text in report.remarks():
                 label = f"{case.label}: " if kind == "passed" else ""
                 print_wrapped(f"{label}{text}", f"{kind}  ", 8)
-            frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
+            frame = DataFrame(report.variables)
             _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
     if is_spec and not faults:
         faults += _report_order(source, changes, steps)
     if is_spec and not faults:
         for label, errors in _learned_errors(source, changes, steps):
-            print_wrapped(f"{label}: what {LESSONS} episodes teach to predict", "learned  ", 8)
+            print_wrapped(
+                f"{label}: prediction errors after {LESSONS} training episodes", "learned  ", 8
+            )
             _print_frame(errors.to_string(float_format=SHORT))
     return 1 if faults else 0
 
@@ -93,7 +95,7 @@ def _print_frame(text: str) -> None:
 
 
 def _report_order(source: str, changes: tuple[str, ...], steps: int) -> bool:
-    """Say that trials depend on what ran before them; return whether they do."""
+    """Print and return whether the results of a trial depend on the trials before it."""
     from ...spec.spec import Spec
     from ...trials.order import fault_of_order, has_programs
     from ...trials.trial import trials_of
@@ -106,7 +108,7 @@ def _report_order(source: str, changes: tuple[str, ...], steps: int) -> bool:
     if fault:
         print_text(f"FAULT   order of trials: {fault}")
     else:
-        print_wrapped("order of trials: the same rows in two orders", "passed  ", 8)
+        print_wrapped("order of trials: two orders gave the same results", "passed  ", 8)
     return bool(fault)
 
 
@@ -133,7 +135,7 @@ def _learned_errors(
 
 
 def _learned_predictor(trial: Trial) -> LearnedPredictorSettings | None:
-    """Return how the agents of a trial learn to predict, if they do."""
+    """Return the settings of the learned predictor of a trial; None without one."""
     from ....core.adaptation.predictors import LearnedPredictorSettings
     from ....core.learners import LearnerSettings
 
@@ -144,7 +146,7 @@ def _learned_predictor(trial: Trial) -> LearnedPredictorSettings | None:
 
 
 def _case_of_file(source: str) -> ScenarioCase:
-    """Return what is to be checked of a function or class in a Python file."""
+    """Return the scenario that a function or class in a Python file builds."""
     with refused():
         build = _factory_of(source)
     try:
@@ -156,7 +158,7 @@ def _case_of_file(source: str) -> ScenarioCase:
 
 
 def _factory_of(source: str) -> Callable[[], object]:
-    """Return what makes a scenario of one's own, by its own settings as they are by default."""
+    """Return a function that builds the scenario of a Python file with its default settings."""
     from ....core.plugins.sources import active
     from ....scenarios import SCENARIOS
 
@@ -171,7 +173,7 @@ def _factory_of(source: str) -> Callable[[], object]:
 
 
 def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCase]:
-    """Yield what is to be checked of a spec, each scenario once."""
+    """Yield the distinct scenarios of the conditions of a spec."""
     from ....core.interface.plain import as_scenario
     from ....core.learners import check_prediction
     from ...spec.spec import Spec

@@ -41,7 +41,7 @@ def presets(name: str | None) -> int:
 
     settings = resolve(name, {}, {}).settings
     if defaults := settings.scenario.scenario_defaults(name):
-        print_text("# What this scenario lays over the preset, as it is set here:")
+        print_text("# Changes of the preset by this scenario:")
         print_text(*(f"# {line}" for line in dumps(defaults).splitlines() if line), "")
     print_data(dumps(settings.model_dump()))
     return 0
@@ -242,13 +242,13 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
 @click.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.number("--seconds", "S", 1.0, "How long each condition is timed [s].")
-@options.formats("table", "csv", text="How to print it; CSV has times of parts in seconds.")
+@options.formats("table", "csv", text="Output format; CSV has the times of parts in seconds.")
 @options.changes
 def profile(spec: Path, seconds: float, form: str, changes: tuple[str, ...]) -> int:
-    """Tell what the time of a decision goes to, condition by condition, and what it tries.
+    """Show the time of a decision part by part, and the joint actions that it tries.
 
-    Every condition of SPEC.toml acts and learns for a while; nothing is kept. Its processor time is
-    told by part, and the joint actions that its evaluator tries beside those that formulas count.
+    Each condition of SPEC.toml acts and learns for a while; nothing is kept. The table has the
+    processor time by part, and compares the joint actions tried with the formulas.
     """
     from ...cost.profile import profile as profile_of
     from ...presentation.progress import say
@@ -281,7 +281,7 @@ def list_all() -> int:
 
 
 class TeamOptions(TypedDict):
-    """Whose hierarchy is shown."""
+    """Agents of the hierarchy."""
 
     agents: int | None
     robots: int | None
@@ -302,7 +302,7 @@ class TeamOptions(TypedDict):
     "--robots",
     type=click.IntRange(1),
     metavar="N",
-    help="Number of robots, whose agents are consecutive; default: one for every two agents.",
+    help="Number of robots with consecutive agents; default: one for every two agents.",
 )
 @click.option(
     "--per",
@@ -327,10 +327,10 @@ def show(
     plot: Path | None,
     **team: Unpack[TeamOptions],
 ) -> int:
-    """Show a topology: edges, order of decision, who sees whom, cost.
+    """Show a topology: edges, order of decision, communication, lookahead, cost.
 
     SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json,
-    teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
+    teams.json, ...; or the spec of a study, which shows its hierarchies over its agents.
     """
     from ....topologies.view import format_view, view
 
@@ -339,8 +339,8 @@ def show(
         if views is None:
             views = [view(topology, **team)]
         elif team["agents"] or team["robots"] or team["per"] != "actuator":
-            whose = "is the spec of a study" if scenario is None else f"over {scenario}"
-            raise SpecError(f"{topology}: {whose}, which says its own agents")
+            source = "the study" if scenario is None else f"the scenario {scenario}"
+            raise SpecError(f"{topology}: {source} defines the agents; omit the options for agents")
         for number, hierarchy in enumerate(views, 1):
             if plot is not None:
                 several = f"-{number}" if len(views) > 1 else ""
@@ -378,7 +378,7 @@ def _of_spec(path: str) -> list[view.HierarchyView] | None:
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except ValueError:
-        return None  # whoever reads it as a topology says why
+        return None  # the reader of topologies says why
     if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
         return None
 

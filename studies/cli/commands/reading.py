@@ -38,7 +38,7 @@ from ..loading import (
 )
 
 PERIOD = 2.0
-"""How often a study that is watched is looked at [s]."""
+"""Polling interval of a watched study [s]."""
 
 
 @click.command()
@@ -47,7 +47,7 @@ PERIOD = 2.0
 def status(directory: Path, watch: bool) -> int:
     """Tell how many trials are done, running, failed (with the reason) and left, and for how long.
 
-    DIR is where the study is kept, whoever runs it; looking at it disturbs nothing.
+    DIR is the folder of the study. Reading it does not disturb a run.
     """
     if watch and sys.stdout.isatty():
         _watch(directory)
@@ -113,7 +113,7 @@ def table(
 
 
 class Compared(TypedDict):
-    """What is compared, see `StudyResults.compare`."""
+    """Options of `StudyResults.compare`."""
 
     by: str | None
     measure: str | None
@@ -308,7 +308,7 @@ def _contents(store: Store, form: Files) -> dict[str, bytes]:
 def report(directory: Path, out: Path | None, trust: bool) -> int:
     """Write a study as one self-contained HTML file: verdict, table, figures, replays, spec.
 
-    DIR is where the study is kept; it may be unfinished.
+    DIR is the folder of the study, which may be unfinished.
     """
     path = load_results([directory], trust=trust).report(out)
     if left_out := untrusted(directory):
@@ -326,13 +326,16 @@ def report(directory: Path, out: Path | None, trust: bool) -> int:
     "--condition", metavar="LABEL", help="Label of the condition; by default the first one."
 )
 @click.option("--seed", type=int, metavar="SEED", help="The seed; by default the first one.")
+@click.option("--full", is_flag=True, help="Print all rules and tables, not only the summary.")
 @options.trust
-def explain(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
+def explain(
+    directory: Path, condition: str | None, seed: int | None, full: bool, trust: bool
+) -> int:
     """Explain a trained team: its rules in words, its policy, its self-model.
 
-    DIR is where the study is kept. Text and figures go into its folder explain. Unless the study
-    keeps its teams (keep_teams = true in its spec), training is run again, which takes seconds, and
-    must give the episodes that are kept.
+    DIR is the folder of the study. The text with all rules and the figures are written to its
+    folder explain. Unless the study keeps its teams (keep_teams = true in its spec), the training
+    is repeated, which takes seconds, and must give the same episodes.
     """
     from ...api.explaining import explain_team
     from ...presentation.figures import save
@@ -345,6 +348,6 @@ def explain(directory: Path, condition: str | None, seed: int | None, trust: boo
     written = explained.folder / "explanation.txt"
     durable.write(written, explained.text.encode())
     figures = save(explained.figures, explained.folder)
-    print_text(str(explained))
+    print_text(explained.text if full else str(explained))
     print_text(written, *figures)
     return 0

@@ -102,7 +102,7 @@ def run(
             raise
         raise SpecError(
             f"{error}; if you did not edit {spec}, it is damaged: {command_line('retry', out)} "
-            "goes on by the database"
+            "continues from the database"
         ) from None
     return show_results(run(changed, out, observer=Terminal(), **running), figures)
 
@@ -156,7 +156,7 @@ def tune(
 
 
 class Supposed(TypedDict):
-    """What a plan supposes."""
+    """Assumptions of a plan."""
 
     jobs: int | None
     deviation: float | None

@@ -284,7 +284,7 @@ def test_what_it_cannot_regress_is_refused() -> None:
     alone.state_space = StateSpace("alone", alone.state_space.variables, 3)
     with pytest.raises(ValueError, match="are an agent's own"):
         LearnedPredictor(LEARNED, alone)
-    with pytest.raises(ValueError, match="does not tell what a mirror does"):
+    with pytest.raises(ValueError, match="declares no mirror symmetry"):
         LearnedPredictor(LearnedPredictorSettings(mirrored=True), Rails())
 
 

@@ -11,7 +11,7 @@ from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.rules.rule_base import RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.world.settings import RobotSettings, WheelSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings

@@ -71,7 +71,7 @@ def test_any_hierarchy() -> None:
     star = Hierarchy("abcd", [("a", "b"), ("a", "c"), ("a", "d")])
     assert below_counts(star) == (3, 0, 0, 0)
     assert PAPER.nested(below_counts(star)) == 450 * 78125 * (16**4 + 3 * 16)
-    assert PAPER.decision(below_counts(star)) == star.joint_actions(4) == 4**4 + 3 * 4
+    assert PAPER.decision(below_counts(star)) == star.count_joint_actions(4) == 4**4 + 3 * 4
     assert not is_chain(below_counts(star))
 
 

@@ -23,7 +23,7 @@ from nested_agents.core.interface.plain import as_prediction
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
-from nested_agents.core.rules.rule_base import RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.checking.checker import check_scenario

@@ -169,7 +169,7 @@ def test_slots_follow_who_is_told() -> None:
     assert [slot.agents.tolist() for slot in one_by_one] == [[0], [1], [2], [3]]
     assert one_by_one[3].senders.tolist() == [0, 2]
     assert one_by_one[3].receivers.tolist() == [3, 3]
-    silent = Hierarchy("abc", [("a", "b"), ("b", "c")], told="none")
+    silent = Hierarchy("abc", [("a", "b"), ("b", "c")], communication="none")
     assert [slot.agents.tolist() for slot in slots_of(silent, [0] * 3, [True])] == [[0, 1, 2]]
 
 
@@ -184,7 +184,9 @@ def test_a_reward_of_a_terminal_state_that_does_not_absorb_is_received_once(worl
         seen = look(world, states)
         ended = Transition(states, 2.0, True, False, {}, absorbing=absorbing)
         team.learn(Experience(seen, team.act(seen), ended, last=True))
-        values = fuzzy(team).rules.each(fuzzy(team).learner.theta, states[:, None])[:, 0]
+        values = fuzzy(team).rules.values_of_agents(fuzzy(team).learner.theta, states[:, None])[
+            :, 0
+        ]
         assert values == pytest.approx(value)
 
 

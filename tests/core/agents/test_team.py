@@ -184,8 +184,8 @@ def test_a_team_of_other_size_is_refused(world, line_world, tmp_path: Path) -> N
 def test_bounds_of_traces_by_other_rows_are_refused(world) -> None:
     team = team_of("td-lambda, paper", world)
     arrays = team.arrays()
-    arrays["learner.reach"] = arrays["learner.reach"][:, :-1]
-    with pytest.raises(ValueError, match=r"saved learner.reach has shape"):
+    arrays["learner.trace"] = arrays["learner.trace"][:, :-1]
+    with pytest.raises(ValueError, match=r"saved learner.trace has shape"):
         team.restore(arrays)
 
 

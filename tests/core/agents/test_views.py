@@ -17,11 +17,11 @@ from nested_agents.core.learners.batch import BatchTDSettings
 SEED = np.random.SeedSequence(7)
 
 
-def team_of(world, told: str = "ancestors", **decision) -> Team:
+def team_of(world, communication: str = "ancestors", **decision) -> Team:
     settings = BatchTDSettings(
         decision=DecisionSettings(**{"evaluator": "best-response"} | decision)
     )
-    hierarchy = Hierarchy(world.agents, list(pairwise(world.agents)), told=told)
+    hierarchy = Hierarchy(world.agents, list(pairwise(world.agents)), communication=communication)
     team = Team(settings, world, hierarchy, SEED)
     rng = np.random.default_rng(3)
     theta = team.only(FuzzyAgents).learner.theta
@@ -72,21 +72,21 @@ def test_what_was_expected_and_communicated_is_measured(world) -> None:
     assert plain.costs == ()
     told = team_of(world, value_of="own", errors=ErrorSettings(weights=0.2))
     told.act(seen, explore=False)
-    assert told.spent["told"] == 3.0
+    assert told.spent["received"] == 3.0
     assert told.spent["broadcast"] == 6.0
     assert 0.0 <= told.spent["agreement"] <= 1.0
     silent = team_of(world, "none", value_of="own", errors=ErrorSettings(weights=0.2))
     silent.act(seen, explore=False)
-    assert silent.spent["told"] == 0.0
+    assert silent.spent["received"] == 0.0
 
 
 def test_who_makes_no_plans_has_no_agreement(world) -> None:
     team = team_of(world, evaluator="exact", errors=ErrorSettings(weights=0.2))
     world.reset(0)
     team.act(look(world, world.present()), explore=False)
-    assert {m.name for m in team.costs} >= {"told", "broadcast"}
+    assert {m.name for m in team.costs} >= {"received", "broadcast"}
     assert "agreement" not in team.spent
-    assert (team.spent["told"], team.spent["broadcast"]) == (3.0, 6.0)
+    assert (team.spent["received"], team.spent["broadcast"]) == (3.0, 6.0)
 
 
 def test_agents_without_errors_that_tell_expect_what_is_done(world) -> None:

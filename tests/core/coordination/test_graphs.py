@@ -59,15 +59,15 @@ def test_the_order_has_the_width_that_is_told():
         assert sorted(order) == list(range(12))
         left, widest = graph.copy(), 0
         for agent in order:
-            beside = set(left[agent])
-            widest = max(widest, len(beside))
+            neighbors = set(left[agent])
+            widest = max(widest, len(neighbors))
             left.remove_node(agent)
-            left.add_edges_from((a, b) for a in beside for b in beside if a < b)
+            left.add_edges_from((a, b) for a in neighbors for b in neighbors if a < b)
         assert widest <= width
         elimination = Elimination(pairwise(graph), 12, 2)
-        beside = [len(step.beside) for step in elimination._steps]
-        assert max(beside) == widest
-        assert Problem(actions=2).decision(beside) <= 12 * 2 ** (1 + width)
+        neighbors = [len(step.neighbors) for step in elimination._steps]
+        assert max(neighbors) == widest
+        assert Problem(actions=2).decision(neighbors) <= 12 * 2 ** (1 + width)
 
 
 def test_max_plus_is_exact_on_trees():

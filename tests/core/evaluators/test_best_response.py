@@ -5,7 +5,6 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from nested_agents.core.evaluators import best_response
 from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
 from nested_agents.core.evaluators.enumeration import (
     AutoSettings,
@@ -25,7 +24,7 @@ from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.numerics import FloatArray
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2
@@ -61,7 +60,7 @@ def rules(world) -> RuleBase:
 
 def asked(agent, world, theta, hierarchy, rng) -> Deliberation:
     joint = np.full(4, NEUTRAL)
-    above = list(hierarchy.above(agent))
+    above = list(hierarchy.senders(agent))
     joint[above] = rng.integers(A, size=len(above))
     return Deliberation(agent, joint, world.predict(), theta, np.full((4, A), 1 / A), rng)
 
@@ -83,7 +82,7 @@ def test_whose_value_decides(name, value_of, rule, world, rules) -> None:
     theta = rng.normal(size=(4, rules.n_rules))
     for agent in range(4):
         deliberation = asked(agent, world, theta, problem.hierarchy, rng)
-        below = problem.hierarchy.below(agent)
+        below = problem.hierarchy.searched(agent)
         expected = np.full(A, -np.inf)
         for own, *actions in product(range(A), repeat=1 + len(below)):
             joint = deliberation.joint_action.copy()
@@ -108,7 +107,7 @@ def test_values_are_those_of_joint_actions_that_keep_what_is_decided(
         found, best = search.values(deliberation), exact.values(deliberation)
         assert (found <= best + 1e-12).all()
         assert found.max() >= np.median(best)
-        if not set(problem.hierarchy.below(agent)) - set(world.groups[agent // 2]):
+        if not set(problem.hierarchy.searched(agent)) - set(world.groups[agent // 2]):
             assert found == pytest.approx(best, rel=0, abs=1e-12)
         assert (deliberation.joint_action == before).all()
 
@@ -228,14 +227,14 @@ def decided(
     )
     problem = DecisionProblem(
         rules, hierarchy, A, tuple((i,) for i in range(n)), "reward", "best-response", 0.9,
-        value_of, unseen, plan, hierarchy.told == "ancestors",
+        value_of, unseen, plan, hierarchy.communication == "ancestors",
     )  # fmt: skip
     search = BestResponseSettings(sweeps=sweeps).build(problem)
     rng = np.random.default_rng(seed)
     prediction = prediction or InStep()
     joint, values = np.full(n, NEUTRAL), []
     for agent in hierarchy.order:
-        told = np.array(hierarchy.above(agent), dtype=np.int64)
+        told = np.array(hierarchy.senders(agent), dtype=np.int64)
         known = np.full(n, NEUTRAL)
         known[told] = joint[told]
         deliberation = Deliberation(
@@ -277,21 +276,6 @@ def test_every_sweep_goes_over_all_bodies(sweeps: int, tried: int) -> None:
     assert sum(prediction.tried) == tried
 
 
-@pytest.mark.parametrize("sweeps", [1, 2])
-def test_bodies_valued_ahead_decide_as_one_by_one(monkeypatch, sweeps: int) -> None:
-    """The first departs from the plan, so that what was valued ahead is valued anew."""
-    runs, calls = [], []
-    for most in (1, 4):
-        monkeypatch.setattr(best_response, "MOST_AHEAD", most)
-        noted = Noted()
-        runs.append(
-            decided(Hierarchy(NAMES, PAIRS), 2, prediction=noted, sweeps=sweeps, value_of="team")
-        )
-        calls.append(len(noted.tried))
-    np.testing.assert_array_equal(*runs)
-    assert calls[1] < calls[0]
-
-
 NAMES = tuple("abcdef")
 PAIRS = list(pairwise(NAMES))
 ALL = [(a, b) for k, a in enumerate(NAMES) for b in NAMES[k + 1 :]]
@@ -302,9 +286,9 @@ ALL = [(a, b) for k, a in enumerate(NAMES) for b in NAMES[k + 1 :]]
     ("hierarchy", "unseen"),
     [
         (Hierarchy(NAMES, [], ALL), "maintain"),
-        (Hierarchy(NAMES, PAIRS, told="none"), "maintain"),
-        (Hierarchy(NAMES, PAIRS, told="none"), "plan"),
-        (Hierarchy(NAMES, PAIRS, told="none", considers="children"), "plan"),
+        (Hierarchy(NAMES, PAIRS, communication="none"), "maintain"),
+        (Hierarchy(NAMES, PAIRS, communication="none"), "plan"),
+        (Hierarchy(NAMES, PAIRS, communication="none", lookahead="children"), "plan"),
     ],
 )
 def test_who_is_told_nothing_learns_nothing_of_what_others_decide(hierarchy, unseen, plan) -> None:
@@ -323,14 +307,14 @@ def test_a_common_plan_carries_nothing_from_who_is_told_to_who_is_not() -> None:
 
 @pytest.mark.parametrize("plan", ["private", "common"])
 def test_who_is_told_answers(plan) -> None:
-    for hierarchy in (Hierarchy(NAMES, PAIRS), Hierarchy(NAMES, PAIRS, told="parents")):
+    for hierarchy in (Hierarchy(NAMES, PAIRS), Hierarchy(NAMES, PAIRS, communication="parents")):
         answers = [decided(hierarchy, first, plan)[1].argmax() for first in range(A)]
         assert answers == list(range(A))
 
 
 def test_agents_with_a_common_plan_agree_without_a_word() -> None:
     """All are equally good who do the same: private plans break ties apart, a common one not."""
-    silent = Hierarchy(NAMES, PAIRS, told="none")
+    silent = Hierarchy(NAMES, PAIRS, communication="none")
 
     def chosen(plan: str, seed: int) -> int:
         values = decided(silent, 0, plan, "plan", seed)
@@ -343,7 +327,7 @@ def test_agents_with_a_common_plan_agree_without_a_word() -> None:
 def test_a_common_plan_needs_somebody_who_plans_for_others(world, rules) -> None:
     apart = Hierarchy(world.agents, [])
     fields = vars(problem_of(world, rules, "chain", "own")) | {"plan": "common", "hierarchy": apart}
-    with pytest.raises(ValueError, match="plan = 'common': nobody considers another"):
+    with pytest.raises(ValueError, match="plan = 'common': no agent searches"):
         BestResponse(DecisionProblem(**fields))
     assert BestResponse(DecisionProblem(**fields | {"unseen": "plan"})).plans
 

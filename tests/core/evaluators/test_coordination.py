@@ -39,7 +39,7 @@ def test_the_team_takes_the_joint_action_of_the_greatest_sum(evaluator, topology
         sums = np.zeros(len(joint))
         for i in range(4):
             supposed = np.full_like(joint, team.action_set.neutral)
-            scope = [i, *team.hierarchy.below(i)]
+            scope = [i, *team.hierarchy.searched(i)]
             supposed[:, scope] = joint[:, scope]
             states = prediction.states(i, supposed)
             sums += fuzzy(team).evaluator.rules.values(fuzzy(team).learner.theta[i], states)

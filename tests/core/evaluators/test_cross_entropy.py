@@ -12,7 +12,7 @@ from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberatio
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.studies.spec.spec import Spec
@@ -110,8 +110,8 @@ def test_boxes_go_on_from_where_they_are_predicted_to_be() -> None:
     world.reset(3, 0)
     prediction, joint_action = world.predict(), np.array([0, 1, 0, 0])
     onward, reached = prediction.after(joint_action), prediction.poses(joint_action[None])
-    np.testing.assert_array_equal(onward.situation.box, reached.box[0])
-    np.testing.assert_array_equal(onward.situation.robots, reached.robots[0])
+    np.testing.assert_array_equal(onward.situation.box, reached.boxes[:, 0])
+    np.testing.assert_array_equal(onward.situation.robots, reached.robots[:, :, 0])
     np.testing.assert_array_equal(onward.situation.speeds, prediction.commands(joint_action))
     still = onward.after(np.full(4, 3)).poses(np.full((1, 4), 3))
-    np.testing.assert_allclose(still.robots[0], onward.situation.robots, atol=1e-3)
+    np.testing.assert_allclose(still.robots[:, :, 0], onward.situation.robots, atol=1e-3)

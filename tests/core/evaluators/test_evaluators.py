@@ -10,7 +10,7 @@ import pytest
 
 from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.evaluators.enumeration import (
-    MOST_JOINT_ACTIONS,
+    MAX_JOINT_ACTIONS,
     ExactEnumeration,
     Sampling,
     SamplingSettings,
@@ -21,7 +21,7 @@ from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberatio
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks, Prediction, Tables
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2
@@ -124,11 +124,11 @@ def brute_force(
     gathered = []
     for own in range(A):
         values, weights = [], []
-        for actions in product(range(A), repeat=len(hierarchy.below(agent))):
+        for actions in product(range(A), repeat=len(hierarchy.searched(agent))):
             joint = np.array(joint_action)
             joint[agent] = own
             weight = 1.0
-            for other, action in zip(hierarchy.below(agent), actions, strict=True):
+            for other, action in zip(hierarchy.searched(agent), actions, strict=True):
                 joint[other] = action
                 weight *= frequencies[other, action]
             reward = prediction.rewards(joint[None])[0]
@@ -156,7 +156,7 @@ def test_enumeration_is_brute_force(
     exact, all_sampled = ExactEnumeration(common), Sampling(SamplingSettings(samples=A**3), common)
     for agent in range(4):
         joint = np.full(4, NEUTRAL)
-        joint[list(hierarchy.above(agent))] = rng.integers(A, size=len(hierarchy.above(agent)))
+        joint[list(hierarchy.senders(agent))] = rng.integers(A, size=len(hierarchy.senders(agent)))
         before = joint.copy()
         asked = Deliberation(agent, joint, prediction, theta, frequencies, rng)
         expected = brute_force(
@@ -165,7 +165,7 @@ def test_enumeration_is_brute_force(
         assert exact.values(asked) == pytest.approx(expected, rel=0, abs=1e-12)
         assert all_sampled.values(asked) == pytest.approx(expected, rel=0, abs=1e-12)
         assert (joint == before).all()
-    tried = hierarchy.joint_actions(A)
+    tried = hierarchy.count_joint_actions(A)
     evaluations = 0 if rule == "reward" else tried * rules.n_rules
     for counts in (exact.counts, all_sampled.counts):
         assert (counts.joint_actions, counts.rule_evaluations) == (tried, evaluations)
@@ -304,7 +304,7 @@ def test_too_many_joint_actions_are_refused() -> None:
     names = [f"agent{i}" for i in range(13)]
     edges = [("agent0", name) for name in names[1:]]
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
-    assert MOST_JOINT_ACTIONS == A**11
+    assert MAX_JOINT_ACTIONS == A**11
     with pytest.raises(
         ValueError,
         match=r"^learner\.decision\.evaluator: 4 \*\* 12 joint actions of 12 agents would be",

@@ -49,19 +49,19 @@ def test_whoever_is_there_keeps_its_ancestors_by_grandparents_alone(seed, gone) 
     whole = Hierarchy(names, edges)
     by_rule = {rule: without(whole, sorted(gone), rule) for rule in ("grandparents", "none")}
     for agent in set(range(7)) - gone:
-        there = set(whole.above(agent)) - gone
-        assert set(by_rule["grandparents"].above(agent)) == there
-        assert set(by_rule["none"].above(agent)) <= there
-        assert all(not by_rule[rule].above(one) for one in gone for rule in by_rule)
+        there = set(whole.senders(agent)) - gone
+        assert set(by_rule["grandparents"].senders(agent)) == there
+        assert set(by_rule["none"].senders(agent)) <= there
+        assert all(not by_rule[rule].senders(one) for one in gone for rule in by_rule)
 
 
 def test_neighbours_of_who_leaves_are_joined_by_no_rule() -> None:
     line = Hierarchy("abc", [], [("a", "b"), ("b", "c")])
-    assert without(line, [1], "grandparents").neighbours == ()
+    assert without(line, [1], "grandparents").neighbors == ()
 
 
 def test_who_is_told_changes_when_agents_leave_and_come_back() -> None:
-    chain = Hierarchy("abcd", list(pairwise("abcd")), told="parents")
+    chain = Hierarchy("abcd", list(pairwise("abcd")), communication="parents")
     left = LeftAgents(agents="b", episode=1, step=1, end_episode=2)
     messages = Messages(chain, [left], n_actions=4)
     heard = []

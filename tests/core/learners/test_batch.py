@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
-from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.rule_base import RuleBase
 
 TABLE = RuleBase([Partition((0.0, 1.0, 2.0, 3.0, 4.0), "triangular")], [(0,)])
 

@@ -15,7 +15,7 @@ from nested_agents.core.interface.experience import Experience, Observation
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import REWARD_SCALE
 from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
 from nested_agents.studies.spec.spec import Spec
 
@@ -140,7 +140,7 @@ def chain(**keys: object) -> Hierarchy:
 
 
 def test_an_agent_sees_what_its_parents_decided_and_nothing_else() -> None:
-    told, did = told_in(team(chain(told="parents")))
+    told, did = told_in(team(chain(communication="parents")))
     assert told.shape == (20, 3, 1)
     assert (told[:, 0] == 3).all(), "of nobody"
     np.testing.assert_array_equal(told[:, 1:, 0], did[:, :2])
@@ -151,14 +151,14 @@ def test_an_agent_sees_what_its_ancestors_decided_in_the_order_of_decision() -> 
     told, did = told_in(team(Hierarchy(names, [("agent3", "agent1"), ("agent1", "agent2")])))
     np.testing.assert_array_equal(told[:, 1], did[:, [2, 0]])
     np.testing.assert_array_equal(told[:, 0, 0], did[:, 2])
-    assert told_in(team(chain(told="none")))[0].shape == (20, 3, 0)
+    assert told_in(team(chain(communication="none")))[0].shape == (20, 3, 0)
 
 
 @pytest.mark.parametrize("unseen", ["maintain", "last"])
 def test_a_lost_message_is_read_as_the_decision_says(unseen: str) -> None:
     lost = LostMessages(agents="agent1")
     decision = DecisionSettings(unseen=unseen)
-    told, did = told_in(team(chain(told="parents"), lost, decision=decision))
+    told, did = told_in(team(chain(communication="parents"), lost, decision=decision))
     before = np.append(0, did[:-1, 0])  # at first it is taken to have maintained
     np.testing.assert_array_equal(told[:, 1, 0], before if unseen == "last" else 0 * before)
     np.testing.assert_array_equal(told[:, 2, 0], did[:, 1])
@@ -210,7 +210,7 @@ def test_messages_have_no_mirror_image() -> None:
 
 def test_neighbours_are_refused_as_they_tell_nothing() -> None:
     names = ("agent1", "agent2", "agent3")
-    with pytest.raises(ValueError, match=r"set topology\.oriented"):
+    with pytest.raises(ValueError, match=r"set topology\.decision_order"):
         team(Hierarchy(names, [], [names[:2]]))
 
 
@@ -287,12 +287,12 @@ def test_experience_of_others_who_tell_is_that_of_nobody() -> None:
 def test_products_that_are_none_without_those_who_tell_are_refused() -> None:
     products = RuleBaseSettings(products=(("gap", "told1", "told2"),))
     before = made(2, rule_base=products)[0]
-    with pytest.raises(ValueError, match="is told by fewer others than when it learned"):
+    with pytest.raises(ValueError, match="receives fewer messages than when it learned"):
         made(1)[0].continue_from(before, np.arange(2))
 
 
 def test_a_topology_that_says_whom_agents_consider_is_remarked_on() -> None:
-    silent = {"kind": "chain", "considers": "none"}
+    silent = {"kind": "chain", "lookahead": "none"}
     spec = Spec(preset="fitted-q", scenario={"kind": "line-up"}, topology=silent)
-    told = "topology.considers: left out, learner.kind = 'fitted-q' considers nobody"
+    told = "topology.lookahead: left out, learner.kind = 'fitted-q' has no lookahead"
     assert any(told in line for c in spec.conditions() for line in c.settings.warnings())

@@ -11,8 +11,8 @@ from nested_agents.core.learners.td import (
     TDLambda,
     TDLambdaSettings,
 )
-from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.rule_base import RuleBase
 
 TABLE = RuleBase([Partition((0.0, 1.0, 2.0), "triangular")], [(0,)])
 

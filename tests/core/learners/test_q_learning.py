@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.learners.td import QLearningSettings
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 PLACE = Variable("place", "1", 0, 2, centres=(0.0, 1.0, 2.0))
 MOVE = Variable("move", "1", 0, 1, centres=(0.0, 1.0))
@@ -46,5 +46,5 @@ def test_it_finds_the_action_values_whatever_is_done() -> None:
 
 def test_a_state_space_without_actions_is_refused() -> None:
     bare = StateSpace("walk", (MOVE, PLACE), 1)
-    with pytest.raises(ValueError, match="holds no actions to maximise over, use td-lambda"):
+    with pytest.raises(ValueError, match="includes no actions to maximize over, use td-lambda"):
         QLearningSettings().build(RuleBase.build(bare, FULL), np.array([0]))

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rule_oracles as oracle
+import values_oracle as oracle
 
 from nested_agents.core.interface.scenario import rows_of
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.learners.learner import Learner
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
-from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.rule_base import RuleBase
 
 LEARNING: dict[str, dict[str, Any]] = {
     "batch-td": {"kind": "batch-td", "ridge": 0.1, "interval": 4, "trace_decay": 0.5},

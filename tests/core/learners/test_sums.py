@@ -9,8 +9,8 @@ from nested_agents.core.learners.td import (
     ValueDecomposition,
     ValueDecompositionSettings,
 )
-from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.rule_base import RuleBase
 
 FUZZY = RuleBase([Partition((-1.0, 0.0, 1.0), "triangular")], [(0,)])
 LEARNERS = {
@@ -63,7 +63,7 @@ def test_the_sum_learns_what_the_team_is_paid(kind):
         paid = np.abs(places[:, 0])
         made.observe(places, paid if kind == "sparse" else float(paid.sum()), False)
     places = rng.uniform(-1, 1, (3, 1))
-    found = made.rules.each(made.theta, places[:, None])[:, 0].sum()
+    found = made.rules.values_of_agents(made.theta, places[:, None])[:, 0].sum()
     assert found == pytest.approx(np.abs(places).sum(), abs=0.02)
 
 

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rule_oracles as oracle
+import values_oracle as oracle
 
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
-from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.rule_base import RuleBase
 
 LOW_HIGH = Partition((0.0, 1.0), "triangular")
 EIGHT_RULES = RuleBase([LOW_HIGH] * 3, [(0, 1, 2)])

@@ -6,7 +6,7 @@ import pytest
 import nested_agents as na
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.learners.written import Written, WrittenSettings
-from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
@@ -92,7 +92,8 @@ def test_the_preset_has_the_value_of_its_scenario(scenario, own, value) -> None:
 
 def test_a_value_of_nothing_is_said_to_be_one() -> None:
     spec = Spec.of({"preset": "hand-written", "seeds": 1, "scenario": {"kind": "line-up"}})
-    assert any(line.startswith("learner.value: nothing is worth") for line in spec.warnings())
+    expected = "learner.value = {}: all states have the value 0"
+    assert any(line.startswith(expected) for line in spec.warnings())
 
 
 @pytest.mark.slow

@@ -107,11 +107,11 @@ def test_turns_and_messages_by_hand() -> None:
 
 
 def test_parents_alone_are_heard() -> None:
-    chain = Hierarchy("abc", pairwise("abc"), told="parents")
+    chain = Hierarchy("abc", pairwise("abc"), communication="parents")
     slots = slots_of(chain, [0] * 3, [True])
     assert [slot.receivers.tolist() for slot in slots] == [[], [1], [2]]
     assert [slot.senders.tolist() for slot in slots] == [[], [0], [1]]
-    silent = Hierarchy("abc", pairwise("abc"), told="none")
+    silent = Hierarchy("abc", pairwise("abc"), communication="none")
     (slot,) = slots_of(silent, [0] * 3, [True])
     assert (slot.agents.tolist(), slot.receivers.tolist()) == ([0, 1, 2], [])
     assert not team_of(Players("abc", 2), silent)[1].told_names
@@ -136,7 +136,7 @@ def test_rollouts_hold_the_probabilities_by_which_agents_acted(
         inputs = rollout.actor_inputs[:8, 0]
         if own:
             told = inputs[..., : len(agents.told_names)].sum(axis=2)
-            assert (told == [len(hierarchy.above(agent)) for agent in rows]).all()
+            assert (told == [len(hierarchy.senders(agent)) for agent in rows]).all()
         logits = policy.logits(inputs.reshape(-1, inputs.shape[-1])).astype(float)
         logs = logits - np.log(np.exp(logits).sum(axis=2, keepdims=True))
         actions = rollout.actions[:8, 0].reshape(*logits.shape[:2], 1)
@@ -297,7 +297,10 @@ def test_what_arrives_is_learned_from() -> None:
 
 
 def test_without_edges_it_is_mappo_and_by_own_critics_ippo() -> None:
-    told_nothing = [{"topology": "independent"}, {"topology": {"kind": "chain", "told": "none"}}]
+    told_nothing = [
+        {"topology": "independent"},
+        {"topology": {"kind": "chain", "communication": "none"}},
+    ]
     for kind, critic in (("mappo", "central"), ("ippo", "own")):
         (trial,) = trials_of(spec_of(kind=kind))
         rows = run_trial(trial).rows
@@ -331,10 +334,10 @@ def remarks(spec: Spec) -> list[str]:
 
 
 def test_a_topology_that_says_nothing_to_the_learner_is_remarked() -> None:
-    considering = {"kind": "chain", "considers": "none", "told": "parents"}
+    considering = {"kind": "chain", "lookahead": "none", "communication": "parents"}
     assert remarks(spec_of()) == remarks(spec_of("tree")) == []
     assert remarks(spec_of(considering)) == [
-        "topology.considers: left out, learner.kind = 'hierarchy-ppo' considers nobody"
+        "topology.lookahead: left out, learner.kind = 'hierarchy-ppo' has no lookahead"
     ]
     assert remarks(spec_of("tree", kind="mappo")) == [
         "topology: left out, learner.kind = 'mappo' passes no actions down"
@@ -358,7 +361,7 @@ class Mine(na.Peer):
 """
 SPEC = """
 scenario.kind = "line-up"
-topology = {kind = "tree", told = "parents"}
+topology = {kind = "tree", communication = "parents"}
 learner.kind = "mine.py:Mine"
 """
 
@@ -373,7 +376,9 @@ def test_a_learner_of_ones_own_is_given_the_hierarchy_if_it_asks(
     with spec.sources.active():
         agents: Any = arrange(spec.conditions()[0].settings, 0).team.parts[0]
     peer = agents.peer
-    assert (peer.hierarchy.told if uses else peer.hierarchy) == ("parents" if uses else None)
+    assert (peer.hierarchy.communication if uses else peer.hierarchy) == (
+        "parents" if uses else None
+    )
     assert [line[:18] for line in remarks(spec)] == ([] if uses else ["topology: left out"])
 
 

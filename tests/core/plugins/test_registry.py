@@ -151,7 +151,7 @@ def test_a_class_with_settings_of_its_own_gets_them(carts: SettingsRegistry) -> 
 @pytest.mark.parametrize(
     ("name", "complaint"),
     [
-        ("Foreign", r"^is no cart, whose Settings inherit \S+\.CartSettings$"),
+        ("Foreign", r"^is no cart: its Settings must inherit \S+\.CartSettings$"),
         ("NUMBER", r"^is no cart, but a int$"),
     ],
 )

@@ -107,7 +107,9 @@ def test_the_copy_of_a_study_stands_in_for_a_file_that_is_gone(tmp_path: Path) -
     copies = tmp_path / "out" / "sources"
     copies.mkdir(parents=True)
     (copies / "links.py").write_text("LINKS = 3")
-    with pytest.raises(ValueError, match=r"^links\.py came with .*out and was not run from a spec"):
+    with pytest.raises(
+        ValueError, match=r"^links\.py came with .*out, and none of your specs has run it"
+    ):
         Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS")
     trust.trust("LINKS = 3")
     assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 3
@@ -123,7 +125,7 @@ def test_a_file_that_needs_another_one_is_refused(tmp_path: Path, beside: str) -
     Sources(tmp_path).load("links.py:links")  # installed, for all that can be known
     (tmp_path / beside).parent.mkdir(exist_ok=True)
     (tmp_path / beside).write_text("LINKS = 3")
-    with pytest.raises(ValueError, match=r"links\.py: imports shared, which stands beside it"):
+    with pytest.raises(ValueError, match=r"links\.py: imports shared from its folder"):
         Sources(tmp_path).load("links.py:links")
 
 

@@ -51,9 +51,9 @@ class Meeting:
 
 
 @na.state_variable("rad", -np.pi, np.pi, periodic=True)
-def heading_error(view, robot):
+def heading_error(situation, robot):
     """The heading of a robot off the course from the box to the goal."""
-    return (view.robots[:, robot, 2] - view.course + np.pi) % (2 * np.pi) - np.pi
+    return (robot.heading - situation.course + np.pi) % (2 * np.pi) - np.pi
 
 
 class Counting:

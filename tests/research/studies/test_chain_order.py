@@ -9,7 +9,8 @@ import pytest
 from made_up_results import NOTHING, Arrays
 
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.analysis import Analysis, Difference
+from nested_agents.studies.results.analysis import Analysis
+from nested_agents.studies.results.differences import Difference
 from nested_agents.studies.spec.spec import Spec
 from research import SPECS
 from research.studies import chain_order as chain_order
@@ -50,7 +51,7 @@ def test_one_bad_order_is_found_and_named() -> None:
         assert comparison.p < 0.001
     assert [d.condition for d in every(analysis) if d.p < 0.05] == ["2 3 1", "2 3 1"]
     assert "6 orders differ" in analysis.notes[0]
-    assert "evaluation success, less that of 1 2 3:" in analysis.notes
+    assert "evaluation success, minus that of 1 2 3:" in analysis.notes
     assert sum(note.startswith("  worse: 2 3 1") for note in analysis.notes) == 2
 
 

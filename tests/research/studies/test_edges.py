@@ -15,8 +15,8 @@ from research import SPECS, study_of
 from research.studies import edges as module
 from research.studies.edges import TRAINED, analyse, check, draw, measure
 
-SILENT = {"topology": {"told": "none"}}
-ALONE = {"topology": {"told": "none", "considers": "none"}}
+SILENT = {"topology": {"communication": "none"}}
+ALONE = {"topology": {"communication": "none", "lookahead": "none"}}
 OUTCOMES = {"told only": 0.3, "considered only": 0.93}
 
 
@@ -88,7 +88,11 @@ def test_a_spec_without_another_hierarchy_is_refused() -> None:
 
 def test_one_team_acts_under_every_hierarchy() -> None:
     table = {"study": study_of("edges"), "seeds": [7], "episodes": 1, "steps": 6, "evaluation": 2}
-    evaluations = {"same": {"topology": {"told": "ancestors"}}, "silent": SILENT, "alone": ALONE}
+    evaluations = {
+        "same": {"topology": {"communication": "ancestors"}},
+        "silent": SILENT,
+        "alone": ALONE,
+    }
     (trial,) = trials_of(Spec.of(table | {"evaluations": evaluations}))
     result = measure(trial)
     phases = {row.phase: [] for row in result.rows}

@@ -396,12 +396,12 @@ class Ordering(Walkers):
 
 
 class Turns(AECEnv[Any, Any, Any]):
-    """Two walkers, of numbers for ids, who take turns and move together after the last."""
+    """Two walkers that take turns and move together after the last turn."""
 
     metadata = {"name": "turns", "render_modes": [], "is_parallelizable": True}  # noqa: RUF012
 
     def __init__(self) -> None:
-        self.possible_agents = [0, 1]
+        self.possible_agents = ["first", "second"]
         self.render_mode = None
 
     def observation_space(self, agent: Any) -> Any:
@@ -415,7 +415,7 @@ class Turns(AECEnv[Any, Any, Any]):
 
     def reset(self, seed: int | None = None, options: Any = None) -> Any:
         rng = np.random.default_rng(seed)
-        self.agents = [0, 1]
+        self.agents = ["first", "second"]
         self.x = {agent: rng.uniform(-0.5, 0.5) for agent in self.agents}
         self.t = 0
         self.rewards = dict.fromkeys(self.agents, 0.0)
@@ -438,7 +438,7 @@ class Turns(AECEnv[Any, Any, Any]):
             self.t += 1
             for one, move in self.chosen.items():
                 self.x[one] = float(np.clip(self.x[one] + 0.1 * (move - 1), -1, 1))
-                self.rewards[one] = float(one + 1)
+                self.rewards[one] = 1.0 + self.possible_agents.index(one)
             self.truncations = dict.fromkeys(self.agents, self.t >= LENGTH)
         self.agent_selection = self.selector.next()
 

@@ -158,6 +158,12 @@ def test_it_can_be_recorded_drawn_and_predicted_exactly(tmp_path: Path) -> None:
     assert (tmp_path / "episode.gif").stat().st_size > 1000
 
 
+def test_an_environment_can_be_drawn_before_anything_runs(tmp_path: Path) -> None:
+    scenario = BoxPushing(BoxPushingSettings(robots=3, box="L"))
+    scenario.draw(tmp_path / "start.png")
+    assert (tmp_path / "start.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_a_task_in_units_of_the_box() -> None:
     fixed, similar = (
         BoxPushingSettings(robots=8, scaling=scaling).build() for scaling in ("fixed", "similar")

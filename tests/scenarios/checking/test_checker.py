@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_agents import View, state_variable
+from nested_agents import Situation, state_variable
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.core.interface.prediction import Blocks, Prediction
@@ -20,6 +20,7 @@ from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents.scenarios.box_pushing.states.situations import Robot
 from nested_agents.scenarios.box_pushing.world.settings import (
     WheelFailure,
 )
@@ -28,7 +29,7 @@ from nested_agents.scenarios.checking.checker import (
     ScenarioError,
     check_scenario,
 )
-from nested_agents.scenarios.checking.frames import Examination
+from nested_agents.scenarios.checking.episodes import CheckPlan
 from nested_agents.scenarios.checking.predictions import faults_of_prediction
 from nested_agents.scenarios.checking.sensing import faults_of_sensing, predicted_steps
 from nested_agents.scenarios.line_up import (
@@ -67,13 +68,13 @@ def line(**changes: Callable[..., Any]) -> Callable[[], Scenario]:
     ids=["line-up", "single agent", "box pushing", "paper", "failures", "robots"],
 )
 def test_sound_scenarios_pass(factory: Callable[[], Scenario]) -> None:
-    findings = check_scenario(factory, steps=20)
-    assert {*findings.passed, *findings.unchecked} - {"roles"} == set(CHECKS)
+    report = check_scenario(factory, steps=20)
+    assert {*report.passed, *report.skipped} - {"roles"} == set(CHECKS)
 
 
 def test_a_made_up_scenario_passes(line_world: Any) -> None:
-    findings = check_scenario(lambda: line_world(2, 2))
-    assert {*findings.passed, *findings.unchecked} - {"roles"} == set(CHECKS)
+    report = check_scenario(lambda: line_world(2, 2))
+    assert {*report.passed, *report.skipped} - {"roles"} == set(CHECKS)
 
 
 class Bare:
@@ -107,16 +108,16 @@ class BarePrediction:
 
 
 def test_what_a_scenario_need_not_have_is_not_asked_for() -> None:
-    findings = check_scenario(Bare)
-    assert set(CHECKS) - set(findings.passed) == {"sensed and predicted"} == {*findings.unchecked}
-    assert str(findings).startswith("passed  form, measures, ")
-    assert "\nnot checked  sensed and predicted: " in str(findings)
+    report = check_scenario(Bare)
+    assert set(CHECKS) - set(report.passed) == {"sensed and predicted"} == {*report.skipped}
+    assert str(report).startswith("passed  form, measures, ")
+    assert "\nnot checked  sensed and predicted: " in str(report)
 
 
-def test_the_findings_hold_what_was_met_beside_what_is_said() -> None:
+def test_the_report_hold_what_was_met_beside_what_is_said() -> None:
     distance, lead, reward = check_scenario(LineUpSettings().build).variables
     assert distance[:4] == ("distance", "m", -1.0, 1.0)
-    assert distance.least < -1 < 1 < distance.greatest
+    assert distance.min < -1 < 1 < distance.max
     assert max(distance.error, lead.error, reward.error) < 1e-12 < 0.02 < lead.persistence
     assert np.isnan(reward.low)
     (place, paid) = check_scenario(Bare).variables
@@ -149,7 +150,7 @@ def test_predictions_are_held_against_the_time_that_they_look_ahead() -> None:
 def test_a_variable_with_a_hidden_state_is_sensed_otherwise_than_predicted() -> None:
     scenario: Any = perceiving(stale)()
     exact = scenario.with_exact_prediction()
-    actions = Examination(perceiving(stale), 5, (0, 1), (0,)).actions(scenario, 0)
+    actions = CheckPlan(perceiving(stale), 5, (0, 1), (0,)).actions(scenario, 0)
     steps = predicted_steps(exact, 0, 0, actions)
     fault = next(faults_of_sensing(exact, steps), None)
     assert re.match(r"stale of agent \d is \d, predicted \d, at step 1", fault or "")
@@ -333,24 +334,24 @@ def off_by(distance: float, *, together: bool = False) -> Callable[[], Scenario]
 
 
 @state_variable("m", 0.0, 1.1)
-def per_period(view: View, robot: int) -> Any:
+def per_period(situation: Situation, robot: Robot) -> Any:
     """Mean something else where several periods are looked ahead."""
-    return view.distance / view.periods
+    return situation.distance / situation.periods
 
 
 times = count()
 
 
 @state_variable("1", 0.0, 1000.0)
-def stale(view: View, robot: int) -> Any:
+def stale(situation: Situation, robot: Robot) -> Any:
     """Depend on how often it was asked for."""
-    return np.full(len(view.box), float(next(times) % 7))
+    return np.full(np.shape(situation.distance), float(next(times) % 7))
 
 
 @state_variable("m", 0.0, 0.5, common=True)
-def not_common(view: View, robot: int) -> Any:
+def not_common(situation: Situation, robot: Robot) -> Any:
     """Differ between robots, unlike what is said of it."""
-    return np.minimum(view.gaps[:, robot], 0.5)
+    return np.minimum(robot.gap, 0.5)
 
 
 def perceiving(variable: StateVariable, robots: int = 1) -> Callable[[], Scenario]:
@@ -613,7 +614,7 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     ),
     "not common": (
         perceiving(not_common, 2),
-        "predictions: not_common, said to be common, is .* of agent 2 and .* of agent 0",
+        "values: not_common, said to be common, is .* of agent 2 and .* of agent 0",
     ),
     "lead not common": (
         space(n_own=1, common=("lead",)),
@@ -706,23 +707,23 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     "hidden state": (perceiving(stale), "equal seeds: .*seed 0 .*differ"),
     "plain prediction": (
         line(predict=lambda self: BarePrediction(self._states())),
-        "form: predict returns BarePrediction, must inherit Prediction, as its",
+        "form: predict returns BarePrediction, must inherit Prediction",
     ),
     "no scenario": (lambda: object(), "form: object lacks agents, .*step"),  # type: ignore[dict-item,return-value]
 }
 
 
 WARNED: dict[str, tuple[Callable[[], Scenario], str]] = {
-    "several periods": (perceiving(per_period), "per_period is predicted no better than if it"),
-    "predicted the wrong way": (inexact(wrong_way), "distance is predicted no better than if it"),
+    "several periods": (perceiving(per_period), "per_period is predicted no better than by"),
+    "predicted the wrong way": (inexact(wrong_way), "distance is predicted no better than by"),
     "predicted in millimetres": (inexact(in_millimetres), "lead is predicted no better than"),
     "predicted as it is": (
         inexact(predict=nothing_moves),
-        "distance is predicted no better than if it stayed as it is",
+        "distance is predicted no better than by persistence",
     ),
     "variables in millimetres": (
         inexact(lambda p, i, a: 1000 * p.states(i, a), _states=millimetres),
-        "distance goes more than 10 times its range beyond it",
+        "distance exceeds its range by more than 10 times its width",
     ),
     "rewards of something else": (
         predicting(rewards=far_reward, tables=lambda self: None),
@@ -819,12 +820,12 @@ def test_a_world_may_have_few_starts(heads: float) -> None:
 
 
 def test_what_could_not_be_checked_is_told_with_the_reason() -> None:
-    unchecked = check_scenario(inexact(), steps=6).unchecked
+    unchecked = check_scenario(inexact(), steps=6).skipped
     assert unchecked["sensed and predicted"].startswith("without with_exact_prediction")
     assert list(unchecked) == ["roles", "sensed and predicted"]
     alone = check_scenario(rowed(own=np.full((4, 1), 0.5), alone=True), steps=6)
-    assert "own variables" not in alone.unchecked
-    assert check_scenario(LineUpSettings(carts=9).build, steps=6).unchecked["tables"] == (
+    assert "own variables" not in alone.skipped
+    assert check_scenario(LineUpSettings(carts=9).build, steps=6).skipped["tables"] == (
         "more than 65,536 joint actions"
     )
 

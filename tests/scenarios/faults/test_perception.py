@@ -70,10 +70,10 @@ def test_who_is_late_predicts_from_where_it_was() -> None:
 def test_bodies_out_of_reach_or_lost_are_taken_to_do_nothing() -> None:
     near = carts(PerceptionSettings(agents="*", reach=1))
     np.testing.assert_array_equal(near.perceived, [[0, 1, 0], [1, 0, 1], [0, 1, 0]])
-    assert [near.idle(agent).tolist() for agent in range(3)] == [[2], [], [0]]
+    assert [near.unperceived(agent).tolist() for agent in range(3)] == [[2], [], [0]]
     names = near.agents
     lost = carts(PerceptionSettings(agents=names[0], lost=(names[1], names[2])))
-    assert lost.idle(0).tolist() == [1, 2]
+    assert lost.unperceived(0).tolist() == [1, 2]
     plain = carts()
     plain.reset(0)
     lost.reset(0)

@@ -215,11 +215,11 @@ def test_the_number_of_the_episode_is_an_option_of_ours_alone() -> None:
     [
         (lambda: faults.FaultyEnv(Told(BOX), [faults.Weak(actuators="hip")]),
          "faults[0].actuators = 'hip': no such actuator, allowed 0, 1"),
-        (lambda: faults.FaultyEnv(Told(BOX), [faults.Seized(actuators=0)]), "no effort makes"),
+        (lambda: faults.FaultyEnv(Told(BOX), [faults.Seized(actuators=0)]), "no effort can"),
         (lambda: faults.FaultyEnv(Told(BOX), [], commands="torque"), "commands = 'torque'"),
         (lambda: faults.FaultyEnv(Told(BOX), [], rest=np.array([3.0, 0.0])), "rest = "),
         (lambda: faults.FaultyEnv(Told(Box(-np.inf, np.inf, (1,))), []), "finite bounds"),
-        (lambda: faults.FaultyEnv(Told(gymnasium.spaces.MultiBinary(2)), []), "allowed: Box"),
+        (lambda: faults.FaultyEnv(Told(gymnasium.spaces.MultiBinary(2)), []), "allowed: Discrete"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_in_a_line(make: Any, said: str) -> None:

@@ -11,7 +11,7 @@ import nested_agents as na
 from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
-from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES, COMPILED, ChainView
+from nested_agents.scenarios.kinematic_chain.variables import BUILT_IN, CHAIN_VARIABLES, ChainView
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
@@ -43,7 +43,7 @@ def moving(joints: int, seed: int = 0, **table: object) -> KinematicChain:
 @pytest.mark.parametrize("joints", [2, 20])
 def test_the_checker_finds_nothing(joints: int) -> None:
     failures = FAILURES[:3] if joints < 3 else FAILURES
-    for table in ({}, {"failures": failures, "joint_limit": 1.5, "state_space": COMPILED}):
+    for table in ({}, {"failures": failures, "joint_limit": 1.5, "state_space": BUILT_IN}):
         na.check_scenario(lambda table=table: arm(joints, **table), steps=8)
 
 
@@ -72,11 +72,11 @@ def test_actions_that_come_to_the_same_are_known_to_best_responses() -> None:
     assert (prediction.alike < np.arange(4)).any()  # at full speed increasing changes nothing
 
 
-def test_compiled_variables_are_what_their_functions_say() -> None:
-    scenario = moving(6, state_space=COMPILED)
+def test_variables_of_all_joints_at_once_equal_those_of_each() -> None:
+    scenario = moving(6, state_space=BUILT_IN)
     view = scenario.predict().view_after(np.random.default_rng(3).integers(4, size=(30, 6)))
     states = scenario._states.of_joints(view, 0, 6)[:, :, 1:]
-    for column, name in enumerate(COMPILED):
+    for column, name in enumerate(BUILT_IN):
         variable = CHAIN_VARIABLES.find(name)
         for joint in range(6):
             assert states[joint, :, column] == pytest.approx(variable(view, joint))
@@ -84,7 +84,7 @@ def test_compiled_variables_are_what_their_functions_say() -> None:
 
 @na.state_variable("m", -1.0, 1.0)
 def height(view: ChainView, joint: int) -> FloatArray:
-    return view.places[:, joint, 1]
+    return view.places[joint, :, 1]
 
 
 def test_a_state_variable_of_ones_own() -> None:
@@ -203,7 +203,7 @@ def test_scripted_controllers_move_nothing_else() -> None:
             "scenario": {"kind": "line-up"}, "learner": {"decision": {"evaluator": place}},
         }
     )  # fmt: skip
-    with pytest.raises(ValueError, match="moves a kinematic-chain only"):
+    with pytest.raises(ValueError, match="needs a kinematic-chain"):
         na.run_trial(trials_of(spec)[0])
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from nested_agents.scenarios.kinematic_chain.variables import ends_of, jacobian_of, postures_of
+from nested_agents.scenarios.kinematic_chain.variables import forward_kinematics, jacobian
 
 
 def composed(angles: np.ndarray, length: float) -> np.ndarray:
@@ -23,23 +23,23 @@ def test_a_thousand_postures() -> None:
     rng = np.random.default_rng(0)
     for n in (2, 3, 4, 6, 8, 16):
         postures = rng.uniform(-np.pi, np.pi, (170, n))
-        found = postures_of(postures, 1.0 / n)
+        found = forward_kinematics(postures.T, 1.0 / n).transpose(1, 0, 2)
         expected = [composed(posture, 1.0 / n) for posture in postures]
         assert np.abs(found - expected).max() < 1e-12
 
 
 def test_by_hand() -> None:
-    places = ends_of(np.array([np.pi / 2, -np.pi / 2]), 0.5)
+    places = forward_kinematics(np.array([np.pi / 2, -np.pi / 2]), 0.5)
     assert places == pytest.approx(np.array([[0, 0], [0, 0.5], [0.5, 0.5]]))
     # The tip is half a metre up and to the right of the base, and half a metre right of joint 2.
-    assert jacobian_of(places) == pytest.approx(np.array([[-0.5, 0.5], [0.0, 0.5]]))
+    assert jacobian(places) == pytest.approx(np.array([[-0.5, 0.5], [0.0, 0.5]]))
 
 
 @given(st.integers(2, 64), st.integers(0, 2**32 - 1))
 def test_the_jacobian_is_the_slope_of_the_tip(n: int, seed: int) -> None:
     angles, small = np.random.default_rng(seed).uniform(-np.pi, np.pi, n), 1e-6
-    moves = jacobian_of(ends_of(angles, 1.0 / n))
+    moves = jacobian(forward_kinematics(angles, 1.0 / n))
     for i in (0, n // 2, n - 1):
         step = small * (np.arange(n) == i)
-        ahead, behind = (ends_of(angles + sign * step, 1.0 / n)[-1] for sign in (1, -1))
+        ahead, behind = (forward_kinematics(angles + sign * step, 1.0 / n)[-1] for sign in (1, -1))
         assert moves[i] == pytest.approx((ahead - behind) / (2 * small), abs=1e-8)

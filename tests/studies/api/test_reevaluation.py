@@ -103,10 +103,12 @@ def test_under_what_it_was_trained_with_a_team_does_the_same_again(place, capsys
 
 def test_decisions_are_crossed_with_topologies_and_a_part_is_enough(place):
     part = na.load(place).where("seed == 5 and condition == 'batch'")
-    frame = na.reevaluate(part, ["independent", {"told": "none"}], [{"unseen": "last"}, {}], jobs=1)
+    frame = na.reevaluate(
+        part, ["independent", {"communication": "none"}], [{"unseen": "last"}, {}], jobs=1
+    )
     assert set(zip(frame["condition"], frame["seed"], strict=True)) == {("batch", 5)}
     assert len(frame) == 4 * 3
-    assert "topology={told = 'none'}, decision={unseen = 'last'}" in set(frame["entry"])
+    assert "topology={communication = 'none'}, decision={unseen = 'last'}" in set(frame["entry"])
 
 
 @pytest.mark.parametrize(

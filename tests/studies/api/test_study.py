@@ -88,7 +88,7 @@ def test_studies_are_loaded_together(places) -> None:
     both = na.load(*places)
     assert both.conditions == ("default (one)", "frozen (one)", "default (two)", "frozen (two)")
     found = both.compare(by="directory")
-    assert [group.setting for group in found.contrasts.groups] == ["default", "frozen"]
+    assert [group.setting for group in found.analysis.groups] == ["default", "frozen"]
     # Equal trials, equal results: the made-up numbers are functions of the trial.
     assert all(d.estimate.value == 0.0 for d in found.differences)
     with pytest.raises(na.SpecError, match="named more than once"):
@@ -142,7 +142,7 @@ def test_a_trained_team_is_explained_and_played(tmp_path) -> None:
     spec = {"seeds": 1, "episodes": 2, "steps": 8, "evaluation": 1}
     study = na.run(spec, tmp_path, jobs=1, progress=False)
     explained = study.explain()
-    assert "in units of the return" in " ".join(str(explained).split())
+    assert "The unit is that of the return" in " ".join(explained.text.split())
     assert "policy" in explained.figures
     assert explained._repr_html_().startswith("<pre>default, seed 0")
     html = study.replay()._repr_html_()

@@ -11,7 +11,7 @@ from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.catalogue.experience import analyse, check, measure, stops
 from nested_agents.studies.catalogue.study import analyse_as, draw_figures, load_study
 from nested_agents.studies.results import marl_eval, published
-from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.results import from_arrays
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
@@ -88,8 +88,8 @@ def test_seeds_may_train_for_different_numbers_of_episodes():
     assert values[0].tolist() == [0, 0, 1, 1, 1, 1, 1]
     assert results.values("td", "success", part=slice(-2, None)).tolist() == [[1, 1], [0, 1]]
     assert results.means("td", "training").tolist() == pytest.approx([5 / 7, 1 / 6])
-    assert contrasts(results).differences[0].estimate.value == pytest.approx(0.25 - 0.75)
-    trained = contrasts(results, "success", "training").groups[0]
+    assert compare_conditions(results).differences[0].estimate.value == pytest.approx(0.25 - 0.75)
+    trained = compare_conditions(results, "success", "training").groups[0]
     assert trained.training["td"].shape == (2, 6), "curves end with the shortest training"
     table = analyse_as("learning-curve", results)
     assert float(table.table[0].estimates["success last 5"].value) == pytest.approx((1 + 0.2) / 2)

@@ -12,7 +12,7 @@ from nested_agents.studies.catalogue.study import draw_figures
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
-from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.power import seeds_needed
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.spec import Spec
@@ -39,7 +39,7 @@ def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
     assert star.p < 0.05 < tree.p
     assert star.estimate.low < -0.6 < star.estimate.high < -0.4
     text = "\n".join(analysis.notes)
-    of_team = "8 robots, team: evaluation success, less that of chain:\n  worse: star, -0."
+    of_team = "8 robots, team: evaluation success, minus that of chain:\n  worse: star, -0."
     assert of_team in text
     assert "adjusted over 8 comparisons (Holm)." in text
     assert max(map(len, text.splitlines())) <= 80
@@ -48,7 +48,7 @@ def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
 def test_differences_are_those_that_compare_prints() -> None:
     frames = hierarchies(CHANCES).frames()
     (star,) = [d for d in analyse(frames).differences["8 robots, team"] if d.condition == "star"]
-    compared = contrasts(frames, by="topology", reference="chain")
+    compared = compare_conditions(frames, by="topology", reference="chain")
     (same,) = [d for d in compared.differences if d.condition == "star"][-1:]
     assert (star.shown, star.seeds) == (same.shown, same.seeds)
 
@@ -56,7 +56,7 @@ def test_differences_are_those_that_compare_prints() -> None:
 def test_with_few_seeds_nothing_can_be_told() -> None:
     analysis = analyse(hierarchies(CHANCES, seeds=5).frames())
     text = "\n".join(analysis.notes)
-    assert "Power: 5 seeds and 8 comparisons cannot give an adjusted p below 0.05" in text
+    assert "Power: 5 seeds cannot give an adjusted p below 0.05 among 8 comparisons" in text
     assert "worse" not in text
 
 
@@ -68,7 +68,7 @@ def test_the_seeds_needed_are_the_fewest_whose_least_p_is_small_enough(compariso
 
 def test_the_first_hierarchy_is_the_reference_where_there_is_no_chain() -> None:
     chances = {key: chance for key, chance in CHANCES.items() if key[0] != "chain"}
-    assert "2 robots, own: evaluation success, less that of star:" in (
+    assert "2 robots, own: evaluation success, minus that of star:" in (
         analyse(hierarchies(chances).frames()).notes
     )
 

@@ -92,7 +92,7 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
 def test_messages_are_the_edges_of_the_transitive_closure(topology: str, count: int) -> None:
     (condition,) = Spec.of({"topology": topology}).conditions()
     hierarchy = arrange(condition.settings, 0).team.hierarchy
-    assert hierarchy.messages == count
+    assert hierarchy.n_messages == count
 
 
 def test_a_trial_is_measured_without_being_changed() -> None:

@@ -19,7 +19,7 @@ from nested_agents.studies.catalogue.wheel_failure import (
 )
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.recovery import RECOVERY, FailureCourse, failure_course
 from nested_agents.studies.results.results import KEPT
 from nested_agents.studies.spec.spec import Spec
@@ -70,24 +70,24 @@ def test_recovery_is_compared_from_the_failure_on() -> None:
     results = wheel_failure(ENDS).frames()
     course = failure_course(results, "4 wheels, seized, enabled=false")
     for name in RECOVERY:
-        compared = contrasts(results, name)
+        compared = compare_conditions(results, name)
         own = compared.groups[0].values["4 wheels, seized, enabled=false"]
         assert own.tolist() == course.measured[name].tolist()
-    compared = contrasts(results, "recovery time [episodes]", by="enabled")
+    compared = compare_conditions(results, "recovery time [episodes]", by="enabled")
     assert {d.condition for d in compared.differences} == {"true"}
-    kept = contrasts(results, "recovered", "weights kept")
+    kept = compare_conditions(results, "recovered", "weights kept")
     assert kept.title == "recovered, weights kept"
     assert kept.differences[0].estimate.value > 0.5, "the self-model adapts, nothing does not"
     with pytest.raises(SpecError, match=r"'recoverd': did you mean 'recovered'"):
-        contrasts(results, "recoverd")
+        compare_conditions(results, "recoverd")
     with pytest.raises(SpecError, match="phase = 'evaluation'"):
-        contrasts(results, "recovered", "evaluation")
+        compare_conditions(results, "recovered", "evaluation")
 
 
 def test_recovery_is_no_measure_where_nothing_fails() -> None:
     results = ablation({"a": 0.5, "b": 0.5}).frames()
     with pytest.raises(SpecError, match="measure = 'recovered'"):
-        contrasts(results, "recovered")
+        compare_conditions(results, "recovered")
 
 
 def test_the_end_of_a_transient_failure_is_marked(tmp_path: Path) -> None:
@@ -100,7 +100,7 @@ def test_the_end_of_a_transient_failure_is_marked(tmp_path: Path) -> None:
     for line in analysis.table:
         assert float(line.estimates["failure ends [episode]"].value) == 30.0
         assert "after its end" in line.estimates
-    assert any("no adaptation" in note for note in analysis.notes)
+    assert any("not adaptation" in note for note in analysis.notes)
     figure = draw(analysis)["wheel-failure"]
     (area,) = [p for p in figure.axes[0].patches if isinstance(p, Rectangle)]
     assert (area.get_x(), area.get_x() + area.get_width()) == (19.5, 29.5)
@@ -139,9 +139,7 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
     analysis = analyse(results.frames())
     for line in analysis.table:
         assert list(line.estimates) == ["before", "just after", "end"]
-    assert (
-        "No recovery is measured where no episode before the failure succeeded." in analysis.notes
-    )
+    assert "Recovery is not measured without successes before the failure." in analysis.notes
 
 
 @pytest.mark.parametrize(

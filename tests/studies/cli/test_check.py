@@ -150,7 +150,7 @@ def test_a_scenario_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[st
         assert (out, err.count("\n")) == ("", 1)
         assert complaint in err
     assert main(["check", f"{path}:sound", "--set", "seeds=2"]) == 2
-    assert "not over a Python file" in capsys.readouterr().err
+    assert "--set: changes a spec, and a Python file is none" in capsys.readouterr().err
 
 
 SETTLED = """
@@ -212,7 +212,7 @@ def test_trials_are_run_in_two_orders_where_users_files_may_keep_something(
         assert line.startswith("FAULT   order of trials: seed ")
         assert "when another trial has run before it: what own.py keeps in a module" in line
     else:
-        assert line == "passed  order of trials: the same rows in two orders"
+        assert line == "passed  order of trials: two orders gave the same results"
 
 
 def test_errors_of_learned_predictors_are_shown_once_beside_those_of_persistence(
@@ -226,9 +226,9 @@ def test_errors_of_learned_predictors_are_shown_once_beside_those_of_persistence
         '"learner.discount" = [0.5, 0.9]\n'
     )
     assert main(["check", str(path), "--steps", "6"]) == 0
-    _, table = capsys.readouterr().out.split("what 8 episodes teach to predict")
+    _, table = capsys.readouterr().out.split("prediction errors after 8 training episodes")
     head, *rows = (line for line in table.splitlines() if line)
-    assert head.split() == ["learned", "as", "it", "is", "given"]
+    assert head.split() == ["learned", "persistence", "given"]
     assert [row.split()[0] for row in rows] == ["distance", "lead"]
 
 

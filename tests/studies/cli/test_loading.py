@@ -47,7 +47,7 @@ def test_a_table_is_made_as_by_another_study_and_of_a_part(study, capsys) -> Non
         capsys, "table", out, "--as", "ablation", "--where", "seed in [0, 2]"
     )
     assert status == 0
-    assert "2 seeds and 2 comparisons cannot give an adjusted p below 0.05" in " ".join(
+    assert "2 seeds cannot give an adjusted p below 0.05 among 2 comparisons" in " ".join(
         printed.split()
     )
     assert said_by(capsys, "table", out, "--as", "scaling")[0] == 2
@@ -57,7 +57,7 @@ def test_conditions_are_compared_in_every_form(study, capsys) -> None:
     out, _ = study
     status, printed, _ = said_by(capsys, "compare", out, "--measure", "steps")
     assert status == 0
-    assert "evaluation steps, less that of default:" in printed
+    assert "evaluation steps, minus that of default:" in printed
     assert "unadjusted)" in printed
     assert max(map(len, printed.splitlines())) <= 80
     latex = said_by(capsys, "compare", out, "--format", "latex")[1]
@@ -124,7 +124,9 @@ def test_a_database_of_another_study_is_noted_by_all_that_read_it(
     text = (own / "study.toml").read_text()
     (own / "study.toml").write_text(text.replace("steps = 5", "steps = 6"))
     said = " ".join(" ".join(said_by(capsys, command, own)[1:]).split())
-    assert "study.toml: is not the spec of results.sqlite beside it, whose results these" in said
+    assert (
+        "study.toml: is not the spec of results.sqlite in its folder, which has the results" in said
+    )
     assert "steps = 6 here, 5 there" in said
 
 

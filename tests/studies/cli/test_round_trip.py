@@ -67,8 +67,8 @@ def study(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 def verdict(study: StudyResults, **options: str) -> str:
     """Return the table and the verdicts of a comparison."""
-    contrasts = study.compare(**options).contrasts
-    return "\n".join([str(tabulate(contrasts.table)), *contrasts.notes])
+    compared = study.compare(**options).analysis
+    return "\n".join([str(tabulate(compared.table)), *compared.notes])
 
 
 @pytest.mark.parametrize("form", FILES)
@@ -88,7 +88,7 @@ def test_exported_trials_give_the_verdict_of_the_study(study: Path, tmp_path: Pa
     assert main(["export", str(study), "--out", str(tmp_path)]) == 0
     expected = na.load(study).compare(measure="seconds.total")
     comparison = na.load(tmp_path / "trials.csv").compare(measure="seconds.total")
-    assert comparison.contrasts.notes == expected.contrasts.notes
+    assert comparison.analysis.notes == expected.analysis.notes
     assert "2 of" in comparison.remarks[0]
     with pytest.raises(SpecError, match=r"measure = 'success': known: .*seconds\.total"):
         na.load(tmp_path / "trials.csv").compare(measure="success")
@@ -110,7 +110,7 @@ def test_a_table_without_its_description_gives_the_same_verdict(study: Path, tmp
     assert main(["export", str(study), "--out", str(tmp_path)]) == 0
     (tmp_path / "study.json").unlink()
     read = na.load(tmp_path / "episodes.csv")
-    assert read.compare().contrasts.notes == na.load(study).compare().contrasts.notes
+    assert read.compare().analysis.notes == na.load(study).compare().analysis.notes
     assert any("study.json" in remark for remark in read.remarks)
     asked = na.load(tmp_path / "episodes.csv", columns=["score=success"])
     assert verdict(asked) == verdict(read, measure="success")

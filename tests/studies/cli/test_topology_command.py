@@ -39,7 +39,7 @@ def test_show_as_json(said) -> None:
     left1, right1, left2, right2 = shown["agents"]
     assert shown["edges"] == [[left1, right1], [left1, left2], [left2, right2]]
     assert shown["order"] == [left1, right1, left2, right2]
-    assert shown["below"][left1] == [right1, left2, right2]
+    assert shown["lookahead"][left1] == [right1, left2, right2]
     assert shown["joint_actions_per_step"] == 4**4 + 4 + 4**2 + 4
     assert shown["depth"] == 3
 
@@ -47,7 +47,7 @@ def test_show_as_json(said) -> None:
 def test_show_as_table(said) -> None:
     _, out, _ = said("show", "chain", "--agents", "4")
     assert out.startswith("chain: 4 agents, depth 4, 340 joint actions a step\n")
-    assert "1  robot1.left       3    256  robot1.right" in out
+    assert "1  robot1.left           3    256  robot1.right" in out
     assert max(map(len, out.splitlines())) <= 80
 
 
@@ -55,23 +55,23 @@ def test_parted_relations_and_failures_are_shown(said, tmp_path) -> None:
     spec = tmp_path / "study.toml"
     spec.write_text(
         "scenario.robots = 2\n[evaluations]\n"
-        "near.topology.told = ['body', 'next']\n"
-        "lost.topology = { considers = 'none', failures = [{ kind = 'lost', agents = 'r*t' }] }\n"
+        "near.topology.communication = ['body', 'next']\n"
+        "lost.topology = { lookahead = 'none', failures = [{ kind = 'lost', agents = 'r*t' }] }\n"
     )
     status, out, _ = said("show", str(spec), "--plot", str(tmp_path / "shown.svg"))
     assert status == 0
-    assert "told: body and next; considers: descendants; 6 messages a step\n" in out
-    assert "told: ancestors; considers: none; 6 messages a step\nfails: lost: r*t\n" in out
+    assert "communication: body and next; lookahead: descendants; 6 messages a step\n" in out
+    assert "communication: ancestors; lookahead: none; 6 messages a step\nfails: lost: r*t\n" in out
     third = (tmp_path / "shown-3.svg").read_text(encoding="utf-8")
-    assert "dotted arrows: told, not considered; dashed frame: messages fail" in third
+    assert "dotted arrows: communication only; dashed frame: messages fail" in third
 
 
 def test_a_file_of_a_topology_does_not_part_relations(said, tmp_path) -> None:
     teams = tmp_path / "teams.toml"
-    teams.write_text('members = ["robot1.left", "robot1.right"]\ntold = "none"\n')
+    teams.write_text('members = ["robot1.left", "robot1.right"]\ncommunication = "none"\n')
     status, _, err = said("show", str(teams))
     assert status == 2
-    assert "told must stand in the [topology] table of the spec" in err
+    assert "communication must stand in the [topology] table of the spec" in err
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,9 @@ def test_robots_are_shown_as_they_are_arranged(said, line_world) -> None:
     )
     assert len(shown["agents"]) == len(scenario.agents)
     assert shown["depth"] == hierarchy.depth
-    assert shown["joint_actions_per_step"] == hierarchy.joint_actions(len(scenario.action_set))
+    assert shown["joint_actions_per_step"] == hierarchy.count_joint_actions(
+        len(scenario.action_set)
+    )
 
 
 def test_it_is_shown_over_the_agents_of_a_scenario(said) -> None:
@@ -133,7 +135,7 @@ def test_it_is_shown_over_the_agents_of_a_scenario(said) -> None:
     assert out.startswith("tree:2: 3 agents, depth 2, 135 joint actions a step\n")  # 5^3 + 2 x 5
     status, _, errors = said("show", "chain", "--scenario", "spread", "--agents", "3")
     assert (status, errors.count("\n")) == (2, 1)
-    assert "chain: over spread, which says its own agents" in errors
+    assert "chain: the scenario spread defines the agents" in errors
 
 
 def test_a_plot_is_written(said, tmp_path: Path) -> None:

@@ -360,14 +360,16 @@ def test_a_file_of_results_that_names_a_module_is_refused(
     if command == "table":
         _, error = capsys.readouterr()
         assert error.count("\n") == 1
-        assert "study = 'payload.study:PART': payload.study is a module that" in error
+        assert "study = 'payload.study:PART': payload.study: " in error
         assert "--trust" in error
         assert main([command, str(reader / "results.json"), "--trust"]) == 0
 
 
 def test_an_environment_of_somebody_elses_module_is_refused() -> None:
     table = {"scenario": {"kind": "gymnasium", "id": "payload.worlds:World-v0"}}
-    with pytest.raises(SpecError, match=r"^scenario\.id: payload\.worlds is a module that theirs"):
+    with pytest.raises(
+        SpecError, match=r"^scenario\.id: payload\.worlds: theirs names this module"
+    ):
         Spec.of(table, Sources(None, brought_by="theirs"))
     Spec.of(
         {"scenario": {"kind": "pettingzoo", "id": "mpe2/simple_spread_v3"}},
@@ -386,5 +388,5 @@ def test_a_module_of_ones_own_spec_is_trusted_where_it_is(
         Sources(reader).permit("payload.parts")
         Sources(None, brought_by="theirs").permit("payload.parts")
     monkeypatch.syspath_prepend(reader / "other")
-    with pytest.raises(ValueError, match=r"payload\.parts is a module that theirs names"):
+    with pytest.raises(ValueError, match=r"payload\.parts: theirs names this module"):
         Sources(None, brought_by="theirs").permit("payload.parts")

@@ -17,7 +17,7 @@ from nested_agents.core.evaluators.evaluator import Counts
 from nested_agents.studies.cli.commands.describing import numbers
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.cost.cost import (
-    WAYS,
+    DECISION_METHODS,
     CostRow,
     StepCost,
     agents_below,
@@ -193,7 +193,7 @@ def test_ways_to_decide_count_as_their_formula(way: str, n: int) -> None:
 
 def test_ways_to_decide_are_added_up_as_the_hierarchies() -> None:
     """Of six agents the first tries 4 + 3 * 12 starts and 6 * 4 around them, each its own four."""
-    table = cost_table([*WAYS, "independent"], [6], rules=[7], iterations=5)
+    table = cost_table([*DECISION_METHODS, "independent"], [6], rules=[7], iterations=5)
     rows = {row.topology: row for row in table.rows}
     exact = {name: row.nested_exact for name, row in rows.items()}
     assert exact["best-response"] == 35 * (68**2 + 5 * 4**2)
@@ -247,7 +247,7 @@ def made_up(n: int, power: float) -> CostRow:
 
 def test_the_table_of_what_was_measured_says_what_it_holds() -> None:
     out = format_rows([made_up(n, 1.5) for n in range(1, 11)], "table")
-    assert "ms: deciding and learning" in out
+    assert "ms: decision and learning" in out
     assert max(map(len, out.splitlines())) <= 80
 
 

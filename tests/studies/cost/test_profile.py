@@ -39,7 +39,7 @@ def test_what_is_tried_stands_beside_the_formulas(tmp_path: Path, capsys) -> Non
     )
     assert chain[2] != "exact"
     assert chain[4] == "5,460"
-    assert "not what the formulas count with 6 agents." in " ".join(out.split())
+    assert "not as by the formula with 6 agents." in " ".join(out.split())
     assert [path.name for path in tmp_path.iterdir()] == ["spec.toml"]
 
 
@@ -84,8 +84,8 @@ def test_growth_is_that_of_what_is_tried_times_that_of_each() -> None:
     text = " ".join(str(table).split())
     assert (
         "chain: 2 to 8 agents: decisions take 30 times as long: 10 times the joint actions, each "
-        "3 times as long. 75% is predict; exact then best-response: not what the formulas count "
-        "with 8 agents."
+        "3 times as long. The largest part is predict (75%); exact then best-response: not as by "
+        "the formula with 8 agents."
     ) in text
     assert ["chain,", "robots=2", "exact", "20", "20", "1", "50"] in [
         line.split() for line in str(table).splitlines()

@@ -9,8 +9,8 @@ import pytest
 
 import nested_agents as na
 from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.values.partitions import Partition
+from nested_agents.core.values.rule_base import RuleBase
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import team as explain
@@ -61,7 +61,7 @@ def study(tmp_path_factory):
 
 
 def run(capsys, *arguments):
-    status = main(["explain", *map(str, arguments)])
+    status = main(["explain", *map(str, arguments), "--full"])
     return status, capsys.readouterr()
 
 
@@ -71,7 +71,7 @@ def test_the_first_trial_in_words_and_figures(study, capsys):
     assert status == 0
     out = said.out
     assert out.startswith("order 1, seed 3: the team after 3 episodes\n")
-    assert "the functions below are all of f" in out
+    assert "so that the functions below add up to f" in " ".join(out.split())
     assert "IF gap is touching" in out
     assert "before the first failure, after all training" in " ".join(out.split())
     folder = study / "explain" / "order-1-seed3"
@@ -85,10 +85,22 @@ def test_the_first_trial_in_words_and_figures(study, capsys):
 
 
 @pytest.mark.slow
+def test_the_summary_fits_a_screen(study, capsys):
+    assert main(["explain", str(study)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    text = [line for line in lines if str(study) not in line]
+    assert text[0].startswith("order 1, seed 3: 4 agents with 47 rules each.")
+    assert len(text) <= 12
+    assert max(map(len, text)) <= 80
+    assert main(["explain", str(study), "--condition", "random"]) == 0
+    assert "the team has learned nothing" in capsys.readouterr().out
+
+
+@pytest.mark.slow
 def test_several_variables_together_and_nothing_learned(study, capsys):
     status, said = run(capsys, study, "--condition", "a pair", "--seed", 3)
     assert status == 0
-    assert "Several variables together do " in said.out
+    assert "Interactions of variables have a share of " in " ".join(said.out.split())
     status, said = run(capsys, study, "--condition", "random")
     assert status == 0
     assert "the agents have learned nothing" in said.out
@@ -102,7 +114,7 @@ def test_errors_of_a_learned_predictor_stand_beside_persistence(study, capsys):
     lines = said.out.splitlines()
     at = lines.index("PREDICTOR")
     head = next(line for line in lines[at:] if "learned  " in line)
-    assert head.split() == ["learned", "as", "it", "is", "given"]
+    assert head.split() == ["learned", "persistence", "given"]
     rows = {line.split()[0]: line.split()[1:] for line in lines[lines.index(head) + 1 :] if line}
     # Within three short episodes it has been learned what an action does to the own wheel.
     assert float(rows["wheel_speed"][0]) < float(rows["wheel_speed"][1])
@@ -292,8 +304,8 @@ def test_agents_of_the_same_rules_have_one_column(tmp_path) -> None:
     for weights in ("role", "own"):
         learner = {"kind": "fitted-q", "weights": weights}
         kept = na.run(table | {"learner": learner}, tmp_path / weights, jobs=1)
-        texts.append(" ".join(str(kept.explain()).split()))
-    assert "have one column, of the first: agent1 = agent2 = agent3." in texts[0]
+        texts.append(" ".join(kept.explain().text.split()))
+    assert "have one column, named after the first: agent1 = agent2 = agent3." in texts[0]
     assert "one column" not in texts[1]
 
 
@@ -310,7 +322,7 @@ def test_a_team_of_a_budget_of_decisions_is_trained_again(condition, tmp_path, c
     table |= {"scenario": {"kind": "spread"}}
     own = {"learner": {"kind": "fitted-q"}} if condition == "fitted-q" else {"preset": "random"}
     kept = na.run(table | {"overrides": [{"name": condition, **own}]}, tmp_path, jobs=1)
-    assert f"{condition}, seed 0: the team after 40 decisions" in str(kept.explain())
+    assert f"{condition}, seed 0: the team after 40 decisions" in kept.explain().text
 
 
 def test_networks_are_not_explained(tmp_path, capsys) -> None:

@@ -1,5 +1,6 @@
 import csv
 import io
+import json
 
 import numpy as np
 import pandas as pd
@@ -28,6 +29,13 @@ def test_csv_holds_every_digit_and_nothing_where_nothing_is_known():
     assert float(rows[0]["success"]) == 1 / 3
     assert (rows[0]["success low"], rows[0]["x_1 [m] high"]) == ("0.2", "3.0")
     assert (rows[1]["success low"], rows[1]["x_1 [m]"]) == ("", "")
+
+
+def test_json_holds_every_digit_and_null_where_nothing_is_known():
+    first, other = json.loads(tabulate(LINES).json)
+    assert (first["condition"], first["seeds"]) == ("order=1, 50%", 8)
+    assert first["estimates"]["success"] == {"value": 1 / 3, "low": 0.2, "high": 0.5}
+    assert other["estimates"] == {"success": {"value": 0.0, "low": None, "high": None}}
 
 
 def test_latex_escapes_and_has_as_many_cells_in_every_row():

@@ -4,12 +4,14 @@ import sqlite3
 from pathlib import Path
 
 import pytest
+from markupsafe import escape as html_escape
 
 from nested_agents import studies
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
-from nested_agents.studies.report.page import extremes, page, rate_of, unfolded
-from nested_agents.studies.results.analysis import Summary
+from nested_agents.studies.report.page import page, unfolded
+from nested_agents.studies.report.sentences import main_title, verdict
+from nested_agents.studies.results.analysis import Analysis, Summary
 from nested_agents.studies.results.statistics import exactly
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE
@@ -33,19 +35,27 @@ def sections(html):
 
 def test_a_finished_study_has_everything(html):
     assert sections(html) == [
-        "summary", "table", "figures", "hierarchy", "replay", "spec", "versions",
+        "summary", "table", "figures", "hierarchy", "replay", "methods", "spec", "versions",
     ]  # fmt: skip
     assert html.count('aria-label="hierarchy: default') == 1
     assert 'aria-label="hierarchy: frozen' not in html, "it is the same"
     assert "All 6 trials are done." in html
-    rates = html[html.index('<dl class="rates" aria-label="evaluation success">') :]
-    rates = rates[: rates.index("</dl>")]
-    found = dict(re.findall("<dt>(.*?)</dt><dd>(.*?) <small>", rates))
+    found = dict(re.findall(r"<li>(.*?): evaluation success is (\S+)\s", html))
     assert list(found) == ["default", "frozen"]
     assert all(f"<td>{value}<small>" in html for value in found.values())
-    assert "evaluation success, less that of default:" in html
+    assert "evaluation success, minus that of default:" in html
     assert "preset = [\n    &#34;default&#34;,\n    &#34;frozen&#34;,\n]" in html
     assert len(html) < 500_000
+
+
+def test_methods_and_each_condition_are_described(html):
+    assert "Task: box-pushing with 2 robots." in html
+    assert "Statistics: means over seeds with 95% confidence intervals." in html
+    assert html.count("<li>default: evaluation success is ") == 1
+    assert html.count("<li>frozen: evaluation success is ") == 1
+    lead = html[html.index('<p class="lead">') :].partition("</p>")[0]
+    assert "Evaluation success is highest with " in lead
+    assert "Karigiannis" in html
 
 
 def test_lines_are_joined_to_what_they_continue():
@@ -65,9 +75,12 @@ def test_the_lowest_and_the_highest_success_are_a_sentence():
     rates = {"b": 0.9, "a": 0.1, "c": 0.5}
     lines = [Summary(c, 8, {"success": exactly(rate)}) for c, rate in rates.items()]
     table = tabulate(lines)
-    assert rate_of(table) == "success"
-    assert extremes(table, "success") == ("Success: from 0.10 (a) to 0.90 (b).",)
-    assert extremes(tabulate(lines[:1]), "success") == ()
+    nothing = Analysis(())
+    assert main_title(table) == "success"
+    sentence = "Success is highest with b, 0.90, and lowest with a, 0.10."
+    assert verdict(table, "success", nothing) == (sentence,)
+    assert verdict(tabulate(lines[:1]), "success", nothing) == ("Success is 0.90.",)
+    assert verdict(table, "", nothing) == ()
 
 
 def test_equal_results_give_equal_bytes_wherever_they_are(finished, html, tmp_path):
@@ -93,7 +106,7 @@ def test_damaged_rows_are_not_published(finished, tmp_path, capsys):
 
 def test_an_empty_study(kept, tmp_path):
     html = page(kept(tmp_path, done=0))
-    assert sections(html) == ["summary", "hierarchy", "spec", "versions"]
+    assert sections(html) == ["summary", "hierarchy", "methods", "spec", "versions"]
     assert "There is nothing to show yet." in html
 
 
@@ -154,5 +167,6 @@ def test_every_committed_spec_is_read(path):
 def test_every_study_has_a_report_before_it_has_begun(path, kept, tmp_path):
     spec = Spec.load(path, ["seeds=1"])
     html = page(kept(tmp_path, spec, done=0))
-    assert f"<h1>{spec.study}</h1>" in html
+    assert f"<h1>{html_escape(spec.title or spec.study)}</h1>" in html
+    assert f"report of study <code>{spec.study}</code>" in html
     assert "There is nothing to show yet." in html

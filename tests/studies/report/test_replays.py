@@ -24,7 +24,7 @@ def test_first_and_last_of_all_finished_trials(kept, tmp_path):
 
 
 def test_what_there_is_no_room_for_is_named(kept, tmp_path):
-    found = read(kept(tmp_path), most_bytes=1)
+    found = read(kept(tmp_path), max_bytes=1)
     assert len(found.episodes) == 2
     assert found.remarks == [
         "Left out to keep the page small: frozen (3 seeds), default (2 seeds)."
@@ -39,7 +39,7 @@ def test_damaged_and_foreign_recordings_are_named(kept, tmp_path, monkeypatch):
     found = read(directory)
     assert len(found.episodes) == 8
     assert len(found.remarks) == 1
-    assert found.remarks[0].startswith("Not shown, as the recording is missing or damaged: ")
+    assert found.remarks[0].startswith("Not shown because the recording is missing or damaged: ")
     monkeypatch.delattr(BoxPushing, "animate")
     monkeypatch.setattr(rendering, "NEEDED", ("hat",))
     assert "the scenario cannot draw it" in "".join(read(directory).remarks)
@@ -52,4 +52,4 @@ def test_what_the_canvas_cannot_play_is_drawn_by_its_scenario(kept, tmp_path, mo
     assert [(film.condition, film.seed) for film in found.films] == [("default", 0), ("frozen", 0)]
     assert all(base64.b64decode(film.data).startswith(b"GIF89a") for film in found.films)
     assert (found.episodes, found.remarks) == ([], [])
-    assert read(directory, most_bytes=len(found.films[0].data)).films == found.films[:1]
+    assert read(directory, max_bytes=len(found.films[0].data)).films == found.films[:1]

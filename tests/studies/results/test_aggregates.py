@@ -11,11 +11,11 @@ from nested_agents.studies.results.aggregates import (
     _profile,
     aggregate,
     interquartile_mean,
-    probability_of_improvement,
     stratified_bootstrap,
 )
-from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.results import from_arrays
+from nested_agents.studies.results.statistics import probability_higher
 
 OWN = np.array([
     [6, 0, 6, 9, 9, 2, 3, 1, 6, 10, 7, 7],
@@ -39,8 +39,8 @@ def test_interquartile_means() -> None:
 def test_probabilities_of_improvement() -> None:
     own, base = np.array([1.0, 1.0, 0.0]), np.array([1.0, 0.0])
     # In pairs: 2 ties and 2 wins of the ones, 1 loss and 1 tie of the zero.
-    assert probability_of_improvement([own, base]) == pytest.approx((2 + 3 * 0.5) / 6)
-    several = probability_of_improvement([own, own, base, own])
+    assert float(probability_higher([(own, base)]).value) == pytest.approx((2 + 3 * 0.5) / 6)
+    several = float(probability_higher([(own, base), (own, own)]).value)
     assert several == pytest.approx((3.5 / 6 + 0.5) / 2), "the mean over tasks"
 
 
@@ -48,7 +48,7 @@ def test_estimates_and_intervals_are_those_of_rliable() -> None:
     iqm = stratified_bootstrap(list(OWN), interquartile_mean)
     assert iqm.value == pytest.approx(0.55)
     assert [iqm.low, iqm.high] == pytest.approx([0.41111111, 0.66666667], abs=0.02)
-    better = stratified_bootstrap([*OWN, *BASE], probability_of_improvement)
+    better = probability_higher(list(zip(OWN, BASE, strict=True)))
     assert better.value == pytest.approx(0.59375)
     assert [better.low, better.high] == pytest.approx([0.45598958, 0.72337963], abs=0.02)
     profile = _profile(list(OWN), np.array([0.0, 0.25, 0.5, 0.75]))
@@ -90,7 +90,7 @@ def results(seeds=3):
 
 
 def test_groups_of_a_comparison_are_tasks() -> None:
-    found = aggregate(contrasts(results(), by="kind"))
+    found = aggregate(compare_conditions(results(), by="kind"))
     assert [(line.condition, line.seeds) for line in found.table] == [("a", 6), ("b", 6)]
     a, b = (line.estimates for line in found.table)
     assert (a["interquartile mean"].value, b["interquartile mean"].value) == (0.5, 1.0)
@@ -103,10 +103,10 @@ def test_groups_of_a_comparison_are_tasks() -> None:
 
 
 def test_lower_may_be_better() -> None:
-    line = aggregate(contrasts(results(), "time", by="kind")).table[1]
+    line = aggregate(compare_conditions(results(), "time", by="kind")).table[1]
     assert line.estimates["P(improvement)"].value == 1.0
 
 
 def test_a_seed_each_is_too_few() -> None:
     with pytest.raises(SpecError, match="statistics: no two conditions have two seeds"):
-        aggregate(contrasts(results(seeds=1), by="kind"))
+        aggregate(compare_conditions(results(seeds=1), by="kind"))

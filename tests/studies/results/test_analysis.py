@@ -8,18 +8,16 @@ from made_up_results import ablation
 from scipy import stats
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.studies.results.analysis import (
+from nested_agents.studies.results.analysis import estimate_of, estimate_over_seeds, verdicts
+from nested_agents.studies.results.comparison import compare_conditions
+from nested_agents.studies.results.differences import (
     Difference,
     difference,
     differences,
-    estimate_of,
-    estimate_over_seeds,
     paired_difference,
     ratio,
     select_shared,
-    verdicts,
 )
-from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.results import (
     STEPS,
     Results,
@@ -76,7 +74,10 @@ def test_lengths_of_episodes_end_at_the_longest_allowed() -> None:
     estimate = estimate_of(results, "a", "evaluation", STEPS)
     assert float(estimate.high) == 150.0
     assert float(estimate.low) == pytest.approx(400 / 3 - 4.3027 * 28.868 / 3**0.5, abs=0.1)
-    assert float(contrasts(results, "steps").table[0].estimates["evaluation steps"].high) == 150.0
+    assert (
+        float(compare_conditions(results, "steps").table[0].estimates["evaluation steps"].high)
+        == 150.0
+    )
     equal = estimate_of(lengths([[25], [25]], StepLimits(25, 25)), "a", "evaluation", STEPS)
     assert tuple(map(float, equal)) == (25.0, 25.0, 25.0)
 
@@ -195,4 +196,4 @@ def test_an_interval_that_seems_to_contradict_p_is_explained_once(
     found = Difference("a", "evaluation success", 8, estimate, p, p, sample)
     text = " ".join(" ".join(verdicts({"all": [found, found]})).split())
     assert text.count("seem to disagree about 0, p decides.") == is_explained
-    assert "probability 0.80 in evaluation success." in text
+    assert "with power 0.80 among 2 comparisons in evaluation success." in text

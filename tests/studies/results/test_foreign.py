@@ -86,7 +86,7 @@ def test_columns_of_conditions_are_crossed(scores) -> None:
     table = scores.assign(model=np.where(scores["run"] < 4, "small", "large"))
     roles = ROLES | {"condition": ["topology", "model"]}
     comparison = na.compare_table(table, score="tokens", by="topology", **roles)
-    assert [group.setting for group in comparison.contrasts.groups] == ["large", "small"]
+    assert [group.setting for group in comparison.analysis.groups] == ["large", "small"]
     assert len(comparison.differences) == 4
 
 
@@ -115,7 +115,7 @@ def test_scores_are_paired_by_seed_and_item(scores) -> None:
 def test_scores_may_have_names_that_mean_something_in_studies(scores, name) -> None:
     table = scores.rename(columns={"tokens": name})
     comparison = na.compare_table(table, score=name, reference="chain", **ROLES)
-    assert comparison.contrasts.title == f"evaluation {name}"
+    assert comparison.analysis.title == f"evaluation {name}"
     assert comparison.differences[0].estimate.value == pytest.approx(6.0)
 
 
@@ -162,7 +162,7 @@ def test_phases_are_not_pooled(scores, tmp_path, capfd) -> None:
     assert main(command) == 2
     assert "phase: name one, known: test, train" in capfd.readouterr().err
     assert main([*command, "--phase", "train"]) == 0
-    assert "train tokens, less that of chain" in capfd.readouterr().out
+    assert "train tokens, minus that of chain" in capfd.readouterr().out
     assert main([*command, "--phase", "tset"]) == 2
     assert "phase = 'tset': did you mean 'test'" in capfd.readouterr().err
 

@@ -107,7 +107,7 @@ def test_order_does_not_matter_and_names_never_merge(
         assert comparison is None
         assert "stands in" in said
     if comparison is not None:
-        groups = comparison.contrasts.groups
+        groups = comparison.analysis.groups
         known = conditions if fault != "blank score" else None
         names = sorted(name for group in groups for name in group.values)
         assert known is None or names == known

@@ -115,7 +115,7 @@ def test_a_run_that_was_killed_is_left_out_and_counted(tmp_path: Path) -> None:
     }
     comparison = compare(tmp_path, runs)
     (found,) = comparison.differences
-    assert comparison.contrasts.title == "last step return"
+    assert comparison.analysis.title == "last step return"
     assert (found.seeds, float(found.estimate.value)) == (3, 0.0)
     said = " ".join(comparison.verdicts)
     assert "step_count 400" in said
@@ -132,7 +132,7 @@ def test_series_are_aligned_by_step_count_whatever_their_keys(tmp_path: Path) ->
     for k in (2, 3):  # a metric that is measured rarely shortens no other
         runs["A"]["0"] = SERIES | {"step_1": SERIES["step_1"] | {"rare": [0.0]}}
         comparison = compare(tmp_path, runs)
-        assert comparison.contrasts.measure.name == "return"
+        assert comparison.analysis.measure.name == "return"
         assert float(comparison.differences[0].estimate.value) == 0.0, k
         assert "step_count 400" in " ".join(comparison.verdicts)
 
@@ -142,7 +142,7 @@ def test_a_run_without_absolute_metrics_does_not_switch_what_is_compared(tmp_pat
     runs = {name: {f"seed_{k}": whole for k in range(4)} for name in ("A", "B")}
     runs["B"]["seed_0"] = SERIES
     comparison = compare(tmp_path, runs)
-    assert comparison.contrasts.title == "evaluation return"
+    assert comparison.analysis.title == "evaluation return"
     assert "1 of 8 runs" in " ".join(comparison.verdicts)
     assert compare(tmp_path, runs, phase="last step").differences[0].seeds == 4
 
@@ -224,7 +224,7 @@ def test_each_task_has_its_own_last_step(tmp_path: Path) -> None:
     comparison = na.load(path).compare()
     means = {
         line.condition: line.estimates["last step return"].value
-        for line in comparison.contrasts.table
+        for line in comparison.analysis.table
     }
     assert {name: float(own) for name, own in means.items()} == {
         "env/short, A": 4.0, "env/short, B": 4.0, "env/long, A": 9.0, "env/long, B": 9.0,

@@ -3,20 +3,30 @@ import pytest
 from scipy import special, stats
 
 from nested_agents.studies.results import curves, laws, samples
-from nested_agents.studies.results.analysis import Difference, adjust, verdict_lines
+from nested_agents.studies.results.analysis import verdict_lines
+from nested_agents.studies.results.differences import Difference, adjust
 from nested_agents.studies.results.notation import format_number
+from nested_agents.studies.results.permutation_tests import (
+    LEVEL,
+    independent_permutation,
+    paired_permutation,
+)
 from nested_agents.studies.results.power import (
     detectable,
+    detectable_independent,
     deviation_of,
-    exponent_text,
     power,
-    power_lines,
     power_of_t,
-    power_text,
     seeds_for,
     seeds_needed,
 )
-from nested_agents.studies.results.statistics import LEVEL, bootstrap, paired_permutation
+from nested_agents.studies.results.power_text import (
+    exponent_text,
+    independent_power_lines,
+    power_lines,
+    power_text,
+)
+from nested_agents.studies.results.statistics import bootstrap
 
 
 def found_in_simulation(
@@ -119,12 +129,14 @@ def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
     text = " ".join(" ".join(verdict_lines(found)).split())
     assert "+1.00 [+0.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
     said = " ".join(line.strip() for line in power_lines([d.sample for d in found]))
-    assert "5 seeds and 2 comparisons cannot give an adjusted p below 0.05" in said
-    assert "It needs at least 7 seeds; for a difference of 0.20, about" in said
+    assert "5 seeds cannot give an adjusted p below 0.05 among 2 comparisons" in said
+    assert "At least 7 seeds are needed; a difference of 0.20 needs about" in said
 
 
 def test_without_deviation_nothing_is_promised() -> None:
-    assert "cannot be determined" in " ".join(power_text(8, 1, None, None))
+    assert "Power: unknown, because all seeds have the same difference" in " ".join(
+        power_text(8, 1, None, None)
+    )
     assert power_lines([]) == []
 
 
@@ -184,12 +196,12 @@ def test_exponents_are_told_apart_by_more_seeds_or_larger_sizes() -> None:
     # Logarithms of sizes lie log 2 apart: their squares about the mean sum up to 5 (log 2) ** 2.
     deviation = 0.5 / (5.0**0.5 * np.log(2.0))
     assert (
-        f"differ by {format_number(detectable(deviation, 20))} are significantly different" in said
+        f"difference of exponents of {format_number(detectable(deviation, 20))} with power" in said
     )
-    assert f"takes about {seeds_for(0.2, deviation)} seeds, or sizes to 32." in said
+    assert f"needs about {seeds_for(0.2, deviation)} seeds, or sizes up to 32." in said
     few = " ".join(" ".join(exponent_text([2.0, 3.0, 4.0], 5, comparisons=3)).split())
     assert few.startswith(
-        "Exponents: 5 seeds are too few for a significant difference, at least 7 are needed."
+        "Exponents: 5 seeds are too few for a significant difference; at least 7 are needed."
     )
 
 
@@ -208,3 +220,32 @@ def test_told_exponents_are_found_as_often_as_promised() -> None:
         pair = [laws.fit(curves.POWER, sample, 2) for sample in both]
         hits += laws.compare(*pair).p < 0.05
     assert 0.74 < hits / times < 0.88
+
+
+def test_differences_that_are_equal_except_for_rounding_have_no_power() -> None:
+    base = np.linspace(-3.0, 4.0, 8)
+    lines = power_lines([(base + 0.5) - base], "score", of_rates=False)
+    assert " ".join(lines).startswith("Power: unknown in score, because all seeds have the same")
+
+
+@pytest.mark.parametrize(("counts", "comparisons"), [((8, 8), 1), ((20, 12), 1), ((15, 15), 3)])
+def test_what_independent_runs_detect_is_found_as_often_as_promised(counts, comparisons) -> None:
+    effect = detectable_independent(1.0, counts, comparisons)
+    rng = np.random.default_rng(0)
+    found = [
+        independent_permutation(rng.normal(effect, size=counts[0]), rng.normal(size=counts[1]))
+        for _ in range(120)
+    ]
+    share = np.mean(np.array(found) * comparisons < LEVEL)
+    assert share == pytest.approx(0.8, abs=0.1)
+
+
+def test_the_power_of_independent_runs_is_printed() -> None:
+    rng = np.random.default_rng(1)
+    groups = [(rng.normal(size=8), rng.normal(size=9))]
+    text = " ".join(independent_power_lines(groups, 1, "score"))
+    assert text.startswith("Power: 8 and 9 independent runs detect a difference of")
+    few = " ".join(independent_power_lines([(np.arange(3.0), np.arange(3.0))], 1))
+    assert few == "Power: 3 and 3 independent runs cannot give an adjusted p below 0.05."
+    equal = " ".join(independent_power_lines([(np.ones(8), np.zeros(8))], 1))
+    assert "unknown, because the runs of each condition are all equal" in equal

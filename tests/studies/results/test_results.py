@@ -16,7 +16,8 @@ from made_up_results import ablation, hierarchies, scaling
 import nested_agents as na
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results.choices import choose_trials
-from nested_agents.studies.results.results import NUMBERS, combine, read
+from nested_agents.studies.results.joining import combine
+from nested_agents.studies.results.results import NUMBERS, read
 from nested_agents.studies.spec.studies import NAMES
 from nested_agents.studies.workers.runner import save
 

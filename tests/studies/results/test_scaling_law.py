@@ -1,9 +1,11 @@
 """Laws of growth of published studies, by Python and by the command."""
 
+import json
 import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import nested_agents as na
@@ -40,7 +42,7 @@ def test_decisions_to_a_criterion_are_counted_and_fitted() -> None:
     assert chain is not None
     # Seeds 0 and 1 of two robots begin after 1 and 2 episodes; five more are looked at.
     assert np.exp(chain.sample.values[:2, 0]) == pytest.approx([20 * 6, 20 * 7])
-    assert any(line.startswith("Exponents, less that of chain") for line in law.notes)
+    assert any(line.startswith("Exponents, minus that of chain") for line in law.notes)
 
 
 def test_runs_that_never_reach_it_are_censored() -> None:
@@ -241,3 +243,56 @@ def test_the_published_study_of_scaling_by_command_and_in_python(capsys, tmp_pat
     assert str(growth.table).splitlines()[1].split()[1] in out
     assert main([*command[:2], "--format", "csv"]) == 0
     assert capsys.readouterr().out.startswith("condition,")
+
+
+def growing_scores() -> pd.DataFrame:
+    """Return scores of eight runs of five sizes that grow as ``3 n^1.5``, with 10% noise."""
+    rng = np.random.default_rng(0)
+    rows = [
+        (n, seed, 3.0 * n**1.5 * (1.0 + 0.1 * rng.normal()))
+        for n in (1, 2, 4, 8, 16)
+        for seed in range(8)
+    ]
+    return pd.DataFrame(rows, columns=["robots", "seed", "score"])
+
+
+@pytest.mark.parametrize("name", ["scores.csv", "scores.jsonl", "scores.parquet", "runs.json"])
+def test_tables_of_scores_are_fitted_as_compare_reads_them(name, tmp_path, capsys) -> None:
+    scores = growing_scores()
+    path = tmp_path / name
+    columns = ["--columns", "condition=robots"]
+    if name == "scores.csv":
+        scores.to_csv(path, index=False)
+    elif name == "scores.jsonl":
+        scores.to_json(path, orient="records", lines=True, double_precision=15)
+    elif name == "scores.parquet":
+        pytest.importorskip("pyarrow", reason="pip install pyarrow")
+        scores.to_parquet(path)
+    else:  # the form of marl-eval, whose algorithms are sizes
+        runs = {
+            str(n): {
+                f"seed_{seed}": {"absolute_metrics": {"score": [own]}}
+                for seed, own in zip(rows["seed"], rows["score"], strict=True)
+            }
+            for n, rows in scores.groupby("robots")
+        }
+        path.write_text(json.dumps({"env": {"task": runs}}))
+        columns = []
+    assert main(["fit", str(path), *columns, "--measure", "score", "--format", "json"]) == 0
+    (line,) = json.loads(capsys.readouterr().out)
+    slopes = [
+        np.polyfit(np.log(own["robots"]), np.log(own["score"]), 1)[0]
+        for _, own in scores.groupby("seed")
+    ]
+    assert line["estimates"]["exponent"]["value"] == pytest.approx(np.mean(slopes), abs=0.02)
+
+
+def test_negative_scores_have_no_law_and_the_reason_says_what_can_be_done(tmp_path, capsys) -> None:
+    path = tmp_path / "scores.csv"
+    scores = growing_scores()
+    scores.assign(score=-scores["score"]).to_csv(path, index=False)
+    assert main(["fit", str(path), "--columns", "condition=robots"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "no law: the mean at size 16 is -197" in said
+    assert "allowed: positive means" in said
+    assert "fit another measure" in said

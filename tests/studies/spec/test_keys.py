@@ -118,7 +118,7 @@ def test_a_kind_is_a_key(name: str, known: Registry) -> None:
     key = the_key(name)
     kinds, _, own = key.allowed.partition("; ")
     assert kinds.split(", ") == list(known.built_in)
-    assert own == "or one of your own, file.py:NAME"
+    assert own == "or your own, file.py:NAME"
     assert key.default.strip('"') in known.built_in
 
 

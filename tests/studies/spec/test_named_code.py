@@ -99,7 +99,7 @@ def test_no_environment_imports_a_module_that_is_not_trusted(
     table = {"scenario": {"kind": kind, "id": name}}
     swept = {"scenario": {"kind": kind, "id": "a"}, "sweep": {"scenario.id": ["a", name]}}
     for each in (table, swept):
-        with pytest.raises(SpecError, match=r"^scenario\.id: .* is a module that theirs names"):
+        with pytest.raises(SpecError, match=r"^scenario\.id: .*: theirs names this module"):
             Spec.of(each, Sources(None, brought_by="theirs"))
     options = {"kind": "gymnasium", "id": "GymV21Environment-v0", "options": {"env_id": name}}
     with pytest.raises(SpecError, match=r"^scenario\.options\.env_id: "):

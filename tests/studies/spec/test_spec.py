@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.scenarios.line_up import LineUp
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec.objects import plain
 from nested_agents.studies.spec.presets import PRESETS
-from nested_agents.studies.spec.spec import Spec, plain
+from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.tables import dumps
 from nested_agents.topologies import build
 
@@ -265,10 +266,10 @@ def test_the_trials_of_all_overrides_are_counted_before_they_are_made():
 def test_evaluations_may_change_the_hierarchy_and_the_decision():
     spec = Spec.parse(
         """
-        topology.told = "parents"
+        topology.communication = "parents"
         [evaluations]
         circle.box = "circle"
-        silent = { topology.told = "none", learner.decision.unseen = "last" }
+        silent = { topology.communication = "none", learner.decision.unseen = "last" }
         tree.topology = "tree:2"
         """
     )
@@ -276,9 +277,9 @@ def test_evaluations_may_change_the_hierarchy_and_the_decision():
     circle, silent, tree = (settings for _, settings in condition.evaluations)
     assert circle.acts_as(condition.settings)
     assert not silent.acts_as(condition.settings)
-    assert (silent.topology.kind, silent.topology.told) == ("chain", "none")
+    assert (silent.topology.kind, silent.topology.communication) == ("chain", "none")
     assert (silent.learner.decision.unseen, tree.learner.decision.unseen) == ("last", "maintain")
-    assert (tree.topology.kind, tree.topology.told) == ("tree", "parents")
+    assert (tree.topology.kind, tree.topology.communication) == ("tree", "parents")
     assert silent.scenario == condition.settings.scenario
 
 
@@ -286,13 +287,19 @@ def test_evaluations_may_change_the_hierarchy_and_the_decision():
     ("table", "complaint"),
     [
         ({"learner": {"kind": "frozen"}}, "learner.kind: a trained team may change its decision"),
-        ({"topology": {"told": "all"}}, "topology.told = 'all': must be 'ancestors', 'parents'"),
-        ({"topology": {"considers": 1}}, "topology.considers = 1: must be"),
         (
-            {"topology": {"told": "none", "failures": [{"kind": "lost", "agents": "*"}]}},
-            "told = 'none': there are no messages to fail",
+            {"topology": {"communication": "all"}},
+            "topology.communication = 'all': must be 'ancestors', 'parents'",
         ),
-        ({"topology": {"told": ["own"]}}, "must be a list of one or two of body, next, farther"),
+        ({"topology": {"lookahead": 1}}, "topology.lookahead = 1: must be"),
+        (
+            {"topology": {"communication": "none", "failures": [{"kind": "lost", "agents": "*"}]}},
+            "communication = 'none': there are no messages to fail",
+        ),
+        (
+            {"topology": {"communication": ["own"]}},
+            "must be a list of one or two of body, next, farther",
+        ),
         ({"topology": {"failures": [{"kind": "lots"}]}}, "topology.failures"),
         (
             {"topology": {"failures": [{"kind": "lost", "agents": "*", "probability": 2}]}},
@@ -446,8 +453,8 @@ def test_keywords_make_a_whole_spec_and_objects_stand_for_names():
 @pytest.mark.parametrize(
     "topology",
     [
-        Hierarchy("abc", [("a", "b")], told="none", considers="children"),
-        Hierarchy("abc", [], neighbours=[("a", "b")]),
+        Hierarchy("abc", [("a", "b")], communication="none", lookahead="children"),
+        Hierarchy("abc", [], neighbors=[("a", "b")]),
         nx.path_graph(["a", "b", "c"]),
         nx.DiGraph([("a", "b"), ("b", "c")]),
     ],
@@ -455,10 +462,11 @@ def test_keywords_make_a_whole_spec_and_objects_stand_for_names():
 def test_a_topology_given_as_an_object_keeps_its_relations(topology):
     built = build(plain(topology, "topology"), list("abc"))
     if isinstance(topology, Hierarchy):
-        assert (built.edges, built.neighbours) == (topology.edges, topology.neighbours)
-        assert (built.told, built.considers) == (topology.told, topology.considers)
+        assert (built.edges, built.neighbors) == (topology.edges, topology.neighbors)
+        assert built.communication == topology.communication
+        assert built.lookahead == topology.lookahead
     else:
-        pairs = built.edges if topology.is_directed() else built.neighbours
+        pairs = built.edges if topology.is_directed() else built.neighbors
         assert pairs == ((0, 1), (1, 2))
 
 
@@ -468,8 +476,8 @@ def test_a_class_stands_for_its_name_as_kind_of_a_table_too() -> None:
 
 
 def test_edges_beside_neighbours_have_no_table():
-    with pytest.raises(SpecError, match="of edges and neighbours has no table in a spec"):
-        plain(Hierarchy("abc", [("a", "b")], neighbours=[("a", "c")]), "topology")
+    with pytest.raises(SpecError, match="both edges and neighbors cannot be written in a spec"):
+        plain(Hierarchy("abc", [("a", "b")], neighbors=[("a", "c")]), "topology")
 
 
 @pytest.mark.parametrize(
@@ -518,10 +526,9 @@ def test_agents_are_laid_over_and_swept_as_topologies_are() -> None:
     ]
 
 
-def test_an_agent_for_every_actuator_is_no_part_of_an_identity() -> None:
+def test_an_agent_for_every_actuator_is_the_default() -> None:
     plain, robots = Spec.of({"sweep": {"agents": ["actuator", "body"]}}).conditions()
     assert plain.settings.canonical() == Spec().conditions()[0].settings.canonical()
-    assert "agents" not in plain.settings.model_dump()
     assert robots.settings.model_dump()["agents"] == "body"
 
 

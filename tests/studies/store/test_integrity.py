@@ -333,7 +333,7 @@ def test_a_damaged_copy_of_the_spec_is_no_other_study(study, before, after, caps
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert f"{path}" in error
-    assert f"it is damaged: nested-agents retry {study} goes on by the database" in error
+    assert f"it is damaged: nested-agents retry {study} continues from the database" in error
 
 
 def test_a_study_of_a_newer_version_is_refused(study, capsys):

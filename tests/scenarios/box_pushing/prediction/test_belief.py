@@ -46,10 +46,9 @@ def calibrating(world, agents="actuator"):
 
 
 def pushed(model, twists=TWISTS):
-    after, box, _ = push(
-        ROBOTS, np.zeros(3), twists[:, None], np.zeros((1, 2), np.int64), 0.512, model
-    )
-    return np.vstack([box, after[0]])
+    choices = np.zeros((2, 1), np.int64)
+    after, box, _ = push(ROBOTS, np.zeros(3), twists[:, None], choices, 0.512, model)
+    return np.vstack([box.T, after[:, :, 0]])
 
 
 def test_believed_are_the_worlds_own_constants_times_the_factors():
@@ -122,7 +121,7 @@ def test_wrong_constants_are_found_out_by_pushing(believed):
     # After 80 decisions of which three quarters push. A wrong start was off by 1.4, 1.4 and 0.7.
     # How robots give way sideways is hardly to be seen in straight pushes.
     assert (np.abs(errors[-1])[[0, 2]] < [0.1, 0.2]).all()
-    box = abs(prediction.poses(joint[None]).box[0] - world.measure()["box_pose"])
+    box = abs(prediction.poses(joint[None]).boxes[:, 0] - world.measure()["box_pose"])
     assert box[:2].max() < 0.005
 
 

@@ -49,8 +49,8 @@ def test_the_exact_one_foresees_to_the_bit(failures: tuple[object, ...], periods
             entered = transition.states[0]
             np.testing.assert_allclose(predicted[same], entered[same], rtol=0, atol=1e-14)
             if periods == 1:
-                np.testing.assert_array_equal(foreseen.box[1], world.world.box_pose)
-                np.testing.assert_array_equal(foreseen.robots[1], world.world.robot_poses)
+                np.testing.assert_array_equal(foreseen.boxes[:, 1], world.world.box_pose)
+                np.testing.assert_array_equal(foreseen.robots[:, :, 1], world.world.robot_poses)
         touched |= bool(transition.info["contact"].any())
     assert touched
 
@@ -84,7 +84,7 @@ def errors(predictor: str, *, steps: int = 14) -> tuple[float, float]:
         world.reset(world_seed(seed, 0))
         for step in range(steps):
             joint = AHEAD if step < 2 else AHEAD + 2
-            box = world.predict().poses(joint[None]).box[0]
+            box = world.predict().poses(joint[None]).boxes[:, 0]
             before = world.measure()["box_pose"]
             info = world.step(joint).info
             if (info["contact_time"] > 0).any():

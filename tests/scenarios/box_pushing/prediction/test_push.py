@@ -1,13 +1,17 @@
 """The push predictor: limits that can be worked out, and the world that it predicts."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from push_oracle import push_one
 
+from nested_agents.core.numerics import FloatArray, IntArray
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.push import PushModel, push
+from nested_agents.scenarios.box_pushing.prediction import push as kernels
+from nested_agents.scenarios.box_pushing.prediction.push import PushModel
 from nested_agents.scenarios.box_pushing.prediction.push_lanes import (
     BOX_SIZE,
     COS,
@@ -29,13 +33,21 @@ def model(n: int, *, rigid: bool = False) -> PushModel:
     return PushModel(
         edges=BOX.outline.edges,
         rounding=BOX.outline.rounding,
-        reach=BOX.reach,
         radii=np.full(n, ROBOT.radius),
         compliance=np.stack([yielding] * n),
         friction_force=BOX.friction_force,
         friction_radius=BOX.friction_radius,
         contact_friction=0.0 if rigid else BOX.contact_friction,
     )
+
+
+def push(
+    robots: FloatArray, box: FloatArray, twists: FloatArray, choices: IntArray, *rest: Any
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return poses and gaps with combinations on the first axis, for choices ``(m, M)``."""
+    pushed = kernels.push(robots, box, twists, np.ascontiguousarray(choices.T), *rest)
+    after, boxes, gaps = (np.moveaxis(each, -1, 0) for each in pushed)
+    return after, boxes, gaps
 
 
 def ahead(poses, speed: float, believed: PushModel, seconds: float = 0.512):
@@ -95,9 +107,7 @@ def test_a_push_off_the_centre_turns_the_box_away() -> None:
 def test_the_lanes_compute_what_is_written(name: str, rigid: bool) -> None:
     rng = np.random.default_rng(0)
     outline = BOXES[name].outline
-    believed = model(3, rigid=rigid)._replace(
-        edges=outline.edges, rounding=outline.rounding, reach=outline.radius
-    )
+    believed = model(3, rigid=rigid)._replace(edges=outline.edges, rounding=outline.rounding)
     for count in (1, 37):
         angles = rng.uniform(-np.pi, np.pi, 3)
         distances = rng.uniform(0.8, 1.2, 3) * (outline.radius + ROBOT.radius)
@@ -116,7 +126,7 @@ def test_the_lanes_compute_what_is_written(name: str, rigid: bool) -> None:
 def test_a_joint_action_has_the_same_bits_alone_and_among_others(name: str) -> None:
     rng = np.random.default_rng(0)
     outline = BOXES[name].outline
-    believed = model(3)._replace(edges=outline.edges, reach=outline.radius)
+    believed = model(3)._replace(edges=outline.edges)
     robots = rng.uniform(-1.2, 1.2, (3, 3)) * [outline.radius, outline.radius, np.pi]
     box = np.array([0.01, 0.02, 0.3])
     twists = rng.uniform(-0.1, 0.13, (3, 40, 3)) * [1, 0.2, 9]
@@ -133,7 +143,7 @@ def test_a_joint_action_has_the_same_bits_alone_and_among_others(name: str) -> N
 def test_headings_are_exact_to_the_last_bit_but_one(angles: list[float]) -> None:
     rows = np.zeros((2, BOX_SIZE))
     rows[1, PSI : PSI + len(angles)] = angles
-    head(rows, 1, len(angles))
+    head(rows, 1)
     for row, function in ((COS, np.cos), (SIN, np.sin)):
         found = rows[1, row : row + len(angles)]
         np.testing.assert_allclose(found, function(angles), rtol=0, atol=3e-16)
@@ -150,7 +160,7 @@ def test_it_predicts_the_world_within_millimetres() -> None:
             predicted = scenario.predict().poses(joint[None])
             before = scenario.world.box_pose.copy()
             scenario.step(joint)
-            errors.append(np.hypot(*(predicted.box[0] - scenario.world.box_pose)[:2]))
+            errors.append(np.hypot(*(predicted.boxes[:, 0] - scenario.world.box_pose)[:2]))
             moves.append(np.hypot(*(before - scenario.world.box_pose)[:2]))
             joint = rng.choice([0, 2, 2, 2], size=4)
     pushed = np.array(moves) > 0.005

@@ -12,7 +12,7 @@ from nested_agents.core.evaluators.best_response import BestResponse
 from nested_agents.core.evaluators.evaluator import Evaluator
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.rules.rule_base import RuleBaseSettings
+from nested_agents.core.values.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import BoxPrediction
 

@@ -1,34 +1,36 @@
 """State variables worked out by hand, and their mirror images."""
 
-from dataclasses import replace
 from math import pi
 
 import numpy as np
 import pytest
+from variables_oracle import batch_of
 
-from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.numerics import FloatArray, wrap, wrap_each
+from nested_agents.core.numerics import wrap, wrap_each
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES, View
+from nested_agents.scenarios.box_pushing.states.situations import SituationBatch
 from nested_agents.scenarios.box_pushing.states.state_spaces import (
     STATE_SPACES,
-    BoxStateSpace,
     build_space,
     state_space_for,
 )
+from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.state_variables import StateVariable, sense
 
 GOAL = np.array([1.0, 0.0, 0.0])
-SQUARE = BOXES["square"].outline
-ORIGIN = np.array([-0.03, 0.0, 0.0])
+SQUARE = BOXES["square"].shape
+ORIGIN = np.array([[-0.03, 0.0, 0.0]])
 
 
-def view(robots, box, gaps) -> View:
+def situation(robots, box, gaps) -> SituationBatch:
     described = np.array([robots], float), np.array([box], float), np.array([gaps], float)
-    return View(*described, GOAL, ORIGIN, 3.0, SQUARE, BOXES["square"].friction_radius)
+    return batch_of(*described, GOAL, ORIGIN, 3.0, SQUARE)
+
+
+def shared(batch: SituationBatch, robot: int) -> dict[str, float]:
+    return dict(zip(VARIABLES, EVERY.shared(batch, [robot])[0][0], strict=True))
 
 
 VARIABLES = tuple(STATE_VARIABLES.built_in)
@@ -39,15 +41,15 @@ EVERY = build_space("every", *VARIABLES)
 def test_functions_fill_the_space_they_describe(name: str) -> None:
     spec = STATE_SPACES[name]
     poses = np.random.default_rng(0).uniform(-1, 1, (5, 2, 3))
-    seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, ORIGIN, 1.0, SQUARE, 0.08)
+    batch = batch_of(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, ORIGIN, 1.0, SQUARE)
     assert spec.own(poses[:, 0], poses[:, 0, 0], GOAL).shape == (5, spec.space.n_own)
-    assert spec.sense(seen, [1])[0].shape == (5, spec.space.n_variables - spec.space.n_own)
+    assert spec.shared(batch, [1])[0].shape == (5, spec.space.n_variables - spec.space.n_own)
 
 
 def test_relational_variables_by_hand() -> None:
     # The box 1 m before the goal, robot 1 straight behind it, robot 2 on its left, facing it.
-    situation = view([[-0.2, 0.0, 0.1], [0.0, 0.2, -pi / 2]], [0.0, 0.0, 0.3], [0.06, 0.08])
-    first = dict(zip(VARIABLES, EVERY.sense(situation, [0])[0][0], strict=True))
+    batch = situation([[-0.2, 0.0, 0.1], [0.0, 0.2, -pi / 2]], [0.0, 0.0, 0.3], [0.06, 0.08])
+    first = shared(batch, 0)
     assert (first["gap"], first["others_gap"], first["box_distance"]) == (0.06, 0.08, 1.0)
     assert first["box_bearing"] == pytest.approx(-0.1)
     assert first["side"] == pytest.approx(0.0)
@@ -56,7 +58,7 @@ def test_relational_variables_by_hand() -> None:
     assert first["cross_track_error"] == pytest.approx(-np.sqrt(0.5))
     assert first["approach"] == pytest.approx(0.01)  # 3 cm in three periods
     assert first["box_turn"] == first["bend"] == pytest.approx(0.3)  # straight ahead
-    second = dict(zip(VARIABLES, EVERY.sense(situation, [1])[0][0], strict=True))
+    second = shared(batch, 1)
     assert second["box_bearing"] == pytest.approx(0.0)
     assert second["side"] == pytest.approx(-pi / 2)
 
@@ -66,11 +68,11 @@ def test_variables_of_crowds_by_hand() -> None:
     turn = np.array([np.cos(0.3), np.sin(0.3)])
     left = np.array([-turn[1], turn[0]])
     low = -0.1 * turn - 0.08 * left
-    situation = view([[*low, 0.1], [0.0, 0.9, -pi / 2]], [0.0, 0.0, 0.3], [0.0, 0.77])
-    first = dict(zip(VARIABLES, EVERY.sense(situation, [0])[0][0], strict=True))
+    batch = situation([[*low, 0.1], [0.0, 0.9, -pi / 2]], [0.0, 0.0, 0.3], [0.0, 0.77])
+    first = shared(batch, 0)
     assert first["face_bearing"] == pytest.approx(0.2)
     assert first["others_away"] == 1.0
-    second = dict(zip(VARIABLES, EVERY.sense(situation, [1])[0][0], strict=True))
+    second = shared(batch, 1)
     assert second["others_away"] == 0.0
     # Nearly all of the push is that of the robot in contact.
     alone = np.arctan2(*-low[::-1])
@@ -82,36 +84,37 @@ def test_variables_of_crowds_by_hand() -> None:
 def test_common_variables_are_the_same_for_all_robots() -> None:
     rng = np.random.default_rng(0)
     poses = rng.normal(size=(20, 5, 3))
-    seen = View(
-        poses, poses[:, 0].copy(), rng.normal(size=(20, 5)), GOAL, ORIGIN, 3.0, SQUARE, 0.08
-    )
-    blocks = dict(enumerate(EVERY.sense(seen, [r])[0] for r in range(5)))
+    gaps = rng.normal(size=(20, 5))
+    batch = batch_of(poses, poses[:, 0].copy(), gaps, GOAL, ORIGIN, 3.0, SQUARE)
+    blocks = dict(enumerate(EVERY.shared(batch, [r])[0] for r in range(5)))
     for column, name in enumerate(VARIABLES):
         alike = all((blocks[r][:, column] == blocks[0][:, column]).all() for r in range(5))
         assert alike == (name in EVERY.space.common), name
 
 
 def test_a_push_away_from_the_goal_misses_it_by_the_whole_distance() -> None:
-    situation = view([[0.2, 0.1, 0.0]], [0.0, 0.0, 0.0], [0.06])
-    assert EVERY.sense(situation, [0])[0][0][VARIABLES.index("cross_track_error")] == -1.0
+    batch = situation([[0.2, 0.1, 0.0]], [0.0, 0.0, 0.0], [0.06])
+    assert shared(batch, 0)["cross_track_error"] == pytest.approx(-1.0, rel=1e-15)
 
 
 def test_the_arc_to_the_goal_pose_bends_twice_as_far_as_the_course() -> None:
     # 45 degrees to the left of the way to the goal: an arc begins at right angles to it.
-    situation = view([[0.0, 0.0, 0.0]], [0.0, 1.0, -pi / 2], [0.06])
-    assert EVERY.sense(situation, [0])[0][0][VARIABLES.index("bend")] == pytest.approx(0.0)
+    batch = situation([[0.0, 0.0, 0.0]], [0.0, 1.0, -pi / 2], [0.06])
+    assert shared(batch, 0)["bend"] == pytest.approx(0.0)
 
 
 def test_a_single_robot_has_no_others() -> None:
-    shared = EVERY.sense(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])[0][0]
-    assert shared[3] == shared[0] == 0.06
+    alone = shared(situation([[-0.2, 0, 0]], [0, 0, 0], [0.06]), 0)
+    assert alone["others_gap"] == alone["gap"] == 0.06
+    assert alone["others_away"] == 1.0
 
 
 def test_equation_1_by_hand() -> None:
     own = STATE_SPACES["paper"].own(np.array([[1.0, -2.0, pi]]), np.array([0.05]), GOAL)[0]
     np.testing.assert_allclose(own, [-pi, -pi / 2, 2.0, 0.05], atol=1e-12)
-    shared = STATE_SPACES["paper"].sense(view([[0, 0, 0]], [1.0, 1.0, 0.2], [0.1]), [0])[0][0]
-    np.testing.assert_allclose(shared, [0.2, -pi / 2 - 0.2, 1.0], atol=1e-12)
+    batch = situation([[0, 0, 0]], [1.0, 1.0, 0.2], [0.1])
+    found = STATE_SPACES["paper"].shared(batch, [0])[0][0]
+    np.testing.assert_allclose(found, [0.2, -pi / 2 - 0.2, 1.0], atol=1e-12)
 
 
 def test_mirrored_worlds_have_mirrored_angles() -> None:
@@ -119,8 +122,9 @@ def test_mirrored_worlds_have_mirrored_angles() -> None:
     robots, box = rng.uniform(-1, 1, (2, 3)), rng.uniform(-0.5, 0.5, 3)
     flip = np.array([1.0, -1.0, -1.0])
     for robot in (0, 1):
-        seen = EVERY.sense(view(robots, box, [0.1, 0.2]), [robot])[0][0]
-        mirrored = EVERY.sense(view(robots * flip, box * flip, [0.1, 0.2]), [robot])[0][0]
+        seen = EVERY.shared(situation(robots, box, [0.1, 0.2]), [robot])[0][0]
+        batch = situation(robots * flip, box * flip, [0.1, 0.2])
+        mirrored = EVERY.shared(batch, [robot])[0][0]
         signs = [
             -1 if described.low < 0 and described.name != "approach" else 1
             for described in EVERY.space.shared
@@ -190,12 +194,12 @@ import numpy as np
 from nested_agents import state_variable
 
 @state_variable("rad", -np.pi, np.pi, periodic=True)
-def face(view, robot):
-    return np.remainder(view.course - view.box[:, 2] + np.pi, 2 * np.pi) - np.pi
+def face(situation, robot):
+    return np.remainder(situation.course - situation.box[2] + np.pi, 2 * np.pi) - np.pi
 
 @state_variable("m", 0.0, 0.5)
-def gap(view, robot):
-    return view.gaps[:, robot] + 1.0
+def gap(situation, robot):
+    return robot.gap + 1.0
 
 number = 3
 """
@@ -239,84 +243,31 @@ def test_what_is_no_state_variable_is_refused_in_one_line(name: str, complaint: 
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("space", [*STATE_SPACES.values(), EVERY])
-def test_all_robots_sense_what_each_does_alone(space: BoxStateSpace) -> None:
-    rng = np.random.default_rng(0)
-    poses, gaps = rng.normal(size=(1, 4, 3)), np.abs(rng.normal(size=(1, 4)))
-    seen = View(poses, poses[:, 0] + 0.3, gaps, GOAL, ORIGIN, 1.0, SQUARE, 0.08)
-    np.testing.assert_array_equal(
-        space.sense(seen, range(4)), [space.sense(seen, [r])[0] for r in range(4)]
-    )
-
-
-@pytest.mark.parametrize("space", [*STATE_SPACES.values(), EVERY])
-@pytest.mark.parametrize("robots", [1, 2, 9, 64])
-def test_observing_has_the_bits_of_sensing_robot_by_robot(
-    space: BoxStateSpace, robots: int
-) -> None:
-    rng = np.random.default_rng(robots)
-    poses = 0.3 * rng.normal(size=(1, robots, 3))
-    gaps = 0.02 * np.abs(rng.normal(size=(1, robots)))
-    seen = View(poses, poses[:, 0] + 0.3, gaps, GOAL, ORIGIN, 1.0, SQUARE, 0.08)
-    expected = space.sense(seen, range(robots))[:, 0]
-    assert space.observe(seen)[0].tobytes() == expected.tobytes()
-
-
-def test_many_situations_are_observed_as_each_is() -> None:
-    rng = np.random.default_rng(3)
-    poses, gaps = 0.3 * rng.normal(size=(5, 10, 3)), 0.02 * np.abs(rng.normal(size=(5, 10)))
-    boxes, origins = poses[:, 0] + 0.3, rng.normal(size=(5, 3))
-    space = build_space("all", *STATE_VARIABLES.built_in)
-    many = space.observe(View(poses, boxes, gaps, GOAL, origins, 1.0, SQUARE, 0.08))
-    for k, origin in enumerate(origins):
-        one = np.s_[k : k + 1]
-        seen = View(poses[one], boxes[one], gaps[one], GOAL, origin, 1.0, SQUARE, 0.08)
-        assert space.observe(seen)[0].tobytes() == many[k].tobytes()
-
-
-def test_what_is_common_is_sensed_once() -> None:
-    asked = []
-
-    def counted(name: str, common: bool) -> StateVariable:
-        def function(view: View, robot: int) -> FloatArray:
-            asked.append((name, robot))
-            return view.distance
-
-        return StateVariable(Variable(name, "m", 0.0, 1.0), function, common)
-
-    seen = view([[-0.2, 0, 0], [0.2, 0, 0]], [0, 0, 0], [0.06, 0.1])
-    functions = counted("same", True), counted("own", False)
-    sense(functions, seen, [0, 1])
-    assert asked == [("same", 0), ("own", 0), ("own", 1)]
-    beside = replace(build_space("both", "gap", "side"), functions=functions)
-    np.testing.assert_array_equal(beside.observe(seen)[0], np.full((2, 2), seen.distance))
-    assert asked == 2 * [("same", 0), ("own", 0), ("own", 1)]
-
-
 def test_a_function_of_a_user_is_checked_whatever_its_name() -> None:
     text = """
 from nested_agents import state_variable
 
 @state_variable("m", 0.0, 1.0)
-def gap(view, robot):
-    return view.box
+def gap(situation, robot):
+    return situation.box
 """
     with Sources(texts={"mine.py": text}).active():
         space = build_space("own", "mine.py:gap")
     with pytest.raises(ValueError, match="state variable 'gap': shape"):
-        space.sense(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])
+        space.shared(situation([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])
 
 
 @pytest.mark.parametrize(
     ("returned", "complaint"),
     [
-        ("view.box", r"state variable 'wrong': shape \(\d+, 3\), must be \(\d+,\)"),
+        ("situation.box", r"state variable 'wrong': shape \(3, \d+\), must be \(\d+,\)"),
+        ("robot.x[:2]", r"state variable 'wrong': shape \(2,\), must be \(5,\)"),
         ("1.0", r"state variable 'wrong': shape \(\), must be \(\d+,\)"),
-        ("view.distance + np.nan", "'wrong': not all of its values are finite numbers"),
-        ("view.distance.astype(str)", "not all of its values are finite numbers"),
-        ("np.add(view.box, 1.0, out=view.box)", "read-only"),
-        ("np.add(view.goal, 1.0, out=view.goal)", "read-only"),
-        ("np.add(view.distance, 1.0, out=view.distance)", "read-only"),
+        ("situation.distance + np.nan", "'wrong': not all of its values are finite numbers"),
+        ("situation.distance.astype(str)", "not all of its values are finite numbers"),
+        ("np.add(situation.box[0], 1.0, out=situation.box[0])", "read-only"),
+        ("np.add(robot.gap, 1.0, out=robot.gap)", "read-only"),
+        ("np.add(situation.distance, 1.0, out=situation.distance)", "read-only"),
     ],
 )
 def test_what_functions_of_users_return_is_checked(returned: str, complaint: str) -> None:
@@ -325,14 +276,14 @@ import numpy as np
 from nested_agents import state_variable
 
 @state_variable("m", 0.0, 1.0)
-def wrong(view, robot):
+def wrong(situation, robot):
     return {returned}
 """
     with Sources(texts={"wrong.py": text}).active():
         space = build_space("own", "gap", "wrong.py:wrong")
     poses = np.random.default_rng(0).normal(size=(5, 2, 3))
-    seen = View(poses, poses[:, 0].copy(), np.abs(poses[:, :, 0]), GOAL, ORIGIN, 1.0, SQUARE, 0.08)
-    for compute in (lambda: space.sense(seen, [0])[0], lambda: space.shared_of(seen, [0, 1])):
-        with pytest.raises(ValueError, match=complaint) as error:
-            compute()
-        assert "\n" not in str(error.value)
+    gaps = np.abs(poses[:, :, 0])
+    batch = batch_of(poses, poses[:, 0].copy(), gaps, GOAL, ORIGIN, 1.0, SQUARE)
+    with pytest.raises(ValueError, match=complaint) as error:
+        space.shared(batch, [0, 1])
+    assert "\n" not in str(error.value)

@@ -1,1 +1,0 @@
-"""Fuzzy rule bases: partitions, rules, their reference implementation and compiled kernels."""

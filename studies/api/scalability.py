@@ -1,0 +1,130 @@
+"""Scalability of a study: table, laws, paragraph and figure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING, get_args
+
+from ..errors import SpecError
+from ..presentation.tables import SummaryTable, tabulate
+from ..results.analysis import Summary
+from ..results.notation import wrapped
+from ..results.results import Results
+from ..results.scaling_law import columns_of, size_key
+from ..scalability.analysis import Scalability
+from ..scalability.data import collect
+from ..scalability.laws import Scaling
+from ..spec.conditions import ConditionSettings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ASSUMED = (
+    "The scenario does not say whether its task grows with the team: strong scaling is assumed. "
+    "The option scaling sets it."
+)
+
+
+class ScalabilityTable(SummaryTable):
+    """A table with Student's intervals."""
+
+    @property
+    def remark(self) -> str:
+        """Description of the intervals."""
+        return "Intervals: Student's over seeds; of ratios to the smallest size, Fieller's."
+
+
+@dataclass(frozen=True)
+class ScalabilityReport:
+    """Scalability of hierarchies and their costs; printed or shown by a notebook."""
+
+    analysis: Scalability
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def table(self) -> SummaryTable:
+        """Performance, speed-up, efficiency, serial fraction and costs by hierarchy and size."""
+        return _tabulate(self.analysis.summaries)
+
+    @property
+    def laws(self) -> SummaryTable:
+        """Contention, coherency and best size of the universal scalability law by hierarchy."""
+        return _tabulate(self.analysis.law_summaries)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The findings as a paragraph, in lines, and remarks."""
+        return tuple(
+            line for text in (self.analysis.paragraph, *self.remarks) for line in wrapped(text)
+        )
+
+    @property
+    def json(self) -> str:
+        """Everything as JSON."""
+        return json.dumps(self.analysis.to_dict() | {"remarks": list(self.remarks)}, indent=1)
+
+    def figure(self) -> Figure:
+        """Return four panels: performance, efficiency, a cost, and performance against the cost."""
+        from ..scalability.figure import draw  # matplotlib takes its time
+
+        return draw(self.analysis)
+
+    def __str__(self) -> str:
+        laws = [str(self.laws), ""] if self.analysis.laws else []
+        return "\n".join([str(self.table), "", *laws, *self.notes])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        notes = "\n".join(map(escape, self.notes))
+        laws = self.laws.html if self.analysis.laws else ""
+        return f"{self.table.html}{laws}<p>{notes}</p>"
+
+
+def analyze(
+    results: Results,
+    settings: Mapping[str, ConditionSettings],
+    measure: str | None,
+    size: str | None,
+    scaling: Scaling | None,
+    criterion: float | None,
+    budget: str,
+) -> ScalabilityReport:
+    """Return the report of results with the settings of their conditions, see `StudyResults`."""
+    if scaling not in (None, *get_args(Scaling)):
+        raise SpecError(f"scaling = {scaling!r}: allowed are {', '.join(get_args(Scaling))}")
+    by_scenario = _scaling_of(results, settings, size)
+    data = collect(
+        results,
+        scaling or by_scenario or "strong",
+        measure=results.main.name if measure is None else measure,
+        size=size,
+        criterion=criterion,
+    )
+    analysis = Scalability(data, budget)
+    _ = analysis.choices  # a wrong budget is refused before anything is printed
+    return ScalabilityReport(analysis, () if scaling or by_scenario else (ASSUMED,))
+
+
+def _tabulate(lines: Sequence[Summary]) -> ScalabilityTable:
+    return ScalabilityTable(tabulate(lines).titles, tuple(lines))
+
+
+def _scaling_of(
+    results: Results, settings: Mapping[str, ConditionSettings], size: str | None
+) -> Scaling | None:
+    """Return whether the task grows with the team; None if the scenario does not say."""
+    columns = columns_of(results)
+    key = size_key(columns, size)
+    sizes: dict[float, set[float | None]] = {}
+    for condition, own in settings.items():
+        if condition in columns:
+            n = float(str(columns[condition][key]))
+            sizes.setdefault(n, set()).add(own.scenario.task_size)
+    known: Sequence[float | None] = [part for each in sizes.values() for part in each]
+    if not known or None in known:
+        return None
+    return "weak" if len(set(known)) > 1 else "strong"

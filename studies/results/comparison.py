@@ -1,0 +1,379 @@
+"""Comparisons of conditions: all with one reference, or level by level of a swept key.
+
+An `Estimate` is the mean of one condition, a `Difference` compares a condition with its reference,
+a `ComparisonGroup` holds the differences from one reference, and a `ComparisonTable` holds all
+groups, over which p-values are adjusted.
+"""
+
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+from ...core.interface.measures import RETURN, SUCCESS, Measure
+from ...core.numerics import pd
+from ...core.plugins.words import closest
+from ..errors import SpecError
+from ..spec.tables import aliases, label, named
+from .analysis import NOTHING, Summary, identity_lines, steps_estimate, verdicts
+from .differences import MIN_RUNS, BySeed, Difference, Pair, differences, select_shared
+from .notation import wrapped
+from .power_text import power_lines
+from .recovery import RECOVERY, recovery_by_seed
+from .results import SECONDS, STEPS, Results, describe_number, row_means
+from .series import LAST_STEP
+from .statistics import Array, Estimate, bootstrap, exactly, rate
+
+DIFFERENCE_TITLES = {True: "difference", False: "difference (independent samples)"}
+"""Headings of the column of differences, of paired and of independent runs."""
+Member = tuple[str, str]
+"""Name of a condition within its group, and its label."""
+
+
+class ComparisonGroup(NamedTuple):
+    """Conditions that are compared with one reference."""
+
+    setting: str
+    """Label of what the conditions have in common; empty if that is nothing."""
+    reference: str
+    differences: tuple[Difference, ...]
+    table: tuple[Summary, ...]
+    """A line for each condition, the reference first."""
+    values: Mapping[str, Array]
+    """Means of the seeds ``(n_seeds,)`` by condition."""
+    training: Mapping[str, Array]
+    """Values of the training episodes ``(n_seeds, n_episodes)`` by condition, where measured."""
+    left_out: tuple[str, ...] = ()
+    """For each condition, the number of runs or scores without a partner."""
+
+
+class ComparisonTable(NamedTuple):
+    """Conditions compared by one measure; p is adjusted over all groups."""
+
+    measure: Measure
+    phase: str
+    """Phase of the episodes; empty for a number of whole trials."""
+    groups: tuple[ComparisonGroup, ...]
+    identical: tuple[tuple[str, ...], ...] = ()
+    """Conditions without any difference, see `Results.identical`."""
+
+    @property
+    def differences(self) -> tuple[Difference, ...]:
+        """All differences."""
+        return tuple(d for group in self.groups for d in group.differences)
+
+    @property
+    def title(self) -> str:
+        """Title of the measure, as tables have it."""
+        return title_of(self.measure, self.phase)
+
+    @property
+    def table(self) -> tuple[Summary, ...]:
+        """A line for each condition: estimate, difference, effect sizes."""
+        return tuple(line for group in self.groups for line in group.table)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Verdicts, and the differences that the comparisons detect, in lines."""
+        groups = {}
+        for group in self.groups:
+            head = ": ".join(filter(None, (group.setting, self.title)))
+            groups[f"{head}, minus that of {group.reference}"] = group.differences
+        lines = verdicts(groups, self.measure, self.title)
+        left_out = "; ".join(text for group in self.groups for text in group.left_out)
+        if left_out:
+            lines += wrapped(f"Without a partner and left out of the difference: {left_out}.")
+        values = [own for group in self.groups for own in group.values.values()]
+        if self.measure.name == SUCCESS.name and not any(own.any() for own in values):
+            lines += wrapped(f"No run has any {self.title}.")
+        return (*(lines or [NOTHING]), *identity_lines(self.identical))
+
+
+def title_of(measure: Measure, phase: str) -> str:
+    """Return the title of a measure in a phase, ``evaluation success`` or ``success, eight``."""
+    kind, _, name = phase.partition(":")
+    return f"{measure.heading}, {name}" if name else f"{kind} {measure.heading}".lstrip()
+
+
+def compare_conditions(
+    results: Results,
+    measure: str = "success",
+    phase: str | None = None,
+    by: str | None = None,
+    reference: str | None = None,
+) -> ComparisonTable:
+    """Compare conditions by the means of their seeds.
+
+    Parameters
+    ----------
+    results
+        Results of any studies.
+    measure
+        Name of a measure of episodes, ``steps``, ``return``, or a number of whole trials.
+    phase
+        Phase of the episodes; by default ``evaluation``, or ``training`` if there is none.
+    by
+        A swept key, or its last part. Conditions that agree in all other keys are compared with
+        the one of the first value. By default all conditions are compared with the first one.
+    reference
+        Another condition, or with `by` another value, to compare with.
+
+    Raises
+    ------
+    SpecError
+        If the results have no such measure, phase, key or reference, or nothing can be a success.
+    """
+    shown, values, phase = values_by_seed(results, measure, phase)
+    if shown.is_rate and shown.greatest == 0.0:
+        others = [m.name for m in results.measures if m != shown]
+        raise SpecError(
+            f"measure = {measure!r}: nothing is a success in these results; known: "
+            f"{', '.join([*others, STEPS.name, RETURN.name])}"
+        )
+    groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
+    pairs: dict[str, list[Pair]] = {
+        setting: [
+            (name, measure, *_pair(values[c], values[members[0][1]], results.pairs_episodes))
+            for name, c in members[1:]
+        ]
+        for setting, members in groups
+    }
+    compared = differences(pairs, shown)
+    compared_groups = [
+        _group(results, setting, members, values, compared[setting], (shown, phase))
+        for setting, members in groups
+    ]
+    return ComparisonTable(shown, phase, tuple(compared_groups), results.identical)
+
+
+def _group(
+    results: Results,
+    setting: str,
+    members: list[Member],
+    values: Mapping[str, pd.DataFrame],
+    compared: tuple[Difference, ...],
+    measured: tuple[Measure, str],
+) -> ComparisonGroup:
+    """Return the group of some conditions, the reference first."""
+    measure, phase = measured
+    by_name = {d.condition: d for d in compared}
+    base = values[members[0][1]]
+    lines = []
+    left_out = []
+    for name, condition in members:
+        title = ", ".join(filter(None, (setting, name)))
+        estimates = {title_of(measure, phase): mean_estimate(measure, values[condition])}
+        if name in by_name:
+            estimates |= _difference_columns(by_name[name], measure)
+            count = _left_out(results, values[condition], base) if by_name[name].paired else ""
+            left_out += [f"{title}, {count}"] if count else []
+        lines.append(Summary(title, len(values[condition]), estimates))
+    return ComparisonGroup(
+        setting=setting,
+        reference=members[0][0],
+        differences=compared,
+        table=tuple(lines),
+        values={name: row_means(values[c]).to_numpy() for name, c in members},
+        training={
+            name: results.by_seed(c, "training", measure.name).dropna(axis=1).to_numpy()
+            for name, c in members
+            if phase and results.has(c, "training", measure.name)
+        },
+        left_out=tuple(left_out),
+    )
+
+
+def _difference_columns(difference: Difference, measure: Measure) -> dict[str, Estimate]:
+    """Return the columns of a difference: the difference and two effect sizes."""
+    title = "P(improvement)" if measure.better else "P(higher)"
+    return {
+        DIFFERENCE_TITLES[difference.paired]: difference.estimate,
+        title: difference.improvement(measure.better),
+        "Cliff's delta": exactly(difference.cliffs_delta),
+    }
+
+
+def missing_reference(results: Results) -> list[str]:
+    """Return lines that say which condition is the reference if the first one has no trial."""
+    present = [condition for condition in results.columns if condition in results.conditions]
+    first = next(iter(results.columns), None)
+    if len(present) < 2 or first is None or present[0] == first:
+        return []
+    return wrapped(
+        f"No trial of {first}, the first condition, has finished: {present[0]} is the reference "
+        "of all comparisons instead."
+    )
+
+
+def power_with_first(results: Results) -> tuple[str, ...]:
+    """Return lines on which differences from the first condition the seeds detect.
+
+    They agree with those of `compare_conditions`, whose tests take seconds for thousands of seeds.
+    """
+    measure, values, phase = values_of(results, results.main.name)
+    base, *others = (values[c] for c in results.columns if c in values)
+    pairs = [select_shared([own, base]) for own in others]
+    samples = [own - reference for own, reference in pairs if len(own) >= MIN_RUNS]
+    return tuple(power_lines(samples, title_of(measure, phase), of_rates=measure.is_rate))
+
+
+def usual_phase(results: Results, measure: str) -> str:
+    """Return the phase of evaluation if all trained conditions have it, else that of training.
+
+    Series of other tools that were not evaluated are compared at their last step.
+
+    Raises
+    ------
+    SpecError
+        If there are several other phases.
+    """
+    trained = {*results.of_phase("training")}
+    for phase in ("evaluation", LAST_STEP):
+        known = {c for c in results.of_phase(phase) if results.has_any(c, phase, measure)}
+        if known and known >= trained:
+            return phase
+    if trained or len(results.phases) < 2:
+        return next(iter(results.phases), "training")
+    raise SpecError(f"phase: name one, known: {', '.join(results.phases)}")
+
+
+def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[BySeed, BySeed]:
+    """Return the means of two conditions by seed, over common episodes if these are paired."""
+    if pairs_episodes:
+        seeds = own.index.intersection(base.index, sort=False)
+        episodes = own.columns.intersection(base.columns)
+        shared = [values.loc[seeds, episodes] for values in (own, base)]
+        both = shared[0].notna() & shared[1].notna()
+        shared = [values.where(both).dropna(how="all") for values in shared]
+        if len(shared[0]) >= MIN_RUNS:
+            own, base = shared
+    return row_means(own), row_means(base)
+
+
+def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
+    """Return the number of runs, or of paired scores, that only one of two conditions has."""
+    index, other = own.index, base.index
+    unit = "runs"
+    if results.pairs_episodes:
+        index, other = own.stack().dropna().index, base.stack().dropna().index
+        unit = "scores"
+    total = len(index) + len(other)
+    count = total - 2 * len(index.intersection(other))
+    return f"{count} of {total} {unit}" if count else ""
+
+
+def mean_estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
+    """Return the mean over seeds of values with a row for each seed."""
+    means = row_means(values).to_numpy()
+    if measure.name == STEPS.name:
+        return steps_estimate(means, measure)
+    if measure.is_rate and values.notna().all(axis=None):
+        return rate(values.to_numpy(dtype=float))
+    return bootstrap(means, bounds=measure.bounds)
+
+
+def values_of(
+    results: Results, name: str, phase: str | None = None
+) -> tuple[Measure, dict[str, BySeed], str]:
+    """Return a measure, its means by condition and seed, and their phase."""
+    measure, values, phase = values_by_seed(results, name, phase)
+    return measure, {condition: row_means(own) for condition, own in values.items()}, phase
+
+
+def values_by_seed(
+    results: Results, name: str, phase: str | None = None
+) -> tuple[Measure, dict[str, pd.DataFrame], str]:
+    """Return a measure, its values by condition, and their phase.
+
+    Values have a row for each seed and a column for each episode, or one column for a number of
+    trials or a measure of recovery, which have an empty phase.
+
+    Raises
+    ------
+    SpecError
+        If no trial has finished, or the results have no such measure or phase.
+    """
+    if not results.conditions:
+        raise SpecError("no trial has finished")
+    if phase is not None and phase not in results.phases:
+        raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
+    has_failed = any("onset" in results.numbers(condition) for condition in results.conditions)
+    recovery = RECOVERY if has_failed else {}
+    measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
+    titled = [(title, m.name) for m in recovery.values() for title in (m.heading, m.title)]
+    titled += [(m.heading, m.name) for m in measures.values()]
+    name = dict(reversed(titled)).get(name, name)
+    if name in recovery:
+        measure, values = recovery_by_seed(results, name, phase or "training")
+        return measure, {c: own.to_frame() for c, own in values.items()}, ""
+    if name in measures:
+        phase = phase or usual_phase(results, name)
+        measure = results.steps(phase) if name == STEPS.name else measures[name]
+        of_phase = {c: results.by_seed(c, phase, name) for c in results.of_phase(phase)}
+        known = {c: own for c, own in of_phase.items() if own.size}
+        if not known:
+            raise SpecError(f"measure = {name!r}: no condition has it in the phase {phase!r}")
+        return measure, known, phase
+    return _trial_numbers(results, name, {*measures, *recovery})
+
+
+def _trial_numbers(
+    results: Results, name: str, others: Collection[str]
+) -> tuple[Measure, dict[str, pd.DataFrame], str]:
+    """Return a number of whole trials as `values_by_seed` does; `others` are further measures."""
+    numbers = {c: results.numbers(c) for c in results.conditions}
+    columns = dict.fromkeys(n for own in numbers.values() for n in own)
+    names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
+    column = next((c for c in columns if name in names[c]), None)
+    if column is None:
+        raise SpecError(f"measure = {name!r}: {closest(name, {*others, *columns})}")
+    measure, factor = describe_number(column)
+    of_trials = {
+        c: pd.DataFrame(factor * own[column], results.seeds(c))
+        for c, own in numbers.items()
+        if column in own
+    }
+    return measure, of_trials, ""
+
+
+def _groups(
+    conditions: list[str],
+    columns: Mapping[str, Mapping[str, object]],
+    by: str | None,
+    reference: str | None,
+) -> list[tuple[str, list[Member]]]:
+    """Return the setting and the members of each group, the reference first."""
+    if by is None:
+        members = [(c, c) for c in conditions]
+        known = {c: aliases(c, columns[c]) for c in conditions}
+        return [("", _put_first(members, reference, known))] if members else []
+    keys = dict.fromkeys(key for c in conditions for key in columns[c])
+    key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
+    if key is None:
+        raise SpecError(f"by = {by!r}: {closest(by, keys)}")
+    groups: dict[str, list[Member]] = {}
+    for c in conditions:
+        level = _level(key, columns[c][key])
+        rest = ", ".join(_level(k, v) for k, v in columns[c].items() if k != key and v != "")
+        groups.setdefault(rest, []).append((level, c))
+    known = {c: aliases(c, {key: columns[c][key]}) for c in conditions}
+    return [(setting, _put_first(members, reference, known)) for setting, members in groups.items()]
+
+
+def _level(key: str, value: object) -> str:
+    """Return a value of a column as a label; text is its own label.
+
+    >>> _level("scenario.robots", 8), _level("topology", "chain")
+    ('robots=8', 'chain')
+    """
+    return value if isinstance(value, str) else f"{key.rpartition('.')[2]}={label({key: value})}"
+
+
+def _put_first(
+    members: list[Member], reference: str | None, known: Mapping[str, Collection[str]]
+) -> list[Member]:
+    """Return the members of a group, the reference first; `known` has the aliases of labels."""
+    if reference is None:
+        return members
+    first = named(reference, {name: known[c] for name, c in members})
+    if first is None:
+        raise SpecError(f"reference = {reference!r}: {closest(reference, dict(members))}")
+    return sorted(members, key=lambda member: member[0] != first)

@@ -1,0 +1,222 @@
+"""Lines on the power of comparisons, for terminals and reports."""
+
+import math
+from collections.abc import Sequence
+from textwrap import wrap
+
+import numpy as np
+
+from ..errors import WIDTH
+from .notation import format_number, wrapped
+from .permutation_tests import LEVEL
+from .power import (
+    SMALLEST,
+    USUAL_LOG_DEVIATION,
+    WANTED,
+    detectable,
+    detectable_independent,
+    deviation_of,
+    seeds_for,
+    seeds_needed,
+)
+from .statistics import Array
+
+APART = 0.2
+"""Difference of exponents of which it is told how many seeds find it."""
+
+
+LARGEST = 4096
+"""Agents of the largest teams that are proposed."""
+
+
+def power_text(
+    seeds: int,
+    comparisons: int,
+    deviation: float | None,
+    smallest: float | None,
+    measure: str = "",
+    unit: str = "",
+) -> list[str]:
+    r"""Return lines on what paired seeds can tell, given the deviation of their differences.
+
+    Parameters
+    ----------
+    seeds, comparisons
+        How many.
+    deviation
+        Standard deviation of the differences of single seeds; None: it is not known.
+    smallest
+        The smallest difference that is of interest; None: none is named.
+    measure
+        By what conditions are compared.
+    unit
+        Of differences, to be read after a number.
+
+    Examples
+    --------
+    >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
+    Power: 5 seeds cannot give an adjusted p below 0.05 among 2 comparisons,
+      whatever the outcome. At least 7 seeds are needed; a difference of 0.20 needs
+      about 18.
+    >>> print(*power_text(20, 1, 0.25, 0.2, "evaluation success"), sep="\n")
+    Power: 20 seeds detect a difference of 0.17 with power 0.80 in evaluation
+      success. A difference of 0.20 needs about 15 seeds.
+    """
+    counted = f"{seeds} seed{'s' * (seeds != 1)}"
+    detect = f"{counted} detect{'s' * (seeds == 1)}"
+    among = f" among {comparisons} comparisons" if comparisons > 1 else ""
+    needed = seeds_needed(comparisons)
+    enough = seeds_for(smallest, deviation, comparisons) if smallest and deviation else None
+    goal = format_number(smallest or 0.0)
+    within = f" in {measure}" if measure else ""
+    if seeds < needed:
+        text = (
+            f"{counted} cannot give an adjusted p below {LEVEL:g}{among}{within}, whatever the "
+            f"outcome. At least {needed} seeds are needed"
+        )
+        text += f"; a difference of {goal} needs about {enough}." if enough else "."
+    elif deviation is None:
+        text = (
+            f"unknown{within}, because all seeds have the same difference. A further seed may "
+            "deviate from them; more seeds show by how much."
+        )
+    else:
+        least = format_number(detectable(deviation, seeds, comparisons))
+        text = f"{detect} a difference of {least}{unit} with power {format_number(WANTED)}"
+        text += f"{among}{within}."
+        if enough and goal != least:
+            text += f" A difference of {goal} needs about {enough} seeds."
+    return wrapped(f"Power: {text}")
+
+
+def planned_text(
+    seeds: int,
+    comparisons: int,
+    deviation: float | None,
+    smallest: float | None,
+    *,
+    of_rates: bool,
+) -> list[str]:
+    """Return lines on what paired seeds can tell before any have run, and of what it is.
+
+    Parameters are those of `power_text`; a deviation that is not known is the unit. `of_rates`:
+    whether success rates are compared, or returns.
+    """
+    unit = "" if deviation else " standard deviations"
+    what = "success rates" if of_rates else "returns, as nothing is a success"
+    supposed = (
+        f"differences of single seeds are taken to deviate by {deviation:g}"
+        if deviation
+        else "how much those of single seeds deviate is not known before (--deviation)"
+    )
+    text = f"Differences of {what}, every condition with the first, p adjusted; {supposed}."
+    known = power_text(seeds, comparisons, deviation or 1.0, smallest, unit=unit)
+    return [*known, *wrap(text, WIDTH)]
+
+
+def exponent_text(
+    sizes: Sequence[float],
+    seeds: int,
+    comparisons: int = 1,
+    deviation: float = USUAL_LOG_DEVIATION,
+) -> list[str]:
+    r"""Return lines on which exponents paired seeds tell apart, and what it takes for `APART`.
+
+    The exponent of a seed is the slope of its logarithms over those of the sizes, so that exponents
+    deviate by what logarithms do, over the root of the sum of squares of those of the sizes.
+
+    Parameters
+    ----------
+    sizes
+        That are run, `seeds` times each.
+    seeds
+        How many.
+    comparisons
+        Of exponents, over which p is adjusted.
+    deviation
+        Of the differences of logarithms of single seeds at a size.
+
+    Examples
+    --------
+    >>> print(*exponent_text([2, 4, 8, 16], 20), sep="\n")
+    Exponents: 20 seeds of sizes 2 to 16 detect a difference of exponents of 0.21
+      with power 0.80. A difference of 0.20 needs about 23 seeds, or sizes up to 32.
+    """
+    goal = format_number(APART)
+    counted = f"{seeds} seed{'s' * (seeds != 1)}"
+    enough = seeds_for(APART, deviation / _reach(sizes), comparisons)
+    larger = list(sizes)
+    while detectable(deviation / _reach(larger), seeds, comparisons) > APART:
+        larger.append(2.0 * larger[-1])
+        if larger[-1] > LARGEST:
+            break
+    needs = f" A difference of {goal} needs about {enough} seeds" if enough else ""
+    if seeds < seeds_needed(comparisons):
+        text = f"{counted} are too few for a significant difference; at least "
+        text += f"{seeds_needed(comparisons)} are needed.{needs}{'.' * bool(needs)}"
+    else:
+        least = format_number(detectable(deviation / _reach(sizes), seeds, comparisons))
+        text = f"{counted} of sizes {sizes[0]:g} to {sizes[-1]:g} detect a difference of "
+        text += f"exponents of {least} with power {format_number(WANTED)}."
+        if len(larger) > len(sizes) and needs:
+            up_to = f", or sizes up to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
+            text += f"{needs}{up_to}."
+    return wrapped(f"Exponents: {text}")
+
+
+def _reach(sizes: Sequence[float]) -> float:
+    """Return the root of the sum of squares of the logarithms of sizes about their mean."""
+    logs = np.log(sizes)
+    return float(np.linalg.norm(logs - logs.mean()))
+
+
+def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool = True) -> list[str]:
+    """Return lines on which differences comparisons could find, and how many seeds it takes.
+
+    Parameters
+    ----------
+    samples
+        Differences of single seeds ``(n_seeds,)``, by comparison: all that were adjusted together,
+        of one unit.
+    measure
+        By what conditions are compared.
+    of_rates
+        Whether they are differences of success rates, of which `SMALLEST` is of interest.
+    """
+    if not samples:
+        return []
+    deviation = deviation_of(samples, of_rates=of_rates)
+    smallest = SMALLEST if of_rates else None
+    return power_text(min(map(len, samples)), len(samples), deviation, smallest, measure)
+
+
+def independent_power_lines(
+    groups: Sequence[tuple[Array, Array]], comparisons: int, measure: str = ""
+) -> list[str]:
+    """Return lines on which difference independent runs detect.
+
+    Parameters
+    ----------
+    groups
+        Values of the runs of both conditions, by comparison.
+    comparisons
+        Number of comparisons over which p is adjusted.
+    measure
+        Title of the measure.
+    """
+    if not groups:
+        return []
+    deviation = deviation_of([own for pair in groups for own in pair], of_rates=False)
+    counts = min(((len(own), len(base)) for own, base in groups), key=sorted)
+    counted = f"{counts[0]} and {counts[1]} independent runs"
+    among = f" among {comparisons} comparisons" if comparisons > 1 else ""
+    within = f" in {measure}" if measure else ""
+    least = detectable_independent(deviation or 1.0, counts, comparisons)
+    if math.isinf(least):
+        text = f"{counted} cannot give an adjusted p below {LEVEL:g}{among}{within}."
+    elif deviation is None:
+        text = f"unknown{within}, because the runs of each condition are all equal."
+    else:
+        text = f"{counted} detect a difference of {format_number(least)} with power "
+        text += f"{format_number(WANTED)}{among}{within}."
+    return wrapped(f"Power: {text}")

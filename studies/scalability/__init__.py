@@ -1,0 +1,1 @@
+"""Scalability of hierarchies: speed-up, laws, crossovers, Pareto fronts and budgets."""

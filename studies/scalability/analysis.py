@@ -1,0 +1,304 @@
+"""The answer to "which hierarchy, how many agents, at which cost" for the results of a study."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import permutations
+from typing import NamedTuple
+
+from ..results.analysis import Summary
+from ..results.notation import format_estimate, format_number
+from ..results.statistics import NOT_NEGATIVE, Estimate
+from .data import ScalabilityData, paired
+from .fronts import (
+    BudgetChoice,
+    FrontPoint,
+    best_within,
+    fronts,
+    parse_budget,
+    probability_of_best,
+)
+from .inference import bounded_mean, sign_change
+from .laws import MIN_SIZES, Speedup, UniversalLaw, fit_universal_law, speedups
+
+HEADINGS = {
+    "decision_ms": "decision time [ms]",
+    "messages": "messages",
+    "joint_actions": "joint actions",
+    "compute_s": "computing time [s]",
+    "decisions": "decisions to criterion",
+}
+"""Headings of costs in the table."""
+LIKELY = 0.5
+"""Probability above which a hierarchy is called a member of the front."""
+
+
+class Crossover(NamedTuple):
+    """A size from which on one hierarchy beats another."""
+
+    better: str
+    worse: str
+    size: Estimate
+
+
+class BestSize(NamedTuple):
+    """The measured size with the best mean performance of one hierarchy."""
+
+    size: float
+    probability: float
+    """Probability over seeds that it is the best of the measured sizes."""
+
+
+@dataclass(frozen=True)
+class Scalability:
+    """Speed-up, laws, crossovers, Pareto fronts and the best hierarchy within a budget."""
+
+    data: ScalabilityData
+    budget: str = ""
+    """Limits of costs, such as ``messages <= 50``; empty for no budget."""
+
+    @cached_property
+    def speedups(self) -> Mapping[str, Mapping[float, Speedup]]:
+        """Speed-up of the task by hierarchy and size, where times of paired seeds are known."""
+        return {
+            name: speedups(times)
+            for name in self.data.hierarchies
+            if (times := self.data.times_of(name)) is not None
+        }
+
+    @cached_property
+    def laws(self) -> Mapping[str, UniversalLaw]:
+        """Universal scalability law by hierarchy, where there are enough sizes."""
+        times = {name: self.data.times_of(name) for name in self.data.hierarchies}
+        return {
+            name: fit_universal_law(own)
+            for name, own in times.items()
+            if own is not None and len(own.sizes) >= MIN_SIZES
+        }
+
+    @cached_property
+    def best_sizes(self) -> Mapping[str, BestSize]:
+        """Best measured size by hierarchy."""
+        best = {}
+        sign = -1.0 if self.data.performance.better == "lower" else 1.0
+        for name in self.data.hierarchies:
+            sizes = self.data.sizes(name)
+            values = paired([self.data.performances[name, n] for n in sizes])
+            if len(values) > 1:
+                shares = probability_of_best(list(sign * values.T))
+                k = int((sign * values.mean(axis=0)).argmax())
+                best[name] = BestSize(sizes[k], float(shares[k]))
+        return best
+
+    @cached_property
+    def crossovers(self) -> tuple[Crossover, ...]:
+        """Sizes from which on one hierarchy beats another, of all pairs."""
+        changes = []
+        sign = -1.0 if self.data.performance.better == "lower" else 1.0
+        for better, worse in permutations(self.data.hierarchies, 2):
+            sizes = [n for n in self.data.sizes(better) if n in self.data.sizes(worse)]
+            columns = [self.data.performances[name, n] for name in (better, worse) for n in sizes]
+            values = paired(columns)
+            if len(sizes) < 2 or len(values) < 2:
+                continue
+            differences = sign * (values[:, : len(sizes)] - values[:, len(sizes) :])
+            size = sign_change(sizes, differences)
+            if size is not None:
+                changes.append(Crossover(better, worse, size))
+        return tuple(changes)
+
+    @cached_property
+    def fronts(self) -> tuple[FrontPoint, ...]:
+        """Every hierarchy at every size with every cost, and whether it is on the Pareto front."""
+        return tuple(fronts(self.data))
+
+    @cached_property
+    def choices(self) -> tuple[BudgetChoice, ...]:
+        """Best hierarchy within the budget by size; empty without a budget."""
+        return tuple(best_within(self.data, parse_budget(self.budget))) if self.budget else ()
+
+    @cached_property
+    def summaries(self) -> tuple[Summary, ...]:
+        """A line of the table for every hierarchy at every size."""
+        lines = []
+        for name in self.data.hierarchies:
+            for size in self.data.sizes(name):
+                values = self.data.performances[name, size]
+                estimates = {
+                    self.data.performance_title: bounded_mean(values, self.data.performance.bounds)
+                }
+                own = self.speedups.get(name, {}).get(size)
+                if own is not None:
+                    estimates["speed-up"] = own.speedup
+                    estimates["efficiency"] = own.efficiency
+                    if own.serial_fraction is not None:
+                        estimates["serial fraction"] = own.serial_fraction
+                for cost, cells in self.data.costs.items():
+                    if (name, size) in cells:
+                        heading = HEADINGS.get(cost, cost)
+                        estimates[heading] = bounded_mean(cells[name, size], NOT_NEGATIVE)
+                label = f"{name}, {size:g} {self.data.size}"
+                lines.append(Summary(label, len(values), estimates))
+        return tuple(lines)
+
+    @property
+    def law_summaries(self) -> tuple[Summary, ...]:
+        """A line for every hierarchy with a universal scalability law."""
+        lines = []
+        for name, law in self.laws.items():
+            estimates = {"contention": law.contention, "coherency": law.coherency}
+            if law.is_plausible:
+                estimates[f"best number of {self.data.size}"] = law.best_size
+            seeds = len(self.data.performances[name, self.data.sizes(name)[0]])
+            lines.append(Summary(name, seeds, estimates))
+        return tuple(lines)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The findings as sentences, which make one paragraph."""
+        return tuple(self._sentences())
+
+    @property
+    def paragraph(self) -> str:
+        """The findings as one paragraph."""
+        return " ".join(self.sentences)
+
+    def _sentences(self) -> Iterator[str]:
+        data = self.data
+        sizes = data.all_sizes
+        growth = "grows with the team" if data.scaling == "weak" else "is the same for all sizes"
+        title = data.performance_title
+        yield (
+            f"{title[0].upper()}{title[1:]} was measured with {sizes[0]:g} to {sizes[-1]:g} "
+            f"{data.size}; the task {growth} ({data.scaling} scaling)."
+        )
+        yield from self._size_sentences()
+        yield from self._crossover_sentences()
+        yield from self._front_sentences()
+        yield from self._budget_sentences()
+
+    def _size_sentences(self) -> Iterator[str]:
+        size = self.data.size
+        efficiencies: dict[float, list[str]] = {}
+        for name, own in self.speedups.items():
+            text = f"{format_estimate(own[max(own)].efficiency)} for {name}"
+            efficiencies.setdefault(max(own), []).append(text)
+        for largest, texts in efficiencies.items():
+            yield f"With {largest:g} {size}, the efficiency is {_join(texts)}."
+        places: dict[str, list[str]] = {}
+        for name, law in self.laws.items():
+            largest = self.data.sizes(name)[-1]
+            places.setdefault(_place(law, largest, size), []).append(name)
+        for place, names in places.items():
+            yield f"{_join(names)}: {place}."
+        likely = [
+            f"{best.size:g} for {name} (probability {format_number(best.probability)})"
+            for name, best in self.best_sizes.items()
+        ]
+        if likely:
+            yield f"Performance is best with this number of {size}: {_join(likely)}."
+
+    def _crossover_sentences(self) -> Iterator[str]:
+        data = self.data
+        if len(data.hierarchies) < 2:
+            yield "There is one hierarchy, so that nothing can cross over."
+            return
+        for better, worse, size in self.crossovers:
+            yield f"{better} beats {worse} from {format_estimate(size)} {data.size} on."
+        other = "other " if self.crossovers else ""
+        yield f"There is no {other}crossover up to {data.all_sizes[-1]:g} {data.size}."
+
+    def _front_sentences(self) -> Iterator[str]:
+        largest = self.data.all_sizes[-1]
+        fronts: dict[str, list[str]] = {}
+        for cost in dict.fromkeys(point.cost for point in self.fronts):
+            members = [
+                f"{p.hierarchy} ({format_number(p.probability)})"
+                for p in self.fronts
+                if p.cost == cost and p.size == largest and p.probability > LIKELY
+            ]
+            heading = HEADINGS.get(cost, cost).partition(" [")[0]
+            fronts.setdefault(_join(members), []).append(heading)
+        for members_text, costs in fronts.items():
+            if members_text:
+                yield (
+                    f"With {largest:g} {self.data.size}, on the Pareto front of performance "
+                    f"against {_join(costs)} (with the probability over seeds): {members_text}."
+                )
+
+    def _budget_sentences(self) -> Iterator[str]:
+        for choice in self.choices:
+            where = f"Within {self.budget}, with {choice.size:g} {self.data.size}"
+            if choice.hierarchy is None:
+                yield f"{where}, there is no hierarchy."
+            elif len(choice.allowed) == 1:
+                yield f"{where}, there is only {choice.hierarchy}."
+            else:
+                yield (
+                    f"{where}, {choice.hierarchy} is the best of {_join(choice.allowed)} with "
+                    f"probability {format_number(choice.probability)}."
+                )
+
+    def to_dict(self) -> dict[str, object]:
+        """Return everything as plain data, which JSON can hold; infinite bounds are None."""
+        return {
+            "size": self.data.size,
+            "scaling": self.data.scaling,
+            "performance": self.data.performance_title,
+            "rows": [
+                {
+                    "condition": line.condition,
+                    "seeds": line.seeds,
+                    "estimates": {title: _plain(e) for title, e in line.estimates.items()},
+                }
+                for line in self.summaries
+            ],
+            "laws": {
+                line.condition: {title: _plain(e) for title, e in line.estimates.items()}
+                for line in self.law_summaries
+            },
+            "best_sizes": {name: own._asdict() for name, own in self.best_sizes.items()},
+            "crossovers": [
+                {"better": c.better, "worse": c.worse, "size": _plain(c.size)}
+                for c in self.crossovers
+            ],
+            "fronts": [point._asdict() for point in self.fronts],
+            "budget": [choice._asdict() for choice in self.choices],
+            "paragraph": self.paragraph,
+        }
+
+
+def _place(law: UniversalLaw, largest: float, size: str) -> str:
+    """Return where the throughput of a law has its maximum, in words."""
+    value, low, high = map(float, law.best_size)
+    if not law.is_plausible:
+        return "the universal scalability law does not describe these times"
+    if value > largest and low <= 1.0:
+        return "no best team size can be determined from these seeds"
+    if value > largest:
+        return (
+            f"the team of maximum throughput is not within the sizes measured: more than "
+            f"{format_number(min(low, largest))} {size}"
+        )
+    if math.isinf(high):
+        return (
+            f"the throughput is at its maximum from {format_number(low)} {size} on, no upper bound"
+        )
+    return f"the throughput is at its maximum with {format_estimate(law.best_size)} {size}"
+
+
+def _join(names: Sequence[str]) -> str:
+    """Return names as a list in a sentence.
+
+    >>> _join(["a"]), _join(["a", "b", "c"])
+    ('a', 'a, b and c')
+    """
+    *first, last = names or [""]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _plain(estimate: Estimate) -> list[float | None]:
+    return [end if math.isfinite(end) else None for end in map(float, estimate)]

@@ -1,0 +1,187 @@
+"""Pareto fronts of performance against a cost, and the best hierarchy within a budget.
+
+The probability that a hierarchy is on the front, or is the best within the budget, is the share of
+bootstrap resamples of the shared seeds in which it is (Efron 1979).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.numerics import BoolArray, IntArray
+from ..errors import SpecError
+from ..results.statistics import Array
+from .data import ScalabilityData, cost_of, paired
+
+RESAMPLES = 2000
+"""Bootstrap resamples of seeds; probabilities are then known to 0.02."""
+LIMIT = re.compile(r"\s*([\w.]+)\s*<=?\s*([0-9.eE+-]+)\s*")
+"""One part of a budget, such as ``messages <= 50``."""
+
+
+class FrontPoint(NamedTuple):
+    """A hierarchy at one size with one cost."""
+
+    size: float
+    cost: str
+    hierarchy: str
+    performance: float
+    cost_value: float
+    on_front: bool
+    probability: float
+    """Probability that it is on the front."""
+
+
+class BudgetChoice(NamedTuple):
+    """The best hierarchy within a budget at one size."""
+
+    size: float
+    hierarchy: str | None
+    """None if no hierarchy is within the budget."""
+    probability: float
+    """Probability that this choice is the best one within the budget."""
+    allowed: tuple[str, ...]
+    """Hierarchies within the budget."""
+
+
+def non_dominated(performance: Array, cost: Array) -> BoolArray:
+    """Return which points ``(..., n)`` no other point beats.
+
+    A point is beaten by one with at least its performance at no higher cost that is better in one
+    of the two.
+
+    Examples
+    --------
+    >>> non_dominated(np.array([0.9, 0.8, 0.95]), np.array([10.0, 20.0, 30.0])).tolist()
+    [True, False, True]
+    """
+    better = performance[..., None, :] >= performance[..., :, None]
+    cheaper = cost[..., None, :] <= cost[..., :, None]
+    strictly = (performance[..., None, :] > performance[..., :, None]) | (
+        cost[..., None, :] < cost[..., :, None]
+    )
+    return np.logical_not(np.any(better & cheaper & strictly, axis=-1))
+
+
+def fronts(data: ScalabilityData) -> list[FrontPoint]:
+    """Return all hierarchies at every size with every cost, those on the front marked."""
+    points = []
+    sign = -1.0 if data.performance.better == "lower" else 1.0
+    for name, cells in data.costs.items():
+        for size in data.all_sizes:
+            hierarchies = [h for h in data.at_size(size) if (h, size) in cells]
+            values = paired([data.performances[h, size] for h in hierarchies])
+            costs = paired([cells[h, size] for h in hierarchies])
+            if len(hierarchies) < 2 or not len(values) or len(costs) != len(values):
+                continue
+            drawn = _resample(len(values))
+            on_front = non_dominated(sign * values.mean(axis=0), costs.mean(axis=0))
+            resampled = non_dominated(
+                sign * values[drawn].mean(axis=1), costs[drawn].mean(axis=1)
+            ).mean(axis=0)
+            for k, hierarchy in enumerate(hierarchies):
+                points.append(
+                    FrontPoint(
+                        size,
+                        name,
+                        hierarchy,
+                        float(values[:, k].mean()),
+                        float(costs[:, k].mean()),
+                        bool(on_front[k]),
+                        float(resampled[k]),
+                    )
+                )
+    return points
+
+
+def parse_budget(text: str) -> dict[str, float]:
+    """Return the limits of a budget by the name of the cost.
+
+    Raises
+    ------
+    SpecError
+        If a part of it is not ``COST <= NUMBER``; one line.
+
+    Examples
+    --------
+    >>> parse_budget("messages <= 50, decision_ms <= 100")
+    {'messages': 50.0, 'decision_ms': 100.0}
+    """
+    limits = {}
+    for part in text.split(","):
+        match = LIMIT.fullmatch(part)
+        try:
+            limits[match[1]] = float(match[2])  # type: ignore[index]
+        except (TypeError, ValueError):
+            raise SpecError(
+                f"budget = {part.strip()!r}: must be COST <= NUMBER, such as messages <= 50"
+            ) from None
+    return limits
+
+
+def best_within(data: ScalabilityData, limits: Mapping[str, float]) -> list[BudgetChoice]:
+    """Return the best hierarchy within a budget at every size.
+
+    Raises
+    ------
+    SpecError
+        If a cost was not measured, or no hierarchy of any size is within the budget; one line.
+    """
+    cells = {name: cost_of(data, name) for name in limits}
+    choices = [_choose(data, size, limits) for size in data.all_sizes]
+    if all(choice.hierarchy is None for choice in choices):
+        least = ", ".join(
+            f"{name} >= {min(float(own.mean()) for own in cells[name].values()):g}"
+            for name in limits
+        )
+        raise SpecError(f"budget: no hierarchy of any size is within it; least measured: {least}")
+    return choices
+
+
+def _choose(data: ScalabilityData, size: float, limits: Mapping[str, float]) -> BudgetChoice:
+    hierarchies = data.at_size(size)
+    values = paired([data.performances[name, size] for name in hierarchies])
+    costs = {
+        cost: paired([data.costs[cost][name, size] for name in hierarchies])
+        for cost in limits
+        if all((name, size) in data.costs[cost] for name in hierarchies)
+    }
+    if len(costs) < len(limits) or not len(values):
+        return BudgetChoice(size, None, 0.0, ())
+    sign = -1.0 if data.performance.better == "lower" else 1.0
+    everyone = np.arange(len(values))[None]
+    best, allowed = _best(sign * values, costs, limits, everyone)
+    if best[0] < 0:
+        return BudgetChoice(size, None, 0.0, ())
+    resampled, _ = _best(sign * values, costs, limits, _resample(len(values)))
+    names = tuple(name for name, ok in zip(hierarchies, allowed[0], strict=True) if ok)
+    share = float((resampled == best[0]).mean())
+    return BudgetChoice(size, hierarchies[int(best[0])], share, names)
+
+
+def _best(
+    values: Array, costs: Mapping[str, Array], limits: Mapping[str, float], drawn: IntArray
+) -> tuple[IntArray, BoolArray]:
+    """Return the index of the best column within the limits, -1 for none, and those within."""
+    allowed = np.ones((len(drawn), values.shape[1]), dtype=bool)
+    for name, limit in limits.items():
+        allowed &= costs[name][drawn].mean(axis=1) <= limit
+    means = np.where(allowed, values[drawn].mean(axis=1), -np.inf)
+    return np.where(allowed.any(axis=1), means.argmax(axis=1), -1), allowed
+
+
+def _resample(n_seeds: int) -> IntArray:
+    return np.random.default_rng(0).integers(n_seeds, size=(RESAMPLES, n_seeds))
+
+
+def probability_of_best(columns: Sequence[Array]) -> Array:
+    """Return for each column of paired seeds the probability that its mean is the greatest."""
+    values = np.stack(columns, axis=1)
+    means = values[_resample(len(values))].mean(axis=1)
+    greatest = means == means.max(axis=1, keepdims=True)
+    shares: Array = (greatest / greatest.sum(axis=1, keepdims=True)).mean(axis=0)
+    return shares

@@ -1,0 +1,98 @@
+"""Speed-up, serial fraction and the universal scalability law: hand-worked and simulated."""
+
+import numpy as np
+import pytest
+
+from nested_agents.studies.results.statistics import Estimate
+from nested_agents.studies.scalability.laws import (
+    Times,
+    fit_universal_law,
+    serial_fraction,
+    speedups,
+)
+
+SIZES = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+
+
+def noisy(times, n_seeds, rng, spread):
+    """Return times ``(n_seeds, n_sizes)`` with a factor for each seed and each run."""
+    own = rng.gamma(spread**-2, spread**2, (n_seeds, len(times)))
+    return times * own * rng.gamma(4.0 * spread**-2, spread**2 / 4.0, (n_seeds, 1))
+
+
+def times_of(contention, coherency):
+    return 100.0 * (1.0 + contention * (SIZES - 1.0) + coherency * SIZES * (SIZES - 1.0)) / SIZES
+
+
+def test_amdahls_serial_fraction_is_recovered():
+    serial = 0.2
+    strong = Times(SIZES, np.array([serial + (1.0 - serial) / SIZES] * 3), "strong")
+    for size, own in speedups(strong).items():
+        assert own.speedup.value == pytest.approx(1.0 / (serial + (1.0 - serial) / size))
+        if size > 1.0:
+            assert own.serial_fraction.value == pytest.approx(serial)
+
+
+def test_gustafsons_serial_fraction_is_recovered():
+    serial = 0.3
+    scaled = serial + (1.0 - serial) * SIZES  # speed-up
+    weak = Times(SIZES, np.array([SIZES / scaled] * 3), "weak")
+    for size, own in speedups(weak).items():
+        assert own.efficiency.value == pytest.approx((serial + (1.0 - serial) * size) / size)
+        if size > 1.0:
+            assert own.serial_fraction.value == pytest.approx(serial)
+
+
+def test_sizes_count_relative_to_the_smallest():
+    values = np.array([[8.0, 4.0, 2.0]] * 2)
+    own = speedups(Times(np.array([2.0, 4.0, 8.0]), values, "strong"))
+    assert own[8.0].speedup.value == pytest.approx(4.0)
+    assert own[8.0].efficiency.value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("scaling", ["strong", "weak"])
+def test_ends_of_a_serial_fraction_are_in_order(scaling):
+    value, low, high = serial_fraction(Estimate(*map(np.asarray, (1.6, 1.2, 2.4))), 2.0, scaling)
+    assert low < value < high
+
+
+@pytest.mark.parametrize("scaling", ["strong", "weak"])
+def test_the_parameters_of_an_exact_law_are_found(scaling):
+    times = times_of(0.05, 0.01) * (SIZES if scaling == "weak" else 1.0)
+    law = fit_universal_law(Times(2.0 * SIZES, np.array([times] * 3), scaling))
+    assert law.contention.value == pytest.approx(0.05)
+    assert law.coherency.value == pytest.approx(0.01)
+    assert law.best_size.value == pytest.approx(2.0 * np.sqrt(0.95 / 0.01))
+    assert law.time_at_smallest == pytest.approx(100.0)
+    assert law.throughput(SIZES) == pytest.approx(times_of(0.0, 0.0)[0] / times_of(0.05, 0.01))
+
+
+def test_two_sizes_have_no_law():
+    with pytest.raises(ValueError, match="2 sizes"):
+        fit_universal_law(Times(SIZES[:2], np.ones((3, 2)), "strong"))
+
+
+def test_superlinear_times_are_not_described_by_the_law():
+    values = noisy(100.0 / SIZES**1.5, 12, np.random.default_rng(0), 0.05)
+    assert not fit_universal_law(Times(SIZES, values, "strong")).is_plausible
+
+
+@pytest.mark.parametrize(
+    ("contention", "coherency", "spread", "n_seeds"),
+    [(0.05, 0.01, 0.2, 12), (0.2, 0.002, 0.3, 12), (0.05, 0.01, 0.2, 5), (0.1, 0.004, 0.4, 20)],
+)
+def test_intervals_of_simulated_laws_cover_the_truth_at_their_level(
+    contention, coherency, spread, n_seeds
+):
+    rng = np.random.default_rng(1)
+    truth = (contention, coherency, np.sqrt((1.0 - contention) / coherency))
+    covered = []
+    for _ in range(600):
+        values = noisy(times_of(contention, coherency), n_seeds, rng, spread)
+        law = fit_universal_law(Times(SIZES, values, "strong"))
+        covered.append(
+            [own.low <= true <= own.high for own, true in zip(law[:3], truth, strict=True)]
+        )
+    shares = np.mean(covered, axis=0)
+    assert (shares >= 0.92).all()
+    assert (shares <= 0.98).all()

@@ -1,0 +1,110 @@
+"""The command and the method, on published results and on tables of scores."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nested_agents as na
+from nested_agents.studies.cli.main import main
+
+RESULTS = Path(__file__).parents[3] / "research" / "results"
+SCALING = RESULTS / "scaling.json"
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    """A table of scores in which the tree overtakes the chain between 4 and 8 agents."""
+    rng = np.random.default_rng(0)
+    means = {"chain": [0.9, 0.8, 0.5, 0.2], "tree": [0.7, 0.7, 0.7, 0.7]}
+    path = tmp_path_factory.mktemp("scores") / "scores.csv"
+    lines = ["hierarchy,agents,seed,score"]
+    for name, own in means.items():
+        for agents, mean in zip((2, 4, 8, 16), own, strict=True):
+            scores = mean + rng.normal(size=12, scale=0.05)
+            lines += [f"{name},{agents},{seed},{score:.4f}" for seed, score in enumerate(scores)]
+    path.write_text("\n".join(lines))
+    return path
+
+
+def load(path):
+    return na.load(path, columns=["condition=hierarchy+agents"])
+
+
+def test_speed_up_and_law_of_published_results():
+    report = na.load(SCALING).scalability()
+    analysis = report.analysis
+    assert analysis.data.scaling == "weak"  # boxes grow with the number of robots
+    assert analysis.data.all_sizes == (2.0, 4.0, 8.0, 16.0)
+    (own,) = analysis.speedups.values()
+    steps = na.load(SCALING).results
+    two, sixteen = (steps.means(size, "evaluation", "steps").mean() for size in ("2", "16"))
+    assert own[16.0].efficiency.value == pytest.approx(two / sixteen)
+    assert set(analysis.data.costs) == {"decision_ms", "messages", "joint_actions", "compute_s"}
+
+
+def test_arms_have_the_same_task_for_all_sizes():
+    assert na.load(RESULTS / "arms.json").scalability().analysis.data.scaling == "strong"
+
+
+def test_the_scaling_may_be_named():
+    assert na.load(SCALING).scalability(scaling="strong").analysis.data.scaling == "strong"
+    with pytest.raises(na.SpecError, match="scaling = 'other': allowed are strong, weak"):
+        na.load(SCALING).scalability(scaling="other")
+
+
+def test_a_crossover_is_found_with_its_interval(table):
+    report = load(table).scalability(size="agents")
+    (crossover,) = report.analysis.crossovers
+    assert (crossover.better, crossover.worse) == ("tree", "chain")
+    assert 4.0 <= crossover.size.low < crossover.size.value < crossover.size.high <= 8.0
+    assert "tree beats chain from" in report.analysis.paragraph
+
+
+def test_results_without_times_and_costs_have_no_speed_up(table):
+    report = load(table).scalability(size="agents")
+    assert not report.analysis.speedups
+    assert "strong scaling is assumed" in " ".join(report.remarks)
+
+
+def test_everything_can_be_written_as_json(table, capsys):
+    arguments = ["scalability", str(table), "--columns", "condition=hierarchy+agents"]
+    assert main([*arguments, "--size", "agents", "--format", "json"]) == 0
+    own = json.loads(capsys.readouterr().out)
+    assert own["crossovers"][0]["better"] == "tree"
+    assert len(own["rows"]) == 8
+
+
+@pytest.mark.parametrize("form", ["table", "latex", "csv", "markdown"])
+def test_the_table_has_all_forms(form, capsys):
+    assert main(["scalability", str(SCALING), "--format", form]) == 0
+    output = capsys.readouterr().out
+    assert "efficiency" in output
+    assert max(map(len, output.splitlines())) <= 80 or form != "table"
+
+
+def test_the_figure_is_written(tmp_path, capsys):
+    path = tmp_path / "scalability.png"
+    assert main(["scalability", str(SCALING), "--plot", str(path)]) == 0
+    assert path.stat().st_size > 10_000
+    assert len(na.load(SCALING).scalability().figure().axes) == 4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--budget", "messages <= 1"], "least measured: messages >= 6"),
+        (["--budget", "tokens <= 1"], "cost = 'tokens'"),
+        (["--budget", "messages"], "must be COST <= NUMBER"),
+        (["--where", "robots == 2"], "size"),
+        (["--size", "joints"], "size = 'joints'"),
+        (["--measure", "sucess"], "did you mean 'success'"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(arguments, message, capsys):
+    assert main(["scalability", str(SCALING), *arguments]) == 2
+    output = capsys.readouterr()
+    assert output.out == ""
+    (line,) = [line for line in output.err.splitlines() if "error" in line]
+    assert message in line
