@@ -85,7 +85,7 @@ def test_a_full_disk_stops_a_study_with_one_line_and_costs_nothing(
     expected = content(tmp_path / "expected")
     whole, _ = done(tmp_path / "expected", capsys)
     told, kept = set(), set()
-    for free in range(0, 400_000, 32768):
+    for free in range(0, 400_000, 12288):
         directory = disk / str(free)
         line = ["run", str(spec), "--out", str(directory)]
         with ballast(disk, free):
