@@ -245,7 +245,7 @@ def older_results(store: Store) -> str | None:
     if not store.is_older:
         return None
     return (
-        f"{store.directory}: holds results of version {store.version}, this is version "
+        f"{store.directory / DATABASE}: holds results of version {store.version}, this is version "
         f"{RESULTS_VERSION}: they are read without their checksums, and run does not continue them"
     )
 

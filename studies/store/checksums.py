@@ -50,7 +50,8 @@ def find_altered(db: sqlite3.Connection) -> list[str]:
     """Return the identities of trials whose rows do not match their checksums."""
     written: dict[str, str] = dict(db.execute("SELECT identity, sha256 FROM checksums").fetchall())
     present = trial_checksums(db)
-    return sorted(k for k in written.keys() | present.keys() if written.get(k) != present.get(k))
+    # An identity without rows has the checksum "", because a damaged checksum may be NULL.
+    return sorted(k for k in written | present if written.get(k) != present.get(k, ""))
 
 
 def _encode(content: object) -> bytes:

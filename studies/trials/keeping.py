@@ -15,7 +15,7 @@ from ..errors import SpecError
 from ..spec.outline import Code, older_results, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import SpecTable, aliases, dumps, flat, named
-from ..store.database import SPEC_FILE, NoStudyError, StudyNotes
+from ..store.database import DATABASE, RESULTS_VERSION, SPEC_FILE, NoStudyError, StudyNotes
 from ..store.durable import read_text
 from ..store.store import Store
 from ..store.writer import lock_directory
@@ -105,9 +105,10 @@ def finished_trial(store: Store, condition: str | None, seed: int | None) -> Tri
     Raises
     ------
     SpecError
-        If there is no such condition or seed, the trial has not finished, or what is kept of it is
-        not as it was written.
+        If there is no such condition or seed, the trial has not finished, its results are damaged,
+        or an older results version has computed them.
     """
+    _check_version(store)
     spec = spec_of(store)
     known = {c.label: aliases(c.label, c.columns) for c in spec.conditions()}
     label = next(iter(known)) if condition is None else named(condition, known)
@@ -124,12 +125,23 @@ def finished_trial(store: Store, condition: str | None, seed: int | None) -> Tri
 
 
 def check_teams(store: Store, identities: Container[str] = ()) -> None:
-    """Refuse a study that keeps no teams, or not those of some trials as they were written."""
+    """Raise if a study keeps no teams, or the teams of some trials are damaged or older."""
+    _check_version(store)
     if not store.spec().get("keep_teams"):
         raise SpecError(f"{store.directory}: keeps no teams: its spec has no keep_teams = true")
     for identity, line in store.damage().items():
         if identity in identities:
             raise SpecError(f"{line}; {command_line('run')} runs it again")
+
+
+def _check_version(store: Store) -> None:
+    """Raise if another version has trained the teams of a study, which might act differently."""
+    if store.is_older:
+        raise SpecError(
+            f"{store.directory / DATABASE}: holds results of version {store.version}, this is "
+            f"version {RESULTS_VERSION}: tables and reports can read them, but its teams and "
+            "recordings are not used"
+        )
 
 
 def notes_of(spec: Spec, measures: Sequence[Measure] = ()) -> StudyNotes:

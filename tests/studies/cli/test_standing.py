@@ -6,7 +6,6 @@ import pytest
 from nested_agents.studies.api.status import _estimate, progress
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec import outline
-from nested_agents.studies.store import database
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.store.writer import LOCK, MARK, Running, read_running
 from nested_agents.studies.workers.runner import save
@@ -99,15 +98,6 @@ def test_what_other_code_has_done_is_done(study, monkeypatch, capsys):
     text = capsys.readouterr().out
     assert "running  1\n         frozen, seed 2, for" in text
     assert "left     1\n" in text
-
-
-def test_a_study_of_another_version_is_refused(study, monkeypatch, capsys):
-    monkeypatch.setattr(database, "RESULTS_VERSION", 99)
-    for command in (["status"], ["status", "--watch"]):
-        assert main([*command, str(study)]) == 2
-        error = capsys.readouterr().err
-        assert "this is version 99; an older nested-agents reads it" in error
-        assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize(
