@@ -16,7 +16,7 @@ from ..hierarchy.messages import NO_PAYLOADS, Messages, Payloads
 from ..hierarchy.stages import DecisionStage, Inbox, decision_stages
 from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
 from ..interface.environments import Transitions
-from ..interface.experience import AgentDecision, Decision, Experience, Observation
+from ..interface.experience import Decision, Experience, Observation
 from ..interface.measures import Measure
 from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
