@@ -20,7 +20,7 @@ from ...core.numerics import FloatArray, IntArray, njit
 from ..angles import angle_of
 
 
-class Lines(NamedTuple):
+class PiecewiseLinear(NamedTuple):
     """Piecewise linear functions without their constants: ``sum(bends * max(x - knots, 0))``."""
 
     knots: FloatArray
@@ -38,28 +38,28 @@ class Options(NamedTuple):
     """``(n, A)`` first action of the joint with the same effect."""
     speed_values: FloatArray
     """``(n, A)`` value of the speed that each action commands."""
-    bearing: Lines
+    bearing: PiecewiseLinear
     """Value of the bearing of every joint."""
-    distance: Lines
+    distance: PiecewiseLinear
     """Value of the distance of the tip from the goal to all joints, one function."""
-    approach: Lines
+    approach: PiecewiseLinear
     """Value of the approach of the tip to all joints, one function."""
 
 
-def lines(knots: FloatArray, values: FloatArray) -> Lines:
+def piecewise_linear(knots: FloatArray, values: FloatArray) -> PiecewiseLinear:
     """Return the functions that take values ``(n, K)`` at knots and are constant beyond."""
     slopes = np.diff(values, axis=1) / np.diff(knots)
-    return Lines(knots, np.diff(slopes, axis=1, prepend=0.0, append=0.0).T.copy())
+    return PiecewiseLinear(knots, np.diff(slopes, axis=1, prepend=0.0, append=0.0).T.copy())
 
 
 @njit(cache=True, fastmath={"contract", "nsz", "reassoc"})
-def _sum(lines: Lines, xs: FloatArray) -> float:
+def _sum(functions: PiecewiseLinear, xs: FloatArray) -> float:
     """Return the sum of all functions, each at its own x ``(n,)``."""
     total = 0.0
-    for k in range(len(lines.knots)):
+    for k in range(len(functions.knots)):
         for i in range(len(xs)):
-            beyond = xs[i] - lines.knots[k]
-            total += lines.bends[k, i] * (beyond if beyond > 0.0 else 0.0)
+            beyond = xs[i] - functions.knots[k]
+            total += functions.bends[k, i] * (beyond if beyond > 0.0 else 0.0)
     return total
 
 

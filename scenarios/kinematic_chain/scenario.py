@@ -26,7 +26,7 @@ from ...core.plugins.words import expect
 from ...core.values.rule_base import RuleBase
 from ..faults.settings import Failures
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
-from .responses import Options, lines, respond
+from .responses import Options, piecewise_linear, respond
 from .variables import ChainStates, ChainView, forward_kinematics
 
 MEASURES = (
@@ -369,9 +369,9 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
             self.turns,
             self.alike,
             np.einsum("iam,im->ia", speed.strengths(self._fractions), weights[0]),
-            lines(bearing.knots[period], bearing_values),
-            lines(distance.knots, team_values[0]),
-            lines(approach.knots, team_values[1]),
+            piecewise_linear(bearing.knots[period], bearing_values),
+            piecewise_linear(distance.knots, team_values[0]),
+            piecewise_linear(approach.knots, team_values[1]),
         )
         angles = self.angles + self.turns[self._joints, plan]
         places = np.ascontiguousarray(forward_kinematics(angles, self.arm.length).T)
