@@ -1,7 +1,7 @@
 """Rule bases: the paper's eight rules by hand, orders, products, values of states and codes."""
 
 import re
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 from math import comb
 
 import numpy as np
@@ -206,18 +206,18 @@ def sigmoid(x: float) -> float:
 
 
 def sigmoid_degrees(x: float, centres: tuple[float, ...], steepness: float) -> list[float]:
-    """Return the membership degrees of Eq. 6, one function of one number at a time."""
+    """Return the membership degrees of Eq. 6 for evenly spaced centers."""
     falls = [1.0]
-    for left, right in zip(centres, centres[1:], strict=False):
+    for left, right in pairwise(centres):
         falls.append(sigmoid(steepness / (right - left) * (x - (left + right) / 2)))
     falls.append(0.0)
-    return [before - after for before, after in zip(falls, falls[1:], strict=False)]
+    return [before - after for before, after in pairwise(falls)]
 
 
 def test_sigmoid_products_equal_sums_over_single_rules() -> None:
     # Three terms that overlap, of one, two and three variables with 2, 3 and 4 functions: a factor
     # that is left out, taken twice or from the wrong variable changes the value.
-    centres = [(0.0, 1.0), (0.0, 0.4, 1.0), (-1.0, 0.0, 0.5, 2.0)]
+    centres = [(0.0, 1.0), (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0, 2.0)]
     terms = [(1,), (0, 2), (0, 1, 2)]
     base = RuleBase([Partition(c, "sigmoid", steepness=6.0) for c in centres], terms, n_own=1)
     theta = np.random.default_rng(3).normal(size=base.n_rules)
