@@ -56,7 +56,7 @@ MODULES = {
         "interface.spaces", "interface.scenario", "interface.prediction", "interface.measures",
         "interface.experience", "interface.agents", "interface.environments", "interface.stacked",
         "interface.plain", "hierarchy.hierarchy",
-        "hierarchy.turns", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
+        "hierarchy.stages", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
         "functions.settings", "functions.agents", "agents.mixed",
         "agents.team", "agents.fuzzy", "agents.peer",
         "agents.loop", "agents.joint", "decision.settings", "decision.exploration",

@@ -63,7 +63,7 @@ def test_a_team_that_is_timed_learns_the_same() -> None:
         team = na.Team(na.BatchTDSettings(), scenario, hierarchy, na.policy_seed(3))
         for _ in control_loop(scenario, team, episodes=2, steps=10, seed=3):
             pass
-        return team.arrays()["learner.theta"]
+        return team.state_dict()["learner.theta"]
 
     plain = trained()
     before = signal.getsignal(signal.SIGALRM)
