@@ -63,7 +63,7 @@ def evaluator_of(
     if decision.rule != "reward" and not context.is_whole:
         _check_values(hierarchy, set(members), decision.value_of)
     if learned is not None:
-        n_tried = len(own) * len(placement.scenario.action_set)
+        n_tried = len(own) * len(context.scenario.action_set)
         check_budget(decision.budget, n_tried, settings.kind)
         return learned
     private = is_private(settings, context.scenario)
