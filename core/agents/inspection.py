@@ -100,7 +100,9 @@ def _explain(agent: AgentDecision) -> list[str]:
         lines.append(f"  values: {values}")
     messages = []
     for sender, action in agent.received.items():
-        said = f" with the message {agent.payloads[sender]!r}" if sender in agent.payloads else ""
-        messages.append(f"{action} from {sender}{said}")
+        payload = (
+            f" with the message {agent.payloads[sender]!r}" if sender in agent.payloads else ""
+        )
+        messages.append(f"{action} from {sender}{payload}")
     lines.append(f"  received: {', '.join(messages) or 'nothing'}")
     return lines
