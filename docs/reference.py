@@ -58,7 +58,7 @@ MODULES = {
         "interface.plain", "hierarchy.hierarchy",
         "hierarchy.stages", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
         "functions.settings", "functions.agents", "agents.mixed",
-        "agents.team", "agents.fuzzy", "agents.peer",
+        "agents.team", "agents.inspection", "agents.fuzzy", "agents.peer",
         "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
         "values.partitions", "values.rule_base", "learners.learner", "learners.td",
         "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",
