@@ -66,8 +66,8 @@ def _check_file(path: Path, db: sqlite3.Connection) -> None:
     (answer,) = db.execute("PRAGMA integrity_check(1)").fetchone()
     if answer == "ok":
         return
-    if found := ERROR_CODE.search(str(answer)):
-        code = int(found[1])
+    if failure := ERROR_CODE.search(str(answer)):
+        code = int(failure[1])
         if code == sqlite3.SQLITE_NOMEM:
             raise MemoryError
         if code & 0xFF in CIRCUMSTANCES and code != sqlite3.SQLITE_IOERR_SHORT_READ:
