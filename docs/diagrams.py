@@ -298,9 +298,17 @@ def hierarchies() -> Figure:
         keys = [f"{name}, value_of={value_of}" for name in names]
         points = [success_of(study.results, key) for key in keys]
         draw_points(axes, [messages[key] + line for key in keys], points, line, label, joined=False)
-    offsets = {"independent": (6, -12), "star": (-6, 12), "binary tree": (10, -2), "chain": (-14, 8)}
+    offsets = {
+        "independent": (6, -12),
+        "star": (-6, 12),
+        "binary tree": (10, -2),
+        "chain": (-14, 8),
+    }
     for name, label in names.items():
-        place = (messages[f"{name}, value_of=team"], success_of(study.results, f"{name}, value_of=team")[0])
+        place = (
+            messages[f"{name}, value_of=team"],
+            success_of(study.results, f"{name}, value_of=team")[0],
+        )
         offset = offsets.get(label, (4, 6))
         axes.annotate(label, place, offset, textcoords="offset points")
     axes.set(xlabel="messages in a decision", ylabel="success of eight robots", ylim=(0, 1.25))
@@ -379,9 +387,11 @@ def games() -> Figure:
         table[settings.index(case.setting), systems.index(case.system)] = float(values[-1].value)
     figure = Figure(figsize=(WIDTH + 1.4, 5.0), layout="constrained")
     axes = figure.subplots()
-    axes.imshow(table, cmap="Blues", vmin=0, vmax=1.3, aspect="auto")
+    axes.imshow(table, cmap="Blues", vmin=0, vmax=1.9, aspect="auto")
     for row, column in np.ndindex(*table.shape):
-        axes.text(column, row, format_number(table[row, column]), ha="center", va="center", size=8.5)
+        axes.text(
+            column, row, format_number(table[row, column]), ha="center", va="center", size=8.5
+        )
     labels = [f"{game}, {exploration}" for game, exploration in settings]
     axes.set_yticks(range(len(settings)), labels)
     axes.set_xticks(range(len(systems)), systems, rotation=45, ha="right", rotation_mode="anchor")

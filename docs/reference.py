@@ -51,6 +51,8 @@ TRIALS = tuple(
 )  # fmt: skip
 VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
+
+
 def write(folder: Path) -> None:
     """Write the pages that have changed into a folder."""
     folder.mkdir(exist_ok=True)

@@ -44,7 +44,9 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
-    assert table in PAGE.read_text(encoding="utf-8"), f"research/notebooks/box_pushing.md: put in\n{table}"
+    assert table in PAGE.read_text(encoding="utf-8"), (
+        f"research/notebooks/box_pushing.md: put in\n{table}"
+    )
 
 
 def test_the_planner(capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,4 +26,6 @@ LAST = "success last 5", "evaluation success"
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
-    assert table in PAGE.read_text(encoding="utf-8"), f"research/notebooks/dynamics_models.md: put in\n{table}"
+    assert table in PAGE.read_text(encoding="utf-8"), (
+        f"research/notebooks/dynamics_models.md: put in\n{table}"
+    )

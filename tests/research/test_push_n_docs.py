@@ -10,7 +10,9 @@ from programs import main
 from research import push_n
 
 pytestmark = pytest.mark.usefixtures("entries_read_once")
-TEXT = (Path(__file__).resolve().parents[2] / "research" / "notebooks" / "push_n.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).resolve().parents[2] / "research" / "notebooks" / "push_n.md").read_text(
+    encoding="utf-8"
+)
 
 
 @pytest.mark.parametrize("measure", ["success", "decisions"])

@@ -8,7 +8,9 @@ from published_tables import print_table
 
 from nested_agents.studies.results.notation import format_number
 
-PAGE = (Path(__file__).resolve().parents[2] / "research" / "notebooks" / "signals.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parents[2] / "research" / "notebooks" / "signals.md").read_text(
+    encoding="utf-8"
+)
 
 
 def test_the_table_of_results(capsys: pytest.CaptureFixture[str]) -> None:

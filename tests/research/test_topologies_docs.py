@@ -32,7 +32,9 @@ PAGE = Path(__file__).resolve().parents[2] / "research" / "notebooks" / "edges.m
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
-    assert table in PAGE.read_text(encoding="utf-8"), f"research/notebooks/edges.md: put in\n{table}"
+    assert table in PAGE.read_text(encoding="utf-8"), (
+        f"research/notebooks/edges.md: put in\n{table}"
+    )
 
 
 SETTINGS = {
@@ -113,7 +115,9 @@ def test_tables_with_a_column_for_each_evaluation(name: str, capsys) -> None:
     rows = [label.removesuffix(", neither") for label in success if label.endswith(", neither")]
     for row in rows:
         line = " | ".join([row, *(success[f"{row}, {how}"] for how in EVALUATED_AS)])
-        assert f"| {line} |" in PAGE.read_text(encoding="utf-8"), f"research/notebooks/edges.md: {line}"
+        assert f"| {line} |" in PAGE.read_text(encoding="utf-8"), (
+            f"research/notebooks/edges.md: {line}"
+        )
 
 
 def test_the_table_of_classes_of_edges(capsys) -> None:
@@ -121,7 +125,9 @@ def test_the_table_of_classes_of_edges(capsys) -> None:
     for line in print_table("edges-classes", columns, capsys).splitlines()[2:]:
         label, _, *values = line[2:-2].split(" | ")
         row = " | ".join([label.removeprefix("default, "), *values])
-        assert f"| {row} |" in PAGE.read_text(encoding="utf-8"), f"research/notebooks/edges.md: {row}"
+        assert f"| {row} |" in PAGE.read_text(encoding="utf-8"), (
+            f"research/notebooks/edges.md: {row}"
+        )
 
 
 def test_the_tables_of_broken_hierarchies(capsys) -> None:
