@@ -208,7 +208,7 @@ def perception() -> Figure:
     axes.text(0.1, 1.2, "gap to the nearest\nface, its bearing,\nside of the box", color=BLUE,
               va="top")  # fmt: skip
     axes.text(2.0, 0.72, "share of other robots\nthat are not at the box", color=GRAY, va="top")
-    axes.annotate("", goal - (0.42, 0), center + (0.3, 0),
+    axes.annotate("", goal - (0.42, 0), np.add(center, (0.3, 0)),
                   arrowprops={"arrowstyle": "<->", "color": GREEN})  # fmt: skip
     axes.text(4.1, 1.15, "distance from the goal,\nand how fast it shrinks", color=GREEN,
               ha="center", va="top")  # fmt: skip

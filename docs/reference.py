@@ -152,8 +152,8 @@ def columns() -> Iterator[str]:
         yield f"## {title}\n"
         yield from table(headings, ((code(n) if "*" not in n else n, u, m) for n, u, m in rows))
     yield "## Measures of the scenarios\n"
-    yield "A scenario declares its own [measures](../extending.md#a-scenario). These are the measures"
-    yield "of the built-in scenarios.\n"
+    yield "A scenario declares its own [measures](../extending.md#a-scenario). These are"
+    yield "the measures of the built-in scenarios.\n"
     # Built only of an environment, or a task.
     adapted = {"gymnasium": EnvironmentScenario, "pettingzoo": EnvironmentScenario}
     for kind in SCENARIOS.built_in:

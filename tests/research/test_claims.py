@@ -371,7 +371,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
     table = capsys.readouterr().out.strip()
     page = PAGE.read_text(encoding="utf-8")
     assert table in page, (
-        "research/notebooks/claims.md: put in the table of python -m research.claims --format markdown"
+        "claims.md: put in the table of python -m research.claims --format markdown"
     )
 
 

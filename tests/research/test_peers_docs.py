@@ -1,4 +1,4 @@
-"""research/notebooks/ppo.md holds the tables that the committed results give, and names specs that are."""
+"""research/notebooks/ppo.md holds the tables of committed results, and names specs that exist."""
 
 import re
 from pathlib import Path

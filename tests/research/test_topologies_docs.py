@@ -1,4 +1,4 @@
-"""research/notebooks/edges.md holds the tables that the committed results give, topologies.md what is run."""
+"""research/notebooks/edges.md holds the tables of committed results, topologies.md what is run."""
 
 import re
 from itertools import pairwise

@@ -6,7 +6,6 @@ from types import ModuleType
 
 import pytest
 
-import nested_agents as na
 from nested_agents.studies.api.running import run_study
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.results.results import NUMBERS
