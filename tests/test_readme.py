@@ -39,7 +39,7 @@ def test_the_rates_of_the_readme_are_published() -> None:
 
 
 def test_the_replay_is_small_and_the_version_is_one() -> None:
-    assert (ROOT / "docs" / "push.gif").stat().st_size < 1_000_000
+    assert (ROOT / "docs" / "figures" / "push.gif").stat().st_size < 1_000_000
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
 

@@ -19,7 +19,9 @@ from research import RESULTS, equal_treatment
 from research.studies.chain_order import equivalence
 from research.studies.edges import TRAINED, analyse, effects
 
-PAGE = Path(__file__).resolve().parents[2] / "research" / "notebooks" / "edges.md"
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGE = ROOT / "research" / "notebooks" / "edges.md"
 
 
 @pytest.mark.parametrize(
@@ -188,9 +190,9 @@ def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
 @pytest.mark.slow
 def test_kept_teams_are_evaluated_again_as_it_says(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
-    studies = PAGE.with_name("studies.md").read_text(encoding="utf-8")
-    topologies = PAGE.with_name("topologies.md").read_text(encoding="utf-8")
-    pages = topologies + studies.replace("out/mine", "out/kept")
+    running = (DOCS / "running.md").read_text(encoding="utf-8")
+    communication = (DOCS / "communication.md").read_text(encoding="utf-8")
+    pages = communication + running.replace("out/mine", "out/kept")
     blocks = re.findall(r"```python\n(.*?)```", pages, re.DOTALL)
     (again,) = [block for block in blocks if "na.reevaluate" in block]
     (acting,) = [block for block in blocks if "study.team" in block]
