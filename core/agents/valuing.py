@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from ..evaluators.budget import check_budget
 from ..evaluators.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
 from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import AgentContext
@@ -62,6 +63,8 @@ def evaluator_of(
     if decision.rule != "reward" and not context.is_whole:
         _check_values(hierarchy, set(members), decision.value_of)
     if learned is not None:
+        n_tried = len(own) * len(context.scenario.action_set)
+        check_budget(decision.budget, n_tried, settings.kind)
         return learned
     private = is_private(settings, context.scenario)
     problem = DecisionProblem(
@@ -78,10 +81,18 @@ def evaluator_of(
         handed_down=hierarchy.communication == "ancestors"
         and not context.messages_fail
         and not private,
-        first=next((i for i in hierarchy.order if i in own), members[0]),
+        members=tuple(i for i in hierarchy.order if i in own) or (members[0],),
         is_private=private,
+        budget=decision.budget,
     )
-    return as_evaluator(decision.evaluator.build(problem))
+    evaluator = as_evaluator(decision.evaluator.build(problem))
+    if decision.budget is not None and not evaluator.keeps_budget:
+        raise ValueError(
+            f"learner.decision.budget = {decision.budget}: learner.decision.evaluator = "
+            f"{decision.evaluator.kind!r} cannot keep to a budget; use sampling, best-response or "
+            "exact"
+        )
+    return evaluator
 
 
 def _check_values(hierarchy: Hierarchy, own: set[int], value_of: ValueOf) -> None:
