@@ -44,7 +44,7 @@ class StepRecord:
     """Seconds that the team took to decide; the scenario reports its own in ``transition.info``."""
     learning: float
     """Seconds that the team took to learn."""
-    spent: Mapping[str, float]
+    decision_costs: Mapping[str, float]
     """What the decision cost, by the names of `Team.costs`."""
 
 
@@ -106,7 +106,7 @@ def control_loop(
         episode = first_episode + k
         seed_of_world = world_seed(seed, first_world + k)
         seen = Observation(space.checked(world.reset(seed_of_world, episode), world.agents), world)
-        team.begin_world(seed_of_world, episode)
+        team.reset(seed_of_world, episode)
         if learn:
             team.begin_episode()
         team.check(seen)
@@ -129,7 +129,7 @@ def control_loop(
                 last=last,
                 deciding=decided - begin,
                 learning=perf_counter() - moved,
-                spent=team.spent,
+                decision_costs=team.decision_costs,
             )
             if last:
                 break

@@ -143,8 +143,8 @@ def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
     assert fuzzy(team).foresight.calibration.constants.any()
     team.save(tmp_path / "team.npz")
     other.load(tmp_path / "team.npz")
-    for name, array in team.arrays().items():
-        np.testing.assert_array_equal(other.arrays()[name], array)
+    for name, array in team.state_dict().items():
+        np.testing.assert_array_equal(other.state_dict()[name], array)
 
 
 def test_robots_of_other_scenarios_have_no_constants(line_world):
