@@ -1,30 +1,16 @@
 """Teams that a study keeps, evaluated under other hierarchies and ways to decide."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from itertools import product
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import NamedTuple, Self
 
 from ...core.numerics import pd
-from ...core.plugins.sources import Sources
 from ...core.plugins.words import show
 from ..errors import SpecError
-from ..presentation.progress import Terminal
-from ..results.results import DONE, Results, read
 from ..spec.objects import plain
-from ..spec.spec import Spec
-from ..spec.tables import SpecTable, TomlTable, label
+from ..spec.tables import TomlTable, label
 from ..store.database import EVALUATION
-from ..store.durable import TEAM
-from ..store.store import Store
-from ..trials.arrangement import check_conditions
-from ..trials.keeping import check_teams, open_to_run
-from ..trials.session import Session
-from ..trials.trial import Trial, TrialResult, trials_of
-from ..workers.runner import Observer, Outcome, run_trials
-from ..workers.workers import start_workers
+from ..workers.runner import Observer
+from .kept_teams import KeptTeams
 from .loading import load
 from .study import Place, StudyResults
 
@@ -69,91 +55,14 @@ def reevaluate(
     SpecError
         If there are no such teams, or they cannot act so; one line.
     """
-    kept = KeptTeams.of(study, {"evaluations": _entries(topology, decision)})
+    study = study if isinstance(study, StudyResults) else load(study)
+    changes = {"evaluations": _entries(topology, decision)}
+    kept = KeptTeams.of(study.directory, study.trials, changes)
     frame = kept.evaluate(kept.trials, jobs, observer).episodes
     frame.insert(0, "entry", frame["phase"].str.removeprefix(EVALUATION))
     meaning = "topology and decision by which the trained team acts"
     frame.attrs["columns"]["entry"] = {"unit": "", "meaning": meaning}
     return frame
-
-
-class KeptTeams(NamedTuple):
-    """Trained teams of the finished trials of a study that keeps its teams."""
-
-    directory: Path
-    identities: Mapping[tuple[str, int], str]
-    """Identities of the trials by condition and seed."""
-    spec: Spec
-    """Spec of the study with its changes."""
-
-    @classmethod
-    def of(cls, study: StudyResults | Place, changes: SpecTable) -> Self:
-        """Return the teams of a study, or of a part of it.
-
-        Parameters
-        ----------
-        study
-            Loaded results, or the directory of a study.
-        changes
-            Changes of the spec, such as its further evaluations.
-
-        Raises
-        ------
-        SpecError
-            If the study keeps no teams, or has no evaluation; one line.
-        """
-        study = study if isinstance(study, StudyResults) else load(study)
-        done = study.trials[study.trials["state"] == DONE]
-        identities = {(row.condition, row.seed): str(row.identity) for row in done.itertuples()}
-        directory = study.directory.resolve()
-        with Store.open(directory) as store:
-            check_teams(store, {*identities.values()})
-            table = {**store.spec(), **changes, "keep_teams": False}
-            sources = Sources(Path(), store.sources(), brought_by=str(directory))
-        spec = Spec.of(table, sources)
-        if spec.evaluation < 1:
-            raise SpecError("evaluation = 0: kept teams are evaluated in a study of 1 or more")
-        return cls(directory, identities, spec)
-
-    @property
-    def conditions(self) -> set[str]:
-        """Labels of the conditions of the teams."""
-        return {condition for condition, _ in self.identities}
-
-    @property
-    def trials(self) -> list[Trial]:
-        """The trials of the teams, with the further evaluations of the spec."""
-        return [t for t in trials_of(self.spec) if (t.condition, t.seed) in self.identities]
-
-    def evaluate(
-        self, trials: Sequence[Trial], jobs: int | None, observer: Observer | None
-    ) -> Results:
-        """Evaluate the teams of trials in the further evaluations of the trials.
-
-        Raises
-        ------
-        SpecError
-            If a team cannot act in an evaluation; one line.
-        """
-        measures = check_conditions(self.spec, self.conditions)
-        with (
-            TemporaryDirectory() as folder,
-            start_workers("loky", jobs, None, len(trials)) as workers,
-            open_to_run(Path(folder), self.spec, trials, measures) as store,
-        ):
-            evaluate = partial(_evaluate, self.directory, self.identities)
-            outcomes = _succeeding(run_trials(trials, store, evaluate, workers))
-            (observer or Terminal()).follow(outcomes, len(trials), 0)
-            return read(store)
-
-
-def _succeeding(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
-    """Yield outcomes until one is a failure."""
-    for outcome in outcomes:
-        if outcome.error is not None:
-            where = f"{outcome.trial.condition}, seed {outcome.trial.seed}"
-            raise SpecError(f"{where}: {outcome.error.splitlines()[-1]}")
-        yield outcome
 
 
 def _entries(topology: Sequence[object], decision: Sequence[object]) -> dict[str, TomlTable]:
@@ -171,14 +80,3 @@ def _entries(topology: Sequence[object], decision: Sequence[object]) -> dict[str
             entry["learner"] = {"decision": entry.pop("decision")}
         entries[name] = entry
     return entries
-
-
-def _evaluate(
-    directory: Path, identities: Mapping[tuple[str, int], str], trial: Trial
-) -> TrialResult:
-    """Evaluate the kept team of a trial in its `evaluations`; imported by name in workers."""
-    with Store.open(directory) as store:
-        arrays = store.recording(identities[trial.condition, trial.seed], TEAM)
-    session = Session.restored(trial, arrays)
-    session.run_other_evaluations()
-    return session.result()

@@ -2,22 +2,24 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from ..errors import SpecError, refused
 from ..resilience.analysis import Resilience, TeamLosses
 from ..resilience.losses import losable_team, loss_sets, next_number, with_loss
 from ..resilience.report import ResilienceReport
 from ..results.comparison import title_of, values_by_seed
+from ..results.results import Results
 from ..spec.conditions import ConditionSettings
 from ..store.database import EVALUATION
 from ..trials.trial import Trial
 from ..workers.runner import Observer
-from .reevaluation import KeptTeams
-from .study import StudyResults
+from .kept_teams import KeptTeams
 
 
 def measure_resilience(
-    study: StudyResults,
+    results: Results,
+    directory: Path,
     *,
     fault: str,
     measure: str | None,
@@ -31,11 +33,12 @@ def measure_resilience(
         raise SpecError(f"sets = {max_sets}: must be 1 or more")
     if not 0.0 < tolerance < 1.0:
         raise SpecError(f"tolerance = {tolerance:g}: must be above 0 and below 1")
-    kept = KeptTeams.of(study, {"evaluations": {}})
-    name = study.results.main.name if measure is None else measure
-    shown_as, values, phase = values_by_seed(study.results, name, "evaluation")
+    kept = KeptTeams.of(directory, results.trials, {"evaluations": {}})
+    name = results.main.name if measure is None else measure
+    shown_as, values, phase = values_by_seed(results, name, "evaluation")
     if not phase or shown_as.better == "lower":
         raise SpecError(f"measure = {name!r}: must be a measure of episodes, higher being better")
+    title = title_of(shown_as, phase)
     settings = {trial.condition: trial.settings for trial in kept.trials}
     with kept.spec.sources.active(), refused():
         teams = [
@@ -44,7 +47,7 @@ def measure_resilience(
         ]
         able = tuple(own for own in teams if own.intact_mean > 0.0)
         if not able:
-            raise SpecError(f"{title_of(shown_as, phase)} of all intact teams is 0 or below")
+            raise SpecError(f"{title} of all intact teams is 0 or below")
         n_lost = 1
         while open_teams := [
             own for own in able if own.halving is None and n_lost < len(own.team.units)
@@ -57,13 +60,12 @@ def measure_resilience(
                 own.condition: [[own.team.units[i] for i in units] for units in sets[own.condition]]
                 for own in open_teams
             }
-            results = kept.evaluate(_trials_with_losses(kept, fault, losses), jobs, observer)
+            evaluated = kept.evaluate(_trials_with_losses(kept, fault, losses), jobs, observer)
             for own in open_teams:
                 for k, units in enumerate(sets[own.condition]):
-                    phase = f"{EVALUATION}{k}"
-                    own.lost[units] = results.by_seed(own.condition, phase, shown_as.name)
+                    entry = f"{EVALUATION}{k}"
+                    own.lost[units] = evaluated.by_seed(own.condition, entry, shown_as.name)
             n_lost = next_number(n_lost)
-    title = title_of(shown_as, phase)
     return ResilienceReport(Resilience(fault, shown_as, title, tolerance, able))
 
 

@@ -408,7 +408,8 @@ class StudyResults:
         from .resilience import measure_resilience
 
         return measure_resilience(
-            self,
+            self.results,
+            self.directory,
             fault=fault,
             measure=measure,
             max_sets=max_sets,

@@ -35,7 +35,7 @@ FREE_KEYS = ("seeds", "title", "keep_teams")
 """Keys besides the size in which the spec of later results may differ."""
 
 
-class Prediction(NamedTuple):
+class SizePrediction(NamedTuple):
     """The predicted mean of a measure for one hierarchy at one size."""
 
     measure: str
@@ -56,7 +56,7 @@ class PredictionFile(NamedTuple):
     """Smallest number of seeds that a law was fitted to."""
     spec: dict[str, object]
     """Spec of the study that the predictions are based on."""
-    predictions: tuple[Prediction, ...]
+    predictions: tuple[SizePrediction, ...]
     sha256: str = ""
     """Hash of everything else."""
 
@@ -120,7 +120,7 @@ def predict(
         if n in run:
             raise SpecError(f"predict = {n}: was run; name sizes that were not")
     numbers = [cost.number for cost in COSTS.values() if cost.number]
-    predictions: list[Prediction] = []
+    predictions: list[SizePrediction] = []
     remarks: list[str] = []
     seeds: list[int] = []
     for name in dict.fromkeys((measure, TIME, *numbers)):
@@ -136,7 +136,7 @@ def predict(
             seeds.append(fitted.law.seeds)
             for n in sizes:
                 ends = map(float, fitted.law.predict(n, LEVEL))
-                predictions.append(Prediction(name, growth.title, hierarchy, float(n), *ends))
+                predictions.append(SizePrediction(name, growth.title, hierarchy, float(n), *ends))
     if not predictions:
         raise SpecError(f"predict: no measure has a law; {' '.join(remarks)}")
     plain = json.loads(json.dumps(spec))
@@ -146,7 +146,7 @@ def predict(
 class CheckedPrediction(NamedTuple):
     """A prediction and what was measured later."""
 
-    prediction: Prediction
+    prediction: SizePrediction
     seeds: int
     measured: Estimate
 
@@ -212,11 +212,11 @@ class PredictionCheck:
         }
 
 
-def _name(prediction: Prediction) -> str:
+def _name(prediction: SizePrediction) -> str:
     return f"{prediction.hierarchy}, {prediction.size:g}: {prediction.title}"
 
 
-def _estimate(prediction: Prediction) -> Estimate:
+def _estimate(prediction: SizePrediction) -> Estimate:
     return Estimate(*map(np.asarray, (prediction.value, prediction.low, prediction.high)))
 
 
@@ -268,7 +268,7 @@ def _fixed(spec: Mapping[str, object], size: str) -> Iterator[tuple[str, object]
 
 
 def _measured(
-    prediction: Prediction, results: Results, places: Mapping[str, tuple[str, float]]
+    prediction: SizePrediction, results: Results, places: Mapping[str, tuple[str, float]]
 ) -> CheckedPrediction | None:
     """Return a prediction with what was measured; None if it was not."""
     measure, values, _ = values_of(results, prediction.measure)
