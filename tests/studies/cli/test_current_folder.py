@@ -35,11 +35,10 @@ def ring(agents, groups):
     return list(zip(agents, agents[1:]))
 """
 COMPILE = """
-import numpy as np
-from nested_agents.core.numerics.arrays import wrap_each
+from nested_agents.core.numerics.arrays import wrap_one
 
-wrap_each(np.zeros(1))
-assert wrap_each.compiled.stats.cache_hits  # another process has compiled it
+wrap_one(0.0)
+assert wrap_one.compiled.stats.cache_hits  # another process has compiled it
 
 from numba import config
 
