@@ -35,10 +35,11 @@ def ring(agents, groups):
     return list(zip(agents, agents[1:]))
 """
 COMPILE = """
-from nested_agents.core.numerics.arrays import wrap_one
+import numpy as np
+from nested_agents.core.values.updates import _value
 
-wrap_one(0.0)
-assert wrap_one.compiled.stats.cache_hits  # another process has compiled it
+_value(np.zeros(1), np.zeros(1, dtype=int), np.zeros(1))
+assert _value.compiled.stats.cache_hits  # another process has compiled it
 
 from numba import config
 
