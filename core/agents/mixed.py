@@ -21,7 +21,7 @@ from ..interface.scenario import Scenario
 from ..learners import LEARNERS
 from ..learners.learner import MembersOf, TeamSettings
 from ..plugins.registry import Plugged
-from ..plugins.settings import Names, Settings, unwritten
+from ..plugins.settings import Names, Settings
 from .joint import body_of
 
 
@@ -32,7 +32,7 @@ class PartOfTeam(Settings):
     """Their names or patterns of these, roles, bodies, or levels (``level1``); one or a list."""
     learner: Annotated[TeamSettings, Plugged(LEARNERS)]
     """How they decide and learn: a table as that of a whole team."""
-    team: Annotated[str | None, unwritten(None)] = None
+    team: str | None = None
     """A file ``.npz`` that `Team.save` wrote, whose weights they begin with; of a team of several
     kinds, those of the part in the same place. None: they have learned nothing."""
 

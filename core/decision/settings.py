@@ -6,7 +6,7 @@ from ..evaluators import EVALUATORS, EvaluatorSettings
 from ..evaluators.enumeration import AutoSettings
 from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
 from ..plugins.registry import Plugged
-from ..plugins.settings import Settings, unwritten
+from ..plugins.settings import Settings
 from .errors import ErrorSettings
 
 
@@ -25,13 +25,13 @@ class DecisionSettings(Settings):
     """Averaged values: the agent's own, its own and those of the agents below it (``below``), or
     those of all agents (``team``). Use ``own`` if an agent's state shows the effect of its action,
     ``team`` if an action that helps one agent may hinder others."""
-    unseen: Annotated[Unseen, unwritten("maintain")] = "maintain"
+    unseen: Unseen = "maintain"
     """Assumed actions of agents that this agent neither hears nor searches over, silent agents
     included: maintain, repeat the last action, or follow the plan of ``best-response``."""
-    plan: Annotated[Plan, unwritten("private")] = "private"
+    plan: Plan = "private"
     """Plans of ``best-response``: each agent makes its own unless an agent above hands one down
     with its messages (``private``), or all agents compute the same plan from common knowledge."""
     evaluator: Annotated[EvaluatorSettings, Plugged(EVALUATORS, EVALUATORS.parsed)] = AutoSettings()
     """Search over joint actions of the agents below: the name of an evaluator, or its table."""
-    errors: Annotated[ErrorSettings | None, unwritten(None)] = None
+    errors: ErrorSettings | None = None
     """Individual errors of agents. With this table every agent also makes plans of its own."""

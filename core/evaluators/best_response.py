@@ -31,7 +31,6 @@ from pydantic import Field
 
 from ..interface.prediction import Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
-from ..plugins.settings import unwritten
 from ..values.rule_base import PooledWeights, RuleBase
 from .drawing import drawn_equal
 from .enumeration import combinations
@@ -82,7 +81,7 @@ class BestResponseSettings(EvaluatorSettings):
     """Best responses around a plan for all agents that are searched over."""
 
     kind: Literal["best-response"] = "best-response"
-    sweeps: Annotated[int, Field(ge=0, le=100), unwritten(1)] = 1
+    sweeps: Annotated[int, Field(ge=0, le=100)] = 1
     """Rounds in which every body improves the plan before the first decision. Where all agents hear
     all decisions, the decisions themselves are a round: with 0, decisions take three quarters of
     the time."""

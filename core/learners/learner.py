@@ -26,7 +26,7 @@ from ..interface.scenario import Scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
-from ..plugins.settings import PartSettings, unwritten
+from ..plugins.settings import PartSettings
 from ..values.rule_base import RuleBase, RuleBaseSettings
 
 CORE = __name__.rpartition(".learners")[0]
@@ -204,7 +204,7 @@ class LearnerSettings(TeamSettings):
     """Self-model: learned effects of the wheels of every body."""
     calibration: CalibrationSettings = CalibrationSettings()
     """Calibration of the constants of the predictor."""
-    predictor: Annotated[Predictor, unwritten(GivenPredictor())] = GivenPredictor()
+    predictor: Predictor = GivenPredictor()
     """The predictor: that of the scenario, persistence, or a learned model."""
 
     @property

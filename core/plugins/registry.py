@@ -18,6 +18,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from contextvars import ContextVar
 from functools import cache
 from inspect import getdoc, isfunction, signature
 from pathlib import Path
@@ -27,10 +28,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 from pydantic import (
     Field,
     GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     SerializationInfo,
     ValidationInfo,
     create_model,
 )
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
@@ -333,6 +336,10 @@ def _parameters(thing: object) -> dict[str, Any]:
     return fields
 
 
+_described: ContextVar[tuple[Registry, ...]] = ContextVar("registries", default=())
+"""Registries whose JSON schema is being written."""
+
+
 def _dump(value: Settings, info: SerializationInfo) -> dict[str, object]:
     """Dump settings like the model that holds them."""
     return value.model_dump(mode=info.mode, exclude_none=info.exclude_none)
@@ -374,6 +381,22 @@ class Plugged(Kinds):
             self._validate,
             serialization=core_schema.plain_serializer_function_ser_schema(_dump, info_arg=True),
         )
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Return the JSON schema: a table of a built-in kind, any other table, or a text."""
+        names = list(self.registry.built_in)
+        other = {"type": "object", "properties": {"kind": {"not": {"enum": names}}}}
+        tables: list[JsonSchemaValue] = [other, {"type": "string"}]
+        if self.registry not in _described.get():  # a team inside a team is not described again
+            token = _described.set((*_described.get(), self.registry))
+            for name in reversed(names):
+                model = self.registry.model(name)
+                model.model_rebuild()
+                tables.insert(0, handler(model.__pydantic_core_schema__))
+            _described.reset(token)
+        return {"title": self.registry.kind, "anyOf": tables}
 
     def _validate(self, value: object, info: ValidationInfo) -> Settings:
         if isinstance(value, Settings):

@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ....core.numerics import BoolArray, FloatArray, njit
-from ....core.plugins.settings import Names, NonNegative, Positive, Settings, unwritten
+from ....core.plugins.settings import Names, NonNegative, Positive, Settings
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
 
 GRAVITY = 9.81
@@ -91,9 +91,7 @@ Vertices = Annotated[tuple[tuple[float, float], ...], Field(min_length=3)]
 class Described(Settings):
     """User-defined object, described by a table that may give it a name."""
 
-    name: Annotated[
-        Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None, unwritten(None)
-    ] = None
+    name: Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = None
     """Name in labels; nothing else depends on it."""
 
 
