@@ -80,7 +80,7 @@ def _episode(
     """Return what every decision, step and fixed load took [s]; episodes do not end early."""
     seed = world_seed(0, episode)
     seen = Observation(scenario.reset(seed, episode), scenario)
-    team.begin_world(seed, episode)
+    team.reset(seed, episode)
     if learn:
         team.begin_episode()
     taken = []

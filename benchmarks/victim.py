@@ -116,7 +116,7 @@ class Adversary:
                 _, team = load(self.study).team()
         except SpecError as refusal:
             return 2, "", str(refusal)
-        arrays = {name: array.tolist() for name, array in team.arrays().items()}
+        arrays = {name: array.tolist() for name, array in team.state_dict().items()}
         return 0, str(arrays), error.getvalue()
 
     def finish(self, directory: Path) -> list[str]:

@@ -55,10 +55,10 @@ MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
         "interface.spaces", "interface.scenario", "interface.prediction", "interface.measures",
         "interface.experience", "interface.agents", "interface.environments", "interface.stacked",
-        "interface.plain", "hierarchy.hierarchy",
-        "hierarchy.turns", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
+        "hierarchy.hierarchy",
+        "hierarchy.stages", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
         "functions.settings", "functions.agents", "agents.mixed",
-        "agents.team", "agents.fuzzy", "agents.peer",
+        "agents.team", "agents.inspection", "agents.fuzzy", "agents.peer",
         "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
         "values.partitions", "values.rule_base", "learners.learner", "learners.td",
         "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",

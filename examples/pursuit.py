@@ -22,7 +22,7 @@ REACH = 0.5
 """Distance within which all robots must be [m]."""
 
 
-class Pursuit:
+class Pursuit(na.Scenario):
     """Robots catch a target: all are near it, and it sees no gap of half a turn between them."""
 
     class Settings(na.ScenarioSettings):

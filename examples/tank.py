@@ -12,7 +12,7 @@ import numpy as np
 import nested_agents as na
 
 
-class Tank:
+class Tank(na.Scenario):
     """Pumps fill or empty one tank until it holds what is wanted; each agent drives a pump."""
 
     class Settings(na.ScenarioSettings):

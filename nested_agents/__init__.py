@@ -29,6 +29,7 @@ from .core.isolation import ignore_settings_files
 ignore_settings_files()
 
 _PLACES = {
+    "AgentDecision": ("core.interface.experience", "AgentDecision"),
     "Agents": ("core.interface.agents", "Agents"),
     "ActionSet": ("core.interface.spaces", "ActionSet"),
     "Analysis": ("studies.results.analysis", "Analysis"),
@@ -58,7 +59,7 @@ _PLACES = {
     "NO_SUCCESS": ("core.interface.measures", "NO_SUCCESS"),
     "SUCCESS": ("core.interface.measures", "SUCCESS"),
     "Prediction": ("core.interface.prediction", "Prediction"),
-    "Placement": ("core.interface.agents", "Placement"),
+    "AgentContext": ("core.interface.agents", "AgentContext"),
     "Peer": ("core.agents.peer", "Peer"),
     "PeerSettings": ("core.agents.peer", "PeerSettings"),
     "Scenario": ("core.interface.scenario", "Scenario"),
@@ -78,7 +79,7 @@ _PLACES = {
     "TeamSettings": ("core.learners.learner", "TeamSettings"),
     "TopologySettings": ("topologies", "TopologySettings"),
     "Transitions": ("core.interface.environments", "Transitions"),
-    "Turn": ("core.hierarchy.turns", "Turn"),
+    "Inbox": ("core.hierarchy.stages", "Inbox"),
     "Transition": ("core.interface.scenario", "Transition"),
     "Variable": ("core.interface.spaces", "Variable"),
     "bootstrap": ("studies.results.statistics", "bootstrap"),
@@ -89,6 +90,7 @@ _PLACES = {
     "cost_table": ("studies.cost.table", "cost_table"),
     "control_loop": ("core.agents.loop", "control_loop"),
     "detectable": ("studies.results.power", "detectable"),
+    "explain_decision": ("core.agents.inspection", "explain_decision"),
     "from_gymnasium": ("scenarios.adapters.scenario", "from_gymnasium"),
     "from_pettingzoo": ("scenarios.adapters.scenario", "from_pettingzoo"),
     "greatest": ("core.numerics", "greatest"),

@@ -23,7 +23,7 @@ from ..core.hierarchy.hierarchy import Communication, Hierarchy, Lookahead
 from ..core.numerics import nx
 from ..core.plugins import sources
 from ..core.plugins.registry import Plugged, SettingsRegistry
-from ..core.plugins.settings import Settings, SettingsError, changed_values, tuples
+from ..core.plugins.settings import PartSettings, SettingsError, changed_values, tuples
 from ..core.plugins.words import closest, expect, expect_each
 from .builders import Bodies, Names, check_names, from_networkx, quote
 from .files import read_file
@@ -47,10 +47,9 @@ DecisionOrder = Literal["listed", "reversed"] | tuple[str, ...]
 """Order of decision: agent order, its reverse, or all names in order."""
 
 
-class TopologySettings(Settings):
+class TopologySettings(PartSettings):
     """What the settings of all topologies share."""
 
-    kind: str = ""
     communication: Communication = "ancestors"
     """Agents whose decided actions an agent receives: all its ancestors, its parents only, or none.
     A list restricts the ancestors to those in the agent's own ``body``, in the ``next`` bodies in
@@ -89,10 +88,6 @@ class TopologySettings(Settings):
     def title(self) -> str:
         """What it is called in messages: its file, its kind, or its class."""
         return str(dict(self).get("path") or self.kind or type(self).__name__)
-
-    def build(self, agents: Names, bodies: Bodies) -> nx.Graph:
-        """Return the graph over named agents, given by body too."""
-        raise ValueError("has no kind, and makes no hierarchy")
 
 
 IMPLIED = {"members": "teams", "edges": "edges"}

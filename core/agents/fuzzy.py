@@ -15,8 +15,8 @@ from ..adaptation.foresight import Foresight
 from ..adaptation.predictors import GivenPredictor, Mirror
 from ..evaluators.evaluator import NOBODY, NOTHING_GIVEN, Aggregation, Deliberation, Evaluator
 from ..hierarchy.hierarchy import Hierarchy
-from ..hierarchy.turns import Turn, all_hear_all
-from ..interface.agents import Agents, Counts, Memory, Placement, under
+from ..hierarchy.stages import Inbox, is_fully_communicating
+from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
 from ..interface.experience import Experience, Observation
 from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
@@ -35,7 +35,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
     ----------
     settings
         How they explore, decide and learn.
-    placement
+    context
         Where they act.
 
     Attributes
@@ -67,14 +67,14 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         If the settings do not fit the state space, or need a prediction that the scenario has not.
     """
 
-    def __init__(self, settings: LearnerSettings, placement: Placement) -> None:
-        scenario = placement.scenario
-        hierarchy = placement.hierarchy
+    def __init__(self, settings: LearnerSettings, context: AgentContext) -> None:
+        scenario = context.scenario
+        hierarchy = context.hierarchy
         check_prediction(settings, scenario)
         self.settings = settings
         self.scenario = scenario
         self.hierarchy = hierarchy
-        self.members = placement.members
+        self.members = context.members
         self.action_set = scenario.action_set
         n = len(hierarchy)
         n_actions = len(scenario.action_set)
@@ -86,7 +86,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.foresight = Foresight(
             settings.predictor, settings.self_model, settings.calibration, scenario
         )
-        if settings.is_mirrored and not placement.is_whole:
+        if settings.is_mirrored and not context.is_whole:
             raise ValueError("learner.mirrored = true: the mirror image is that of a whole team")
         self.mirror = Mirror.of(scenario) if settings.is_mirrored else None
         self.rows = rows_of(scenario, self.members, shared=settings.weights == "role")
@@ -97,14 +97,14 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         )
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
         self.learner = as_learner(settings.build(self.rules, rows))
-        self._placement = placement
+        self._placement = context
         self._evaluators: dict[Hierarchy, Evaluator | None] = {}
         self._left = NOBODY
         self._actions_of_left = NOBODY
         self.is_private = is_private(settings, scenario)
         self.views: Views | None = None
         self.evaluator = self._evaluator()
-        self._searches_jointly = self._can_search_jointly(placement)
+        self._searches_jointly = self._can_search_jointly(context)
         self._neutral = np.full(n, self.action_set.neutral)
         own_rows = dict(zip(self.members.tolist(), self.rows.tolist(), strict=True))
         self._row_of = [own_rows.get(agent) for agent in range(n)]
@@ -112,11 +112,11 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             n_rules = self.learner.theta.shape[1]
             plans = isinstance(self.evaluator, Aggregation) and self.evaluator.plans
             self.views = Views(
-                settings, placement, self._row_of, n_rules, self.foresight, plans=plans
+                settings, context, self._row_of, n_rules, self.foresight, plans=plans
             )
             self.costs = self.views.costs
         self.explorer = as_explorer(settings.exploration.build(n))
-        self.rng = np.random.Generator(np.random.PCG64(placement.seed))
+        self.rng = np.random.Generator(np.random.PCG64(context.seed))
         self.seen: FloatArray = np.ones((n, n_actions))
         conditional = settings.decision.teammates == "conditional"
         is_counted = conditional and self.evaluator is not None
@@ -128,15 +128,15 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         present = Present(self.hierarchy, self._left)
         return evaluator_of(self.settings, self.rules, learned, self._placement, present)
 
-    def _can_search_jointly(self, placement: Placement) -> bool:
+    def _can_search_jointly(self, context: AgentContext) -> bool:
         """Return whether one search may find the actions of all agents, see `decide`."""
         return (
             self.evaluator is not None
-            and placement.is_whole
+            and context.is_whole
             and not self.is_private
             and type(self.evaluator).decide is not Evaluator.decide
-            and not placement.messages_fail
-            and all_hear_all(placement.hierarchy)
+            and not context.messages_fail
+            and is_fully_communicating(context.hierarchy)
         )
 
     def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
@@ -191,7 +191,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.explorer.begin_episode()
         self.learner.begin_episode()
 
-    def perceive(self, seen: Observation, *, explore: bool) -> FuzzyInputs:
+    def observe(self, seen: Observation, *, explore: bool) -> FuzzyInputs:
         """Return what a decision is made by."""
         left = seen.present
         if self._n_told:  # a column for each action told, as yet that of nobody
@@ -226,23 +226,26 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         )
         return self.evaluator.decide(first, exploring)
 
-    def decide(self, inputs: FuzzyInputs, turn: Turn) -> IntArray:
+    def act(self, inputs: FuzzyInputs, inbox: Inbox) -> IntArray:
         """Return the actions ``(k,)`` of the agents of a turn, one after the other.
 
         Where all agents hear all others, one search in the first turn may find the actions of all.
         """
         if self.evaluator is None:
-            return self.rng.integers(len(self.action_set), size=len(turn.agents))
-        if self._searches_jointly and turn.agents[0] == self.hierarchy.order[0]:
+            return self.rng.integers(len(self.action_set), size=len(inbox.agents))
+        is_first = inbox.agents[0] == self.hierarchy.order[0]
+        if self._searches_jointly and is_first and inputs.values is None:
             inputs.joint_action = self._joint_search(inputs)
         if inputs.joint_action is not None:
-            return inputs.joint_action[turn.agents]
-        if len(turn.agents) == 1:
-            return np.array([self._choose(inputs, int(turn.agents[0]), turn.senders, turn.actions)])
+            return inputs.joint_action[inbox.agents]
+        if len(inbox.agents) == 1:
+            return np.array(
+                [self._choose(inputs, int(inbox.agents[0]), inbox.senders, inbox.actions)]
+            )
         chosen = []
-        for agent in turn.agents.tolist():
-            own = turn.receivers == agent
-            chosen.append(self._choose(inputs, agent, turn.senders[own], turn.actions[own]))
+        for agent in inbox.agents.tolist():
+            own = inbox.receivers == agent
+            chosen.append(self._choose(inputs, agent, inbox.senders[own], inbox.actions[own]))
         return np.array(chosen)
 
     def _choose(self, inputs: FuzzyInputs, agent: int, senders: IntArray, actions: IntArray) -> int:
@@ -277,6 +280,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             raise ValueError(
                 f"the evaluator gave {len(values)} values of {len(self.action_set)} actions"
             )
+        if inputs.values is not None:
+            inputs.values[agent] = values.copy()
         if self.is_private and self.evaluator.expected is not None:
             inputs.expected[agent] = self.evaluator.expected.copy()
         if inputs.explore:
@@ -294,9 +299,36 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.given.size:
             self.given[every[:, None], joint_action[:, None], every, joint_action] += 1.0
 
-    def spent(self, inputs: FuzzyInputs) -> Mapping[str, float]:
-        """Return how far expectations were right, and what was communicated; without views {}."""
-        return {} if self.views is None else self.views.spent(inputs, self.hierarchy)
+    def decision_costs(self, inputs: FuzzyInputs) -> Mapping[str, float]:
+        """Return agreement and communication, for agents with views of their own."""
+        return {} if self.views is None else self.views.decision_costs(inputs, self.hierarchy)
+
+    def record_values(self, inputs: FuzzyInputs) -> None:
+        """Keep the values of actions in this decision; each agent then searches on its own."""
+        inputs.values = {}
+
+    def action_values(self, inputs: FuzzyInputs) -> Mapping[int, FloatArray]:
+        """Return the recorded values ``(A,)`` of the actions of each member."""
+        return inputs.values or {}
+
+    def value(self, agent: int, states: FloatArray) -> FloatArray:
+        """Return the value function of an agent at states ``(..., d)``.
+
+        Raises
+        ------
+        ValueError
+            If the states have other variables; one line.
+        """
+        row = self._row_of[agent]
+        assert row is not None  # the team asks the part of the agent
+        variables = [variable.name for variable in self.space.variables]
+        if not states.ndim or states.shape[-1] != len(variables):
+            raise ValueError(
+                f"states: shape {states.shape}, allowed: (..., {len(variables)}), the variables "
+                f"{', '.join(variables)}"
+            )
+        flat = states.reshape(-1, len(variables))
+        return self.rules.values(self.learner.theta[row], flat).reshape(states.shape[:-1])
 
     def learn(self, experience: Experience, inputs: FuzzyInputs) -> None:
         """Revise predictions, and learn from the states entered; after an episode, all of it."""
@@ -334,7 +366,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """Count weights that have changed."""
         self.counts.weight_updates += updates
 
-    def check_world(self, scenario: Scenario) -> None:
+    def check_scenario(self, scenario: Scenario) -> None:
         """Refuse another world for the very same agents, if their values mean nothing there."""
         self._carried_rows(scenario, self.members)
 
@@ -346,7 +378,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             shared=self.settings.weights == "role",
         )
 
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Begin where agents of the same settings ended in another world.
 
         They go on with weights and experience, with how often agents of each row were seen to take
@@ -370,9 +402,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             self.given = former.given.copy()
         self.foresight.continue_from(former.foresight)
 
-    def memory(self) -> Memory:
+    def state_dict(self) -> StateDict:
         """Return all that they remember."""
-        memory: Memory = {
+        memory: StateDict = {
             "generator": words_of(self.rng),
             "explorer": self.explorer.memory,
             "seen": self.seen,
@@ -384,32 +416,32 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             memory |= {f"{name}.{key}": array for key, array in part.arrays().items()}
         return memory
 
-    def restore(self, memory: Mapping[str, AnyArray]) -> None:
-        """Continue from what `memory` returned.
+    def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
+        """Continue from a `state_dict`.
 
         Raises
         ------
         ValueError
             If it is that of other agents.
         """
-        own = self.memory()
-        if memory.keys() != own.keys():
+        own = self.state_dict()
+        if state.keys() != own.keys():
             raise ValueError(
-                f"team: saved arrays {', '.join(sorted(memory))} are not this team's "
+                f"team: saved arrays {', '.join(sorted(state))} are not this team's "
                 f"{', '.join(sorted(own))}"
             )
         fixed = [f"learner.{name}" for name in self.learner.fixed_arrays]
         for name in [*fixed, "seen", "explorer", "generator"]:
-            if name in own and memory[name].shape != own[name].shape:
+            if name in own and state[name].shape != own[name].shape:
                 raise ValueError(
-                    f"team: saved {name} has shape {memory[name].shape}, this team's "
+                    f"team: saved {name} has shape {state[name].shape}, this team's "
                     f"{own[name].shape}"
                 )
-        set_words(self.rng, memory["generator"])
-        self.explorer.memory[:] = memory["explorer"]
-        self.seen = memory["seen"].copy()
+        set_words(self.rng, state["generator"])
+        self.explorer.memory[:] = state["explorer"]
+        self.seen = state["seen"].copy()
         if self.given.size:
-            self.given = memory["given"].copy()
-        self.learner.restore(under("learner.", memory))
+            self.given = state["given"].copy()
+        self.learner.restore(select_prefix("learner.", state))
         for name, part in self.foresight.adaptive.items():
-            part.restore(under(f"{name}.", memory))
+            part.restore(select_prefix(f"{name}.", state))

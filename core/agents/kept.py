@@ -9,7 +9,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from ..interface.agents import Agents, Memory, under
+from ..interface.agents import Agents, StateDict, select_prefix
 from ..numerics import AnyArray
 from ..plugins import sources
 
@@ -43,20 +43,20 @@ def begin_with(agents: Agents[Any], file: str, part: int) -> None:
             kept = dict(arrays)
     except (OSError, ValueError, BadZipFile) as error:
         raise ValueError(f"{where}: {error}") from None
-    kept = under(f"part{part}.", kept) or kept
-    own = agents.memory()
+    kept = select_prefix(f"part{part}.", kept) or kept
+    own = agents.state_dict()
     learned = _learned(own) & kept.keys()
     if not learned:
         raise ValueError(f"{where}: holds {', '.join(sorted(kept)) or 'nothing'}, and no weights")
     for name in sorted(learned):
         _check_shape(where, name, kept[name], own)
     try:
-        agents.restore({**own, **{name: kept[name] for name in learned}})
+        agents.load_state_dict({**own, **{name: kept[name] for name in learned}})
     except (KeyError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None
 
 
-def _learned(memory: Memory) -> set[str]:
+def _learned(memory: StateDict) -> set[str]:
     return {name for name in memory if name not in OF_A_RUN}
 
 

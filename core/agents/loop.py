@@ -17,8 +17,7 @@ from time import perf_counter
 import numpy as np
 
 from ..interface.experience import Experience, Observation
-from ..interface.plain import as_scenario
-from ..interface.scenario import Transition, checked_transition
+from ..interface.scenario import Transition, checked_scenario, checked_transition
 from ..numerics import FloatArray, IntArray
 from ..plugins.words import expect
 from .team import Team
@@ -44,7 +43,7 @@ class StepRecord:
     """Seconds that the team took to decide; the scenario reports its own in ``transition.info``."""
     learning: float
     """Seconds that the team took to learn."""
-    spent: Mapping[str, float]
+    decision_costs: Mapping[str, float]
     """What the decision cost, by the names of `Team.costs`."""
 
 
@@ -100,13 +99,13 @@ def control_loop(
     expect("whole numbers", Integral, episodes=episodes, steps=steps, seed=seed)
     first_world = first_episode if first_world is None else first_world
     explore = learn if explore is None else explore
-    world = as_scenario(scenario)
+    world = checked_scenario(scenario)
     space = world.state_space
     for k in range(episodes):
         episode = first_episode + k
         seed_of_world = world_seed(seed, first_world + k)
         seen = Observation(space.checked(world.reset(seed_of_world, episode), world.agents), world)
-        team.begin_world(seed_of_world, episode)
+        team.reset(seed_of_world, episode)
         if learn:
             team.begin_episode()
         team.check(seen)
@@ -129,7 +128,7 @@ def control_loop(
                 last=last,
                 deciding=decided - begin,
                 learning=perf_counter() - moved,
-                spent=team.spent,
+                decision_costs=team.decision_costs,
             )
             if last:
                 break

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..interface.agents import Memory
+from ..interface.agents import StateDict
 from ..interface.environments import Environments
 from ..interface.experience import Observation
 from ..interface.scenario import Scenario
@@ -91,7 +91,7 @@ class ManyEnvironmentsLoop:
         self._started += len(indices)
         return states
 
-    def state_dict(self) -> Memory:
+    def state_dict(self) -> StateDict:
         """Return the state of the loop, without that of the team."""
         n = len(self._scenario.agents)
         joint_actions = np.array(self._joint_actions, dtype=np.int32)

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..hierarchy.turns import levels_of
+from ..hierarchy.stages import communication_levels
 from ..interface.scenario import Scenario
 from ..learners import LEARNERS
 from ..learners.learner import MembersOf, TeamSettings
@@ -99,7 +99,7 @@ class MixedSettings(TeamSettings):
 
 def _names_of(scenario: Scenario, hierarchy: Hierarchy) -> list[list[str]]:
     """Return by what every agent can be named: name, role, body, level."""
-    levels = levels_of(hierarchy)
+    levels = communication_levels(hierarchy)
     return [
         [name, role, body_of(name), f"level{level + 1}"]
         for name, role, level in zip(scenario.agents, scenario.roles, levels, strict=True)

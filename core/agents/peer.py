@@ -14,8 +14,8 @@ import numpy as np
 from pydantic import Field
 
 from ..decision.exploration import no_way_on
-from ..hierarchy.turns import Turn
-from ..interface.agents import Agents, Memory, Placement
+from ..hierarchy.stages import Inbox
+from ..interface.agents import AgentContext, Agents, StateDict
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Transition
 from ..learners.learner import CORE, TeamSettings
@@ -42,7 +42,7 @@ class Peer(ABC):
         Seed of everything random in it.
     """
 
-    is_sampled = False
+    is_stochastic = False
     """Whether its policy is stochastic, so that sampled actions are evaluated, too."""
 
     def __init__(self, seed: np.random.SeedSequence) -> None:
@@ -61,22 +61,22 @@ class Peer(ABC):
     def end_episode(self) -> None:  # noqa: B027 - optional
         """Learn after an episode."""
 
-    def arrays(self) -> dict[str, FloatArray]:
+    def state_dict(self) -> dict[str, FloatArray]:
         """Return what it has learned."""
         return {}
 
-    def restore(self, arrays: Mapping[str, AnyArray]) -> None:
-        """Continue from what `arrays` returned.
+    def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
+        """Continue from a `state_dict`.
 
         Raises
         ------
         ValueError
             If it cannot; one line.
         """
-        if arrays:
-            raise ValueError(f"learner.kind: {type(self).__name__} has no method restore")
+        if state:
+            raise ValueError(f"learner.kind: {type(self).__name__} has no method load_state_dict")
 
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Start with what a learner of equal settings has learned elsewhere.
 
         Raises
@@ -84,7 +84,7 @@ class Peer(ABC):
         ValueError
             If it cannot; one line.
         """
-        raise ValueError(no_way_on("learner.kind", self))
+        raise ValueError(no_way_on("learner.kind", self, "warm_start"))
 
 
 @dataclass
@@ -104,30 +104,30 @@ class PeerAgents(Agents[PeerInputs]):
     ----------
     settings
         Settings of the learner.
-    placement
+    context
         Scenario, seed and hierarchy.
     """
 
-    def __init__(self, settings: PeerSettings, placement: Placement) -> None:
-        hierarchies = (placement.hierarchy,) if settings.uses_hierarchy else ()
-        self.peer: Peer = settings.build(placement.scenario, placement.seed, *hierarchies)
+    def __init__(self, settings: PeerSettings, context: AgentContext) -> None:
+        hierarchies = (context.hierarchy,) if settings.uses_hierarchy else ()
+        self.peer: Peer = settings.build(context.scenario, context.seed, *hierarchies)
         self.rng = self.peer.rng
-        self.is_sampled = self.peer.is_sampled
+        self.is_stochastic = self.peer.is_stochastic
 
     def begin_episode(self) -> None:
         """Start an episode of learning."""
         self.peer.begin_episode()
 
-    def perceive(self, seen: Observation, *, explore: bool) -> PeerInputs:
+    def observe(self, seen: Observation, *, explore: bool) -> PeerInputs:
         """Return the inputs of a decision."""
         return PeerInputs(seen, explore)
 
-    def decide(self, inputs: PeerInputs, turn: Turn) -> IntArray:
+    def act(self, inputs: PeerInputs, inbox: Inbox) -> IntArray:
         """Return the actions of the agents of a turn; the first turn chooses those of all."""
         if inputs.joint_action is None:
             joint_action = self.peer.act(inputs.seen, explore=inputs.explore)
             inputs.joint_action = np.asarray(joint_action)
-        return inputs.joint_action[turn.agents]
+        return inputs.joint_action[inbox.agents]
 
     def learn(self, experience: Experience, inputs: PeerInputs) -> None:
         """Learn from a step."""
@@ -135,14 +135,14 @@ class PeerAgents(Agents[PeerInputs]):
         if experience.last:
             self.peer.end_episode()
 
-    def memory(self) -> Memory:
+    def state_dict(self) -> StateDict:
         """Return what has been learned."""
-        return dict(self.peer.arrays())
+        return dict(self.peer.state_dict())
 
-    def restore(self, memory: Mapping[str, AnyArray]) -> None:
-        """Continue from what `memory` returned, if the learner can."""
-        self.peer.restore(memory)
+    def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
+        """Continue from a `state_dict`, if the learner can."""
+        self.peer.load_state_dict(state)
 
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Start with what was learned elsewhere, if the learner can."""
-        self.peer.continue_from(former.peer)
+        self.peer.warm_start(former.peer)

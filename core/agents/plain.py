@@ -14,7 +14,6 @@ import numpy as np
 from ..decision.exploration import Explorer, no_way_on
 from ..evaluators.evaluator import Deliberation, Evaluator
 from ..interface.agents import Counts
-from ..interface.plain import offered
 from ..learners.learner import Learner
 from ..numerics import FloatArray, IntArray
 
@@ -92,7 +91,7 @@ class PlainLearner(Learner):
 
     def continue_from(self, former: Self, rows: IntArray) -> None:
         """Begin with what another learner has learned, if the user's class can."""
-        if offered(self.plain, "continue_from") is None:
+        if getattr(self.plain, "continue_from", None) is None:
             raise ValueError(no_way_on("learner.kind", self.plain))
         self.plain.continue_from(former.plain, rows)
 
@@ -108,7 +107,7 @@ class PlainEvaluator(Evaluator):
 
     def __init__(self, plain: Any) -> None:
         self.plain = plain
-        self.counts: Counts = offered(plain, "counts", Counts())
+        self.counts: Counts = getattr(plain, "counts", Counts())
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
@@ -148,6 +147,6 @@ class PlainExplorer(Explorer):
 
     def continue_from(self, former: Self) -> None:
         """Go on from an explorer of other agents, if the user's class can."""
-        if offered(self.plain, "continue_from") is None:
+        if getattr(self.plain, "continue_from", None) is None:
             raise ValueError(no_way_on("learner.exploration.kind", self.plain))
         self.plain.continue_from(former.plain)

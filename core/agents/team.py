@@ -1,4 +1,4 @@
-"""A team: agents in a hierarchy who decide together, turn by turn, and learn from what comes."""
+"""Teams: agents that decide jointly, stage by stage of a hierarchy, and learn together."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ import numpy as np
 
 from ..hierarchy.failures import LeftAgents, MessageFailure, ReparentedAgents
 from ..hierarchy.hierarchy import Hierarchy
-from ..hierarchy.messages import Messages
-from ..hierarchy.turns import Slot, Turn, slots_of
-from ..interface.agents import Agents, Counts, Memory, Placement, under
+from ..hierarchy.messages import NO_PAYLOADS, Messages, Payloads
+from ..hierarchy.stages import DecisionStage, Inbox, decision_stages
+from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
 from ..interface.environments import Transitions
 from ..interface.experience import Decision, Experience, Observation
 from ..interface.measures import Measure
-from ..interface.plain import as_scenario
-from ..interface.scenario import Scenario
-from ..numerics import AnyArray, BoolArray, IntArray
+from ..interface.scenario import Scenario, checked_scenario
+from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from ..plugins.settings import Settings
 from ..plugins.words import expect
+from .inspection import inspect_agents
 from .kept import begin_with
 
 if TYPE_CHECKING:
@@ -30,42 +30,40 @@ if TYPE_CHECKING:
 
 A = TypeVar("A", bound=Agents[Any])
 MESSAGES = Measure("messages", "messages", gathering="sum", better="lower", least=0.0)
-"""What of a decision's cost is counted here, where agents say more than actions: the messages that
-have arrived, whatever agents are of."""
+"""Number of received messages, a measure of teams that send payloads."""
 
 
 class Team:
-    """A hierarchy, its messages, and the agents that decide: of one kind, or part by part.
+    """Agents of one or several kinds that decide jointly in a hierarchy.
 
     Parameters
     ----------
     settings
-        Of the agents: how they decide and learn.
+        Settings of the agents.
     scenario
-        Where they act.
+        Scenario in which they act.
     hierarchy
-        Who decides before whom, and sees whom.
+        Order of decisions, communication and lookahead.
     seed
-        Source of everything random in the team.
+        Seed of all random numbers of the team.
     failures
-        What fails of the messages down the hierarchy.
+        Message failures and absences, with their times.
 
     Attributes
     ----------
     parts
-        The agents, kind by kind.
+        The agents, one part for each kind.
     messages
-        Who is told what.
+        Delivery of messages.
     costs
-        What is measured of an episode of what its decisions cost: of functions, and of agents with
-        views of their own.
-    spent
-        What its last decision cost, by their names.
+        Measures of the costs of decisions.
+    decision_costs
+        Costs of the last decision, by the names of `costs`.
 
     Raises
     ------
     ValueError
-        If the hierarchy is over other agents than the scenario's, or the settings do not fit the
+        If the hierarchy does not consist of the scenario's agents, or the settings do not fit the
         scenario; one line.
     """
 
@@ -80,56 +78,58 @@ class Team:
         expect("settings of a team or of a learner", Settings, settings=settings)
         expect("a hierarchy", Hierarchy, hierarchy=hierarchy)
         expect("what policy_seed returns", np.random.SeedSequence, seed=seed)
-        world = as_scenario(scenario)
-        if hierarchy.agents != tuple(world.agents):
+        checked = checked_scenario(scenario)
+        if hierarchy.agents != tuple(checked.agents):
             raise ValueError(
                 f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "
-                f"{', '.join(world.agents)}"
+                f"{', '.join(checked.agents)}"
             )
         if not settings.uses_hierarchy:
-            hierarchy, failures = Hierarchy(world.agents, []), ()
+            hierarchy = Hierarchy(checked.agents, [])
+            failures = ()
         self.hierarchy = hierarchy
-        self.action_set = world.action_set
-        kinds = settings.members(world, hierarchy)
+        self.action_set = checked.action_set
+        kinds = settings.members(checked, hierarchy)
         seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
         parts: list[Agents[Any]] = []
         self._part_of = [0] * len(hierarchy)
         for (members, own, kept), own_seed in zip(kinds, seeds, strict=True):
             for agent in members.tolist():
                 self._part_of[agent] = len(parts)
-            fail = bool(failures)
-            placement = Placement(world, hierarchy, members, own_seed, messages_fail=fail)
-            parts.append(own.agents(placement))
+            context = AgentContext(
+                checked, hierarchy, members, own_seed, messages_fail=bool(failures)
+            )
+            parts.append(own.agents(context))
             if kept is not None:
                 begin_with(parts[-1], kept, len(parts) - 1)
         self.parts = tuple(parts)
         self.costs = costs_of(parts)
-        self.spent: Mapping[str, float] = {}
-        self._messages = 0
-        self._has_contents = any(part.has_contents for part in parts)
+        self.decision_costs: Mapping[str, float] = {}
+        self._n_received = 0
+        self._has_payloads = any(part.sends_payload for part in parts)
         self.messages = Messages(
-            hierarchy, failures, len(world.action_set), has_contents=self._has_contents
+            hierarchy, failures, len(checked.action_set), has_payloads=self._has_payloads
         )
         self._present = hierarchy
-        self._actions_of_left = _actions_of_left(failures, world)
+        self._actions_of_left = _actions_of_left(failures, checked)
 
     @cached_property
-    def _slots(self) -> tuple[Slot, ...]:
-        # Who is told by another superior may not decide at once with it.
-        one_by_one = any(
+    def _stages(self) -> tuple[DecisionStage, ...]:
+        # Reparented agents may receive actions from agents of their own stage.
+        is_sequential = any(
             isinstance(f, ReparentedAgents) or (isinstance(f, LeftAgents) and f.repair == "next")
             for f in self.messages.failures
         )
-        at_once = [part.at_once and not one_by_one for part in self.parts]
-        return slots_of(self.hierarchy, self._part_of, at_once)
+        acts_in_parallel = [part.acts_in_parallel and not is_sequential for part in self.parts]
+        return decision_stages(self.hierarchy, self._part_of, acts_in_parallel)
 
     def only(self, kind: type[A]) -> A:
-        """Return the team's agents, if all are of one kind, and of this one.
+        """Return the agents of a team that consists of one part of this kind.
 
         Raises
         ------
         ValueError
-            If they are not; one line.
+            If the team consists of other agents; one line.
         """
         if len(self.parts) == 1 and isinstance(self.parts[0], kind):
             return self.parts[0]
@@ -137,13 +137,13 @@ class Team:
         raise ValueError(f"learner.kind: needs {kind.__name__}, the team is of {others}")
 
     @property
-    def is_sampled(self) -> bool:
-        """Whether a policy in it is one of probabilities."""
-        return any(part.is_sampled for part in self.parts)
+    def is_stochastic(self) -> bool:
+        """Whether the policy of some part is stochastic."""
+        return any(part.is_stochastic for part in self.parts)
 
     @property
     def counts(self) -> Counts:
-        """What all have evaluated so far."""
+        """Number of evaluations of all parts so far."""
         total = Counts()
         for part in self.parts:
             total.add(part.counts)
@@ -151,20 +151,20 @@ class Team:
 
     @property
     def weight_bytes(self) -> int:
-        """How much memory all weights take."""
+        """Memory of all learned weights [bytes]."""
         return sum(part.weight_bytes for part in self.parts)
 
     @contextmanager
     def drawing_apart(self) -> Iterator[None]:
-        """Let what is drawn within change nothing of what is drawn after."""
+        """Restore the states of all random generators on exit."""
         generators = [part.rng.bit_generator for part in self.parts]
         states = [generator.state for generator in generators]
         yield
         for generator, state in zip(generators, states, strict=True):
             generator.state = state
 
-    def check(self, seen: Observation) -> None:
-        """Refuse a world without what the agents decide by.
+    def check(self, observation: Observation) -> None:
+        """Refuse a scenario that lacks what the agents decide by.
 
         Raises
         ------
@@ -172,98 +172,170 @@ class Team:
             One line.
         """
         for part in self.parts:
-            part.check(seen)
+            part.check(observation)
 
-    def begin_world(self, seed: int | np.random.SeedSequence, episode: int) -> None:
-        """Begin a world; what fails of the messages in it follows from `seed`."""
-        self.messages.begin(seed, episode)
+    def check_scenario(self, scenario: Scenario) -> None:
+        """Refuse another scenario in which the trained team cannot act.
+
+        Raises
+        ------
+        ValueError
+            One line.
+        """
         for part in self.parts:
-            part.begin_world(episode)
+            part.check_scenario(scenario)
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int) -> None:
+        """Start an episode; random message failures follow from `seed`."""
+        self.messages.reset(seed, episode)
+        for part in self.parts:
+            part.reset(episode)
 
     def begin_episode(self) -> None:
-        """Begin an episode of learning."""
+        """Start an episode of training."""
         for part in self.parts:
             part.begin_episode()
 
-    def act(self, seen: Observation, *, explore: bool = True) -> Decision:
-        """Decide a joint action, from the top of the hierarchy down.
+    def act(
+        self, observation: Observation, *, explore: bool = True, inspect: bool = False
+    ) -> Decision:
+        """Return a joint decision.
 
-        Without `explore` every agent takes its greatest action and the team's memory stays as it
-        is, apart from the random numbers that break ties.
+        Parameters
+        ----------
+        observation
+            States of all agents.
+        explore
+            Whether the agents explore. If not, each takes an action of greatest value, and the
+            team changes only the random numbers that break ties.
+        inspect
+            Whether the decision contains the values, received actions and exploration of single
+            agents, see `AgentDecision`. The joint action is the same; agents that would share one
+            search then search one after the other, which takes longer.
+
+        Examples
+        --------
+        >>> from nested_agents.core.learners.batch import BatchTDSettings
+        >>> from nested_agents.scenarios.line_up import LineUpSettings
+        >>> carts = LineUpSettings(carts=2).build()
+        >>> chain = Hierarchy(carts.agents, [carts.agents])
+        >>> team = Team(BatchTDSettings(), carts, chain, np.random.SeedSequence(0))
+        >>> observation = Observation(carts.reset(0), carts)
+        >>> decision = team.act(observation, explore=False, inspect=True)
+        >>> [list(agent.received) for agent in decision.agents]
+        [[], ['cart1']]
         """
         if self._present is not self.messages.hierarchy:
             self._rearrange()
-        inputs = tuple(part.perceive(seen, explore=explore) for part in self.parts)
-        joint = self._walk(seen, inputs)
-        if self._has_contents:
-            self.messages.advance(joint, self._contents(inputs))
-        else:
-            self.messages.advance(joint)
+        if inspect and observation.present.ndim > 2:
+            raise ValueError("inspect = True: a decision of one environment only")
+        inputs = tuple(part.observe(observation, explore=explore) for part in self.parts)
+        inboxes: list[Inbox] | None = None
+        if inspect:
+            inboxes = []
+            for part, own in zip(self.parts, inputs, strict=True):
+                part.record_values(own)
+        joint_action = self._decide(observation, inputs, inboxes)
+        payloads = self._payloads(inputs) if self._has_payloads else NO_PAYLOADS
+        self.messages.advance(joint_action, payloads)
         for part, own in zip(self.parts, inputs, strict=True):
-            part.conclude(own, joint)
+            part.conclude(own, joint_action)
         if self.costs:
-            self.spent = self._spent(inputs)
-        return Decision(joint, inputs)
+            self.decision_costs = self._costs_of_decision(inputs)
+        if inboxes is None:
+            return Decision(joint_action, inputs)
+        values: dict[int, FloatArray] = {}
+        for part, own in zip(self.parts, inputs, strict=True):
+            values.update(part.action_values(own))
+        agents = inspect_agents(
+            self.hierarchy.agents, self.action_set.names, joint_action, values, inboxes
+        )
+        return Decision(joint_action, inputs, agents)
 
-    def _walk(self, seen: Observation, inputs: tuple[object, ...]) -> IntArray:
-        """Let the agents decide, turn by turn; each is told what those above it have decided."""
-        batch_shape = seen.present.shape[:-2]
-        joint = np.full((*batch_shape, len(self.hierarchy)), self.action_set.neutral)
-        decided = joint.T  # a view with the agents first, however many environments there are
+    def _decide(
+        self,
+        observation: Observation,
+        inputs: tuple[object, ...],
+        inboxes: list[Inbox] | None = None,
+    ) -> IntArray:
+        """Return the joint action, decided stage by stage; append the inboxes to a list."""
+        shape = (*observation.present.shape[:-2], len(self.hierarchy))
+        joint_action = np.full(shape, self.action_set.neutral)
+        by_agent = joint_action.T  # a view with the axis of agents first
         fail = bool(self.messages.failures)
-        gone = self.messages.gone
-        some_left = fail and bool(gone.any())
-        if some_left:
-            joint[..., gone] = self._joint_of_left()[gone]
-        for part, agents, receivers, senders in self._slots:
-            if some_left:
-                agents = agents[~gone[agents]]
-            if fail and self.parts[part].has_contents:  # whoever is absent is not asked
-                agents = agents[~np.isin(agents, self.messages.absent(agents))]
-            if not len(agents):
+        if fail:
+            left = self.messages.left
+            joint_action[..., left] = self._joint_action_of_left()[left]
+        for stage in self._stages:
+            part = self.parts[stage.part]
+            payloads = self._payloads(inputs) if part.sends_payload else None
+            inbox = self.messages.deliver(stage, joint_action, payloads)
+            if not len(inbox.agents):
                 continue
-            if self.parts[part].has_contents:
-                turn = self.messages.turn_with_contents(agents, joint, self._contents(inputs))
-            elif fail:
-                turn = self.messages.failed_turn(agents, joint)
-            else:
-                turn = Turn(agents, receivers, senders, decided[senders].T)
-            decided[agents] = self.parts[part].decide(inputs[part], turn).T
-            self._messages += len(turn.senders)
+            if inboxes is not None:
+                inboxes.append(inbox)
+            by_agent[inbox.agents] = part.act(inputs[stage.part], inbox).T
+            self._n_received += len(inbox.senders)
             if fail:
-                joint[self.messages.absent(agents)] = self.action_set.neutral
-        return joint
+                joint_action[self.messages.absent(inbox.agents)] = self.action_set.neutral
+        return joint_action
 
-    def _joint_of_left(self) -> IntArray:
-        """Return what agents do who have left ``(n,)``; others are neutral."""
-        return self.messages.acting_for(self._actions_of_left, self.action_set.neutral)
+    def value(self, agent: str, states: FloatArray) -> FloatArray:
+        """Return the value function of an agent at some states.
+
+        Parameters
+        ----------
+        agent
+            Name of the agent.
+        states
+            ``(..., d)`` states of the agent, in the order of the scenario's state variables.
+
+        Returns
+        -------
+        FloatArray
+            ``(...)`` values.
+
+        Raises
+        ------
+        ValueError
+            If there is no such agent, or it has no value function of its own states; one line.
+        """
+        names = self.hierarchy.agents
+        if agent not in names:
+            raise ValueError(f"agent = {agent!r}, allowed: {', '.join(names)}")
+        index = names.index(agent)
+        return self.parts[self._part_of[index]].value(index, np.asarray(states, dtype=float))
+
+    def _joint_action_of_left(self) -> IntArray:
+        """Return the actions ``(n,)`` of agents that have left; others are neutral."""
+        return self.messages.actions_of_left(self._actions_of_left, self.action_set.neutral)
 
     def _rearrange(self) -> None:
-        """Let all parts know who has left or come, and the hierarchy of those who are there."""
+        """Pass a repaired hierarchy to all parts."""
         self._present = self.messages.hierarchy
-        left = np.flatnonzero(self.messages.gone)
+        left = np.flatnonzero(self.messages.left)
         for part in self.parts:
-            part.rearrange(self._present, left, self._joint_of_left()[left])
+            part.rearrange(self._present, left, self._joint_action_of_left()[left])
 
-    def _contents(self, inputs: tuple[object, ...]) -> Mapping[int, object]:
-        """Return by agent what has been said beside actions so far."""
-        contents: dict[int, object] = {}
+    def _payloads(self, inputs: tuple[object, ...]) -> Payloads:
+        """Return the payloads of the messages sent so far, by agent."""
+        payloads: dict[int, object] = {}
         for part, own in zip(self.parts, inputs, strict=True):
-            contents.update(part.contents(own))
-        return contents
+            payloads.update(part.payloads(own))
+        return payloads
 
-    def _spent(self, inputs: tuple[object, ...]) -> Mapping[str, float]:
-        """Return what a decision has cost, by the names of `costs`."""
+    def _costs_of_decision(self, inputs: tuple[object, ...]) -> Mapping[str, float]:
+        """Return the costs of a decision by the names of `costs`."""
         total = {measure.name: 0.0 for measure in self.costs}
-        total[MESSAGES.name] = float(self._messages)
-        self._messages = 0
+        total[MESSAGES.name] = float(self._n_received)
+        self._n_received = 0
         for part, own in zip(self.parts, inputs, strict=True):
-            for name, value in part.spent(own).items():
+            for name, value in part.decision_costs(own).items():
                 total[name] += value
         return total
 
     def learn(self, experience: Experience) -> None:
-        """Learn from what a decision led to."""
+        """Learn from a step."""
         for part, inputs in zip(self.parts, experience.decision.inputs, strict=True):
             part.learn(experience, inputs)
 
@@ -272,35 +344,24 @@ class Team:
         for part, inputs in zip(self.parts, decision.inputs, strict=True):
             part.learn_batch(decision.joint_action, inputs, steps, last)
 
-    def continue_from(self, former: Team) -> None:
-        """Begin where the team of another scenario or hierarchy ended, between two episodes.
+    def warm_start(self, former: Team) -> None:
+        """Start with what the team of another scenario or hierarchy learned, between episodes.
 
         Raises
         ------
         ValueError
-            If what was learned means nothing here; one line.
+            If it cannot be used here; one line.
         """
         for part, before in zip(self.parts, former.parts, strict=True):
-            part.continue_from(before)
-
-    def check_world(self, scenario: Scenario) -> None:
-        """Refuse another world for the very same team, if what it has learned means nothing there.
-
-        Raises
-        ------
-        ValueError
-            One line.
-        """
-        for part in self.parts:
-            part.check_world(scenario)
+            part.warm_start(before)
 
     def save(self, path: Path | str) -> None:
-        """Write everything that the team remembers to an ``.npz`` file: arrays only."""
+        """Write the `state_dict` to an ``.npz`` file."""
         with open(path, "wb") as file:
-            np.savez(file, allow_pickle=False, **self.arrays())
+            np.savez(file, allow_pickle=False, **self.state_dict())
 
     def load(self, path: Path | str) -> None:
-        """Continue from what `save` wrote; the team must be built from the same settings.
+        """Continue from a file of `save`; the team must be built from the same settings.
 
         Raises
         ------
@@ -308,43 +369,43 @@ class Team:
             If the file is not of a team of this shape.
         """
         with np.load(path, allow_pickle=False) as arrays:
-            self.restore(dict(arrays))
+            self.load_state_dict(dict(arrays))
 
-    def arrays(self) -> Memory:
-        """Return everything that the team remembers as named arrays."""
+    def state_dict(self) -> StateDict:
+        """Return the saved state of all parts as named arrays."""
         if len(self.parts) == 1:
-            return self.parts[0].memory()
+            return self.parts[0].state_dict()
         return {
             f"part{k}.{name}": array
             for k, part in enumerate(self.parts)
-            for name, array in part.memory().items()
+            for name, array in part.state_dict().items()
         }
 
-    def restore(self, arrays: Mapping[str, AnyArray]) -> None:
-        """Continue from what `arrays` returned.
+    def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
+        """Continue from a `state_dict`.
 
         Raises
         ------
         ValueError
-            If they are of another team.
+            If it is that of another team.
         """
         if len(self.parts) == 1:
-            self.parts[0].restore(arrays)
+            self.parts[0].load_state_dict(state)
             return
         for k, part in enumerate(self.parts):
-            part.restore(under(f"part{k}.", arrays))
+            part.load_state_dict(select_prefix(f"part{k}.", state))
 
 
 def costs_of(parts: Sequence[Agents[Any]]) -> tuple[Measure, ...]:
-    """Return what decisions of some parts cost, each once.
+    """Return the measures of the costs of all parts, each once.
 
     Raises
     ------
     ValueError
-        If two parts give the same cost in different units; one line.
+        If two parts report one cost in different units; one line.
     """
     by_name: dict[str, Measure] = {}
-    if any(part.has_contents for part in parts):
+    if any(part.sends_payload for part in parts):
         by_name[MESSAGES.name] = MESSAGES
     for part in parts:
         for measure in part.costs:
@@ -357,15 +418,15 @@ def costs_of(parts: Sequence[Agents[Any]]) -> tuple[Measure, ...]:
     return tuple(by_name.values())
 
 
-def _actions_of_left(failures: Sequence[MessageFailure], world: Scenario) -> list[int]:
-    """Return what those do who have left, failure by failure; others are neutral.
+def _actions_of_left(failures: Sequence[MessageFailure], scenario: Scenario) -> list[int]:
+    """Return the action of agents that have left, for every failure.
 
     Raises
     ------
     ValueError
-        If there is no such action; one line.
+        If an action is unknown; one line.
     """
-    names = world.action_set.names
+    names = scenario.action_set.names
     actions = []
     for k, failure in enumerate(failures):
         action = failure.action if isinstance(failure, LeftAgents) else None
@@ -374,5 +435,5 @@ def _actions_of_left(failures: Sequence[MessageFailure], world: Scenario) -> lis
                 f"topology.failures[{k}].action = {action!r}: no action, allowed: "
                 f"{', '.join(names)}"
             )
-        actions.append(world.action_set.neutral if action is None else names.index(action))
+        actions.append(scenario.action_set.neutral if action is None else names.index(action))
     return actions

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from ..evaluators.budget import check_budget
 from ..evaluators.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.agents import Placement
+from ..interface.agents import AgentContext
 from ..interface.scenario import Scenario
 from ..learners.learner import LearnerSettings
 from ..numerics import IntArray
@@ -32,7 +33,7 @@ def evaluator_of(
     settings: LearnerSettings,
     rules: RuleBase,
     learned: Evaluator | None,
-    placement: Placement,
+    context: AgentContext,
     present: Present,
 ) -> Evaluator | None:
     """Return the evaluator of some agents; None: their actions are drawn at random.
@@ -43,7 +44,7 @@ def evaluator_of(
         Of the agents.
     learned
         Their learner, if it values actions itself.
-    placement
+    context
         Where they act.
     present
         Who takes part.
@@ -57,18 +58,20 @@ def evaluator_of(
     if decision.rule == "random":
         return None
     hierarchy = present.hierarchy
-    members = placement.members.tolist()
+    members = context.members.tolist()
     own = set(members) - set(present.left.tolist())
-    if decision.rule != "reward" and not placement.is_whole:
+    if decision.rule != "reward" and not context.is_whole:
         _check_values(hierarchy, set(members), decision.value_of)
     if learned is not None:
+        n_tried = len(own) * len(context.scenario.action_set)
+        check_budget(decision.budget, n_tried, settings.kind)
         return learned
-    private = is_private(settings, placement.scenario)
+    private = is_private(settings, context.scenario)
     problem = DecisionProblem(
         rules=rules,
         hierarchy=hierarchy,
-        n_actions=len(placement.scenario.action_set),
-        groups=placement.scenario.groups,
+        n_actions=len(context.scenario.action_set),
+        groups=context.scenario.groups,
         rule=decision.rule,
         teammates=decision.teammates,
         discount=settings.discount,
@@ -76,12 +79,20 @@ def evaluator_of(
         unseen=decision.unseen,
         plan=decision.plan,
         handed_down=hierarchy.communication == "ancestors"
-        and not placement.messages_fail
+        and not context.messages_fail
         and not private,
-        first=next((i for i in hierarchy.order if i in own), members[0]),
+        members=tuple(i for i in hierarchy.order if i in own) or (members[0],),
         is_private=private,
+        budget=decision.budget,
     )
-    return as_evaluator(decision.evaluator.build(problem))
+    evaluator = as_evaluator(decision.evaluator.build(problem))
+    if decision.budget is not None and not evaluator.keeps_budget:
+        raise ValueError(
+            f"learner.decision.budget = {decision.budget}: learner.decision.evaluator = "
+            f"{decision.evaluator.kind!r} cannot keep to a budget; use sampling, best-response or "
+            "exact"
+        )
+    return evaluator
 
 
 def _check_values(hierarchy: Hierarchy, own: set[int], value_of: ValueOf) -> None:

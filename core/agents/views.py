@@ -19,7 +19,7 @@ from ..adaptation.foresight import Foresight
 from ..decision.errors import Errors
 from ..evaluators.evaluator import concerned
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.agents import Placement
+from ..interface.agents import AgentContext
 from ..interface.experience import Observation
 from ..interface.measures import Measure
 from ..interface.prediction import Prediction
@@ -54,7 +54,7 @@ class FuzzyInputs:
 
     left: FloatArray
     """``(n, d)`` the states that they are in; where they value actions, with a column for each
-    action that they are told, filled in turn by turn."""
+    action that they are told, filled in stage by stage."""
     previous: IntArray | None
     """``(n,)`` what all did in the decision before; none: there was none, or nobody asks."""
     prediction: Prediction
@@ -65,6 +65,8 @@ class FuzzyInputs:
     """``(n, A)`` how often each agent was seen to take each action, rows summing to one."""
     explore: bool
     """Whether they explore."""
+    values: dict[int, FloatArray] | None = None
+    """Values ``(A,)`` of actions by agent, if the decision is inspected."""
     joint_action: IntArray | None = None
     """``(n,)`` the joint action, if one search has found the actions of all agents."""
     views: dict[int, OwnView] = field(default_factory=dict)
@@ -80,7 +82,7 @@ class Views:
 
     Parameters
     ----------
-    settings, placement
+    settings, context
         Of the agents.
     rows
         Per agent of the team the row of its weights; none: they are not known.
@@ -105,7 +107,7 @@ class Views:
     def __init__(
         self,
         settings: LearnerSettings,
-        placement: Placement,
+        context: AgentContext,
         rows: list[int | None],
         n_rules: int,
         foresight: Foresight,
@@ -113,20 +115,20 @@ class Views:
         plans: bool,
     ) -> None:
         self.costs = COSTS if plans else COSTS[1:]
-        self._members = placement.members.tolist()
+        self._members = context.members.tolist()
         self._rows = rows
         self._foresight = foresight
-        hierarchy = placement.hierarchy
+        hierarchy = context.hierarchy
         # Who values its own actions where it is predicts nothing, and needs no state but its own.
-        perceived = placement.scenario.perceived[placement.members]
+        perceived = context.scenario.perceived[context.members]
         self._broadcast = 0.0 if settings.values_actions else float(perceived.sum())
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
-            bodies = placement.scenario.embodiment() if settings.decision.errors.constants else None
+            bodies = context.scenario.embodiment() if settings.decision.errors.constants else None
             whose = concerned(hierarchy, settings.decision.value_of)
             n_constants = 0 if bodies is None else len(bodies.constants)
             self._errors = Errors(
-                settings.decision.errors, whose, rows, n_rules, n_constants, placement.seed
+                settings.decision.errors, whose, rows, n_rules, n_constants, context.seed
             )
 
     def by_agent(
@@ -145,7 +147,7 @@ class Views:
             views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
         return views
 
-    def spent(self, inputs: FuzzyInputs, hierarchy: Hierarchy) -> Mapping[str, float]:
+    def decision_costs(self, inputs: FuzzyInputs, hierarchy: Hierarchy) -> Mapping[str, float]:
         """Return how far expectations were right, and what was communicated in a decision."""
         share = len(self._members) / len(hierarchy)  # those of other parts add theirs
         spent = {

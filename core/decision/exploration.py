@@ -30,11 +30,10 @@ def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
     return weights / weights.sum()
 
 
-def no_way_on(key: str, part: object) -> str:
+def no_way_on(key: str, part: object, method: str = "continue_from") -> str:
     """Return the message that a part cannot be warm-started from another team."""
     return (
-        f"{key}: {type(part).__name__} has no continue_from, which starting from another team "
-        "requires"
+        f"{key}: {type(part).__name__} has no {method}, which starting from another team requires"
     )
 
 

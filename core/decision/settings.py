@@ -2,6 +2,8 @@
 
 from typing import Annotated, Literal
 
+from pydantic import Field
+
 from ..evaluators import EVALUATORS, EvaluatorSettings
 from ..evaluators.enumeration import AutoSettings
 from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
@@ -33,5 +35,9 @@ class DecisionSettings(Settings):
     with its messages (``private``), or all agents compute the same plan from common knowledge."""
     evaluator: Annotated[EvaluatorSettings, Plugged(EVALUATORS, EVALUATORS.parsed)] = AutoSettings()
     """Search over joint actions of the agents below: the name of an evaluator, or its table."""
+    budget: Annotated[int | None, Field(ge=1)] = None
+    """Maximum number of joint actions that the team tries in a decision, to compare hierarchies at
+    equal computing. The budget is divided equally over the agents; what an agent does not need goes
+    to the others. Without this key the search alone decides."""
     errors: ErrorSettings | None = None
     """Individual errors of agents. With this table every agent also makes plans of its own."""

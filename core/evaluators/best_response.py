@@ -19,6 +19,11 @@ learns more of the decisions than it is told.
 With ``unseen = "plan"`` an agent plans for all agents whose actions it was not told.
 
 The number of evaluated joint actions grows linearly with the number of bodies.
+
+With a budget, an agent first reserves the joint actions of its own decision: those of its body, or
+only its own actions if its share is smaller. The rest of its share is spent on the plan: on the
+joint actions to start from (a random sample of them if they are too many), then on bodies in the
+order of decision, until the next body would exceed the share.
 """
 
 from abc import abstractmethod
@@ -123,9 +128,11 @@ class BestResponse(Aggregation):
     ------
     ValueError
         If the teammate model is not ``best-response``, or a common plan is wanted where there is
-        nothing to plan or agents have views of their own.
+        nothing to plan or agents have views of their own, or the budget is below the actions of
+        every agent.
     """
 
+    name = "best-response"
     plans = True
 
     def __init__(self, problem: DecisionProblem, sweeps: int = 1) -> None:
@@ -151,11 +158,21 @@ class BestResponse(Aggregation):
         self._own = [tuple(j for j in self._free[i] if body[j] == body[i]) for i in range(n)]
         self._others = [np.setdiff1d(np.arange(n), free) for free in self._free]
         self._starts: dict[tuple[int, ...], IntArray] = {}
+        self._shares = self.shares([self._need(i) for i in range(n)], least=self.n_actions)
         self._order = np.array(hierarchy.order)
         self._decides_jointly = self._can_decide_jointly()
         self._plans: dict[int, IntArray] = {}
         self._last: _BodyValues | None = None
         self._equivalent: list[tuple[IntArray, IntArray]] = []
+
+    def _need(self, agent: int) -> int:
+        """Return the maximum number of joint actions that an agent tries without a budget."""
+        decision = self.n_actions ** len(self._own[agent])
+        if self._planner[agent] != agent:
+            return decision
+        starts = len(self._starting_actions(self.hierarchy.order))
+        improvements = sum(self.n_actions ** len(group) for group in self.problem.groups)
+        return decision + starts + self._sweeps * improvements
 
     def _can_decide_jointly(self) -> bool:
         """Return whether all agents share one plan and decide body by body, by the team's value."""
@@ -171,7 +188,13 @@ class BestResponse(Aggregation):
             and self._sweeps == 1
             and [i for agents in bodies for i in agents] == [*problem.hierarchy.order]
             and len({*map(len, problem.groups)}) == 1
+            and (problem.budget is None or self._joint_need() <= problem.budget)
         )
+
+    def _joint_need(self) -> int:
+        """Return the maximum number of joint actions of a joint search."""
+        decisions = sum(self.n_actions ** len(group) for group in self.problem.groups)
+        return self._need(self.problem.hierarchy.order[0]) + decisions
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
@@ -183,7 +206,10 @@ class BestResponse(Aggregation):
             self._plans = {}
             self._last = None
             self._equivalent = self._equivalent_actions(deliberation.prediction)
-        plan, free = self._plan(deliberation), self._own[agent]
+        free = self._own[agent]
+        if self.n_actions ** len(free) > self._shares[agent]:
+            free = (agent,)
+        plan = self._plan(deliberation, self._shares[agent] - self.n_actions ** len(free))
         last, concerned = self._last, self.concerned[agent]
         if last is not None and not last.is_valid(concerned, plan):
             last = None
@@ -225,12 +251,12 @@ class BestResponse(Aggregation):
         pooled = self.learned(first).pooled
         return respond(Search(pooled, starts, value, self._order, exploring, first.rng))
 
-    def _plan(self, deliberation: Deliberation) -> IntArray:
-        """Return the plan ``(n,)`` as the deciding agent knows it."""
+    def _plan(self, deliberation: Deliberation, budget: int) -> IntArray:
+        """Return the plan ``(n,)`` as the deciding agent knows it, within a budget if it is new."""
         agent = deliberation.agent
         planner = self._planner[agent]
         if planner not in self._plans:
-            self._plans[planner] = self._new_plan(deliberation)
+            self._plans[planner] = self._new_plan(deliberation, budget)
         plan = self._plans[planner]
         if not self._shares_plan[agent]:
             plan = plan.copy()
@@ -271,7 +297,7 @@ class BestResponse(Aggregation):
         every = self._numbers[: len(self._actions[len(agents)])]
         return every, every
 
-    def _new_plan(self, deliberation: Deliberation) -> IntArray:
+    def _new_plan(self, deliberation: Deliberation, budget: int) -> IntArray:
         """Return a plan ``(n,)`` for the agent and those that it plans for."""
         agent, rng = deliberation.agent, deliberation.rng
         free = self._free[agent]
@@ -281,10 +307,13 @@ class BestResponse(Aggregation):
         bodies: dict[int, list[int]] = {}
         for i in free:
             bodies.setdefault(int(self._body_of[i]), []).append(i)
-        starts = self._with_starts(deliberation, free)
-        plan = starts[greatest(self.worth(deliberation, starts), rng)]
+        plan = self._start(deliberation, free, budget)
+        budget -= min(budget, len(self._starts[free]))
         value = None
         for members in self._sweeps * list(bodies.values()):
+            budget -= self.n_actions ** len(members)
+            if self.problem.budget is not None and budget < 0:
+                break
             values = self._body_values(deliberation, plan, tuple(members), value).ravel()
             distinct = self._distinct(tuple(sorted(members)))[1]
             self.count(agent, len(distinct))
@@ -292,6 +321,15 @@ class BestResponse(Aggregation):
             plan[members] = self._actions[len(members)][best]
             value = values[best]
         return plan
+
+    def _start(self, deliberation: Deliberation, free: tuple[int, ...], budget: int) -> IntArray:
+        """Return the best ``(n,)`` of the joint actions to start from that the budget covers."""
+        starts, rng = self._with_starts(deliberation, free), deliberation.rng
+        if self.problem.budget is not None and budget < len(starts):
+            if budget == 0:
+                return deliberation.joint_action.copy()
+            starts = starts[rng.choice(len(starts), budget, replace=False)]
+        return starts[greatest(self.worth(deliberation, starts), rng)]
 
     def _with_starts(self, deliberation: Deliberation, free: tuple[int, ...]) -> IntArray:
         """Return the joint actions ``(m, n)`` that a plan may start from."""

@@ -76,13 +76,15 @@ class Coordination(Aggregation):
     ------
     ValueError
         If no agent has neighbors, the settings ask for other than own values and best responses,
-        or the coordination graph is too wide. Raised before memory is allocated.
+        the coordination graph is too wide, or the budget is below the joint actions of all tables.
+        Raised before memory is allocated.
     """
 
     def __init__(
         self, problem: DecisionProblem, name: str, maximiser: Callable[..., Elimination | MaxPlus]
     ) -> None:
         super().__init__(problem)
+        self.name = name
         hierarchy = problem.hierarchy
         if hierarchy.edges or not hierarchy.neighbors:
             raise ValueError(
@@ -99,6 +101,8 @@ class Coordination(Aggregation):
             self.require(key, value, allowed, why)
         n = len(hierarchy)
         self.scopes = [tuple(sorted((i, *hierarchy.searched(i)))) for i in range(n)]
+        makers = len(problem.deciding) if problem.is_private else 1
+        self.check_budget(makers * sum(self.n_actions ** len(scope) for scope in self.scopes))
         try:
             self._maximiser = maximiser(self.scopes, n, self.n_actions)
         except ValueError as error:
@@ -164,7 +168,8 @@ class CrossEntropy(Aggregation):
     Raises
     ------
     ValueError
-        If the decision rule is not ``reward``, or no agent is above all others to plan for them.
+        If the decision rule is not ``reward``, no agent is above all others to plan for them, or
+        the budget is below one iteration.
     """
 
     continues = True
@@ -180,6 +185,13 @@ class CrossEntropy(Aggregation):
                 "agent is above all others and plans for them, as in a chain"
             )
         self.settings = settings
+        self.name = settings.kind
+        self._iterations = settings.iterations
+        if problem.budget is not None:
+            planners = len(problem.deciding) if problem.is_private else 1
+            iteration = planners * settings.samples * settings.horizon
+            self.check_budget(iteration)
+            self._iterations = min(settings.iterations, problem.budget // iteration)
         self._plan: IntArray = np.zeros(len(hierarchy), dtype=np.int64)
 
     def values(self, deliberation: Deliberation) -> FloatArray:
@@ -198,7 +210,7 @@ class CrossEntropy(Aggregation):
         probabilities = np.full(shape, 1.0 / self.n_actions)
         n_elite = max(1, round(s.elite * s.samples))
         elite: IntArray = np.zeros((0, *shape[:2]), dtype=np.int64)
-        for _ in range(s.iterations):
+        for _ in range(self._iterations):
             plans = self.sample(probabilities, s.samples, rng)
             plans[: len(elite[:1])] = elite[:1]  # the best so far
             worths = self._worths(deliberation.agent, prediction, plans)

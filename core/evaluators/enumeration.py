@@ -53,6 +53,12 @@ def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatAr
     return probabilities / probabilities.sum()
 
 
+def exact_joint_actions(problem: DecisionProblem) -> int:
+    """Return the number of joint actions that exact enumeration tries in a decision."""
+    below = (len(problem.hierarchy.searched(i)) for i in problem.deciding)
+    return sum(problem.n_actions ** (1 + k) for k in below)
+
+
 class ExactEnumeration(Aggregation):
     """Tries every joint action of the agents below, as the paper: ``A ** (1 + len(below))`` each.
 
@@ -62,12 +68,16 @@ class ExactEnumeration(Aggregation):
     Raises
     ------
     ValueError
-        If an agent would have to try more than `MAX_JOINT_ACTIONS`.
+        If an agent would have to try more than `MAX_JOINT_ACTIONS`, or the budget is below the
+        joint actions of all agents.
     """
+
+    name = "exact"
 
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
         n, a = len(self.hierarchy), self.n_actions
+        self.check_budget(exact_joint_actions(problem))
         self._below = [combinations(self.hierarchy.searched(i), a) for i in range(n)]
         self._indices: list[IntArray] = []
         self._given_places: list[IntArray] = []
@@ -147,11 +157,17 @@ class Sampling(Aggregation):
     the plain mean then estimates the weighted one. If there are no more joint actions than samples,
     all are evaluated.
 
+    A budget reduces the samples. If an agent may try fewer joint actions than it has actions, it
+    compares a random sample of its actions, each with one joint action of the agents below.
+
     Raises
     ------
     ValueError
-        If the teammate model is conditional on the own action.
+        If the teammate model is conditional on the own action, or the budget is below one joint
+        action for every agent.
     """
+
+    name = "sampling"
 
     def __init__(self, settings: SamplingSettings, problem: DecisionProblem) -> None:
         super().__init__(problem)
@@ -160,23 +176,36 @@ class Sampling(Aggregation):
                 "learner.decision.teammates = 'conditional': sampling evaluates best-response, "
                 "uniform, empirical; use exact"
             )
-        self.samples = settings.samples
+        a = self.n_actions
+        below = map(len, map(self.hierarchy.searched, range(len(self.hierarchy))))
+        self._shares = self.shares([a * min(settings.samples, a**k) for k in below], least=1)
 
     def values(self, deliberation: Deliberation) -> FloatArray:
-        """Return the value ``(A,)`` of each action of the deciding agent."""
+        """Return the value ``(A,)`` of each action of the deciding agent.
+
+        Actions that the budget leaves out have the value -inf.
+        """
         below, a = self.hierarchy.searched(deliberation.agent), self.n_actions
-        frequencies, rng = deliberation.frequencies, deliberation.rng
-        empirical = self.problem.teammates == "empirical"
+        share = self._shares[deliberation.agent]
+        if share < a:
+            own = deliberation.rng.choice(a, share, replace=False)
+            tried = self._sample(deliberation, 1)
+            values = np.full(a, -np.inf)
+            values[own] = self.worth(deliberation, self.joint_actions(deliberation, own, tried))
+            return values
+        if a ** len(below) > share // a:
+            return self.aggregate(deliberation, self._sample(deliberation, share // a), None)
         probabilities = None
-        if a ** len(below) <= self.samples:
-            tried = combinations(below, a)
-            if empirical:
-                probabilities = probabilities_of(frequencies, below)
-        elif empirical:
-            tried = self.sample(frequencies[list(below)], self.samples, rng)
-        else:
-            tried = rng.integers(a, size=(self.samples, len(below)))
-        return self.aggregate(deliberation, tried, probabilities)
+        if self.problem.teammates == "empirical":
+            probabilities = probabilities_of(deliberation.frequencies, below)
+        return self.aggregate(deliberation, combinations(below, a), probabilities)
+
+    def _sample(self, deliberation: Deliberation, samples: int) -> IntArray:
+        """Return sampled joint actions ``(samples, k)`` of the agents below."""
+        below = self.hierarchy.searched(deliberation.agent)
+        if self.problem.teammates == "empirical":
+            return self.sample(deliberation.frequencies[list(below)], samples, deliberation.rng)
+        return deliberation.rng.integers(self.n_actions, size=(samples, len(below)))
 
 
 class AutoSettings(EvaluatorSettings):
@@ -201,9 +230,13 @@ class AutoSettings(EvaluatorSettings):
         if problem.unseen == "plan" or problem.plan == "common":
             return EVALUATORS.parsed("best-response")
         free = max(1 + len(hierarchy.searched(i)) for i in range(len(hierarchy)))
-        if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MAX_JOINT_ACTIONS:
+        is_affordable = problem.budget is None or exact_joint_actions(problem) <= problem.budget
+        is_small = free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MAX_JOINT_ACTIONS
+        if is_small and is_affordable:
             return EVALUATORS.parsed("exact")
         is_large = free > self.sampling_up_to or problem.value_of != "own"
-        if is_large and problem.teammates == "best-response":
+        own_actions = problem.n_actions * len(problem.deciding)
+        all_fit = problem.budget is None or own_actions <= problem.budget
+        if is_large and all_fit and problem.teammates == "best-response":
             return EVALUATORS.parsed("best-response")
         return SamplingSettings(samples=self.samples)

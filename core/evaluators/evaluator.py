@@ -21,6 +21,7 @@ from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import PartSettings
 from ..values.rule_base import PooledWeights, RuleBase
+from .budget import check_budget, divide
 
 Rule = Literal["value", "reward", "reward-and-value"]
 """Decision rule: the criterion by which joint actions are compared."""
@@ -80,6 +81,8 @@ class Evaluator(ABC):
     """Whether it needs predictions of several decisions (`Prediction.after`)."""
     counts: Counts
     """Number of evaluations so far; the agents add their weight updates."""
+    keeps_budget: ClassVar[bool] = False
+    """Whether it keeps to the budget of its `DecisionProblem`."""
     expected: IntArray | None = None
     """``(n,)`` joint action that the last deciding agent expected; None without a plan."""
 
@@ -128,10 +131,17 @@ class DecisionProblem:
     """Whether plans are private or common."""
     handed_down: bool = True
     """Whether all messages arrive, so that plans may be handed down with them."""
-    first: int | None = None
-    """The agent of this group that decides first; None: the first of the hierarchy."""
+    members: tuple[int, ...] | None = None
+    """Agents that decide by the evaluator, in the order of decision; None: all agents."""
     is_private: bool = False
     """Whether agents have views of their own and share no intermediate results."""
+    budget: int | None = None
+    """Joint actions that the team may try in a decision; None: no limit."""
+
+    @property
+    def deciding(self) -> tuple[int, ...]:
+        """The agents that decide by the evaluator, in the order of decision."""
+        return self.hierarchy.order if self.members is None else self.members
 
 
 class EvaluatorSettings(PartSettings):
@@ -212,6 +222,9 @@ class Aggregation(Evaluator):
         If the settings ask for a plan and the evaluator makes none.
     """
 
+    keeps_budget = True
+    name: str = ""
+    """Name in a spec."""
     plans: ClassVar[bool] = False
     """Whether the evaluator makes plans for the other agents."""
 
@@ -247,9 +260,39 @@ class Aggregation(Evaluator):
         With views of their own, all agents are.
         """
         before, self._prediction = self._prediction, deliberation.prediction
-        first = self.hierarchy.order[0] if self.problem.first is None else self.problem.first
+        first = self.problem.deciding[0]
         is_first = deliberation.agent == first or before is not deliberation.prediction
         return is_first or self.problem.is_private
+
+    def shares(self, needs: Sequence[int], least: int) -> list[int]:
+        """Return the number of joint actions that each agent may try in a decision.
+
+        Parameters
+        ----------
+        needs
+            By agent, the joint actions that it tries without a budget.
+        least
+            Joint actions that every agent tries at least.
+
+        Raises
+        ------
+        ValueError
+            If the budget is below the least that all agents try together.
+        """
+        budget, deciding = self.problem.budget, self.problem.deciding
+        if budget is None:
+            return list(needs)
+        self.check_budget(least * len(deciding))
+        shares = list(needs)
+        for agent, share in zip(
+            deciding, divide(budget, [needs[i] for i in deciding]), strict=True
+        ):
+            shares[agent] = share
+        return shares
+
+    def check_budget(self, least: int) -> None:
+        """Refuse a budget below the `least` number of joint actions that the team tries."""
+        check_budget(self.problem.budget, least, self.name)
 
     def count(self, agent: int, joint_actions: int) -> None:
         """Count evaluated joint actions, and the rules that each averaged agent evaluated."""
@@ -302,13 +345,20 @@ class Aggregation(Evaluator):
 
     def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Return values ``(A, m)`` of own actions, each with joint actions `tried` ``(m, k)``."""
-        agent, a = deliberation.agent, self.n_actions
-        n = len(deliberation.joint_action)
-        joint = np.empty((a, len(tried), n), dtype=np.int64)
+        joint = self.joint_actions(deliberation, np.arange(self.n_actions), tried)
+        return self.worth(deliberation, joint).reshape(self.n_actions, -1)
+
+    def joint_actions(self, deliberation: Deliberation, own: IntArray, tried: IntArray) -> IntArray:
+        """Return each own action ``(b,)`` with each of the actions `tried` ``(m, k)`` below.
+
+        The joint actions are ``(b m, n)``.
+        """
+        agent, n = deliberation.agent, len(deliberation.joint_action)
+        joint = np.empty((len(own), len(tried), n), dtype=np.int64)
         joint[:] = deliberation.joint_action
-        joint[:, :, agent] = np.arange(a)[:, None]
+        joint[:, :, agent] = own[:, None]
         joint[:, :, list(self.hierarchy.searched(agent))] = tried
-        return self.worth(deliberation, joint.reshape(-1, n)).reshape(a, -1)
+        return joint.reshape(-1, n)
 
     def sample(self, probabilities: FloatArray, samples: int, rng: np.random.Generator) -> IntArray:
         """Sample actions ``(samples, ...)`` by their probabilities ``(..., A)``."""

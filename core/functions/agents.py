@@ -16,8 +16,8 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from ..hierarchy.turns import Turn
-from ..interface.agents import Agents, Memory, Placement
+from ..hierarchy.stages import Inbox
+from ..interface.agents import AgentContext, Agents, StateDict
 from ..interface.experience import Observation
 from ..interface.measures import Measure
 from ..learners import LEARNERS
@@ -71,7 +71,7 @@ class FunctionAgents(Agents[FunctionInputs]):
     ----------
     settings
         The function and its settings.
-    placement
+    context
         Scenario, hierarchy, and random seed of the agents.
 
     Raises
@@ -80,13 +80,13 @@ class FunctionAgents(Agents[FunctionInputs]):
         If the function is asynchronous, or has a parameter that is not allowed.
     """
 
-    at_once = True
-    has_contents = True
+    acts_in_parallel = True
+    sends_payload = True
 
-    def __init__(self, settings: FunctionSettings, placement: Placement) -> None:
-        scenario = placement.scenario
+    def __init__(self, settings: FunctionSettings, context: AgentContext) -> None:
+        scenario = context.scenario
         self.settings = settings
-        self.members = placement.members
+        self.members = context.members
         self._agents = tuple(scenario.agents)
         self._actions = scenario.action_set.names
         self._variables = [variable.name for variable in scenario.state_space.variables]
@@ -94,26 +94,26 @@ class FunctionAgents(Agents[FunctionInputs]):
         self._parameters = parameters_of(settings.kind, self._function)
         own = type(settings).model_fields.keys() - FunctionSettings.model_fields.keys()
         self._options = {name: value for name, value in settings if name in own}
-        self.rng = np.random.Generator(np.random.PCG64(placement.seed))
-        self._key = placement.seed.generate_state(2, np.uint64)
+        self.rng = np.random.Generator(np.random.PCG64(context.seed))
+        self._key = context.seed.generate_state(2, np.uint64)
         reported = [
             Measure(name, name, unit, gathering="sum", better="lower", least=0)
             for name, unit in settings.costs.items()
         ]
         counted = [measure for measure in COUNTED if measure.name not in settings.costs]
         self.costs = (*counted, *reported)
-        self.begin_world(0)
+        self.reset(0)
 
-    def begin_world(self, episode: int) -> None:
+    def reset(self, episode: int) -> None:
         """Start an episode."""
         self._episode = episode
         self._step = 0
 
-    def perceive(self, seen: Observation, *, explore: bool) -> FunctionInputs:
+    def observe(self, seen: Observation, *, explore: bool) -> FunctionInputs:
         """Return the inputs of a decision."""
         return FunctionInputs(seen.present)
 
-    def decide(self, inputs: FunctionInputs, turn: Turn) -> IntArray:
+    def act(self, inputs: FunctionInputs, inbox: Inbox) -> IntArray:
         """Return the actions of the agents whose turn it is ``(k,)``.
 
         Raises
@@ -121,8 +121,8 @@ class FunctionAgents(Agents[FunctionInputs]):
         FunctionError
             If the function raises an error, or does not return an action.
         """
-        agents = turn.agents.tolist()
-        received = self._received(inputs, turn)
+        agents = inbox.agents.tolist()
+        received = self._received(inputs, inbox)
         arguments = [self._arguments(inputs, agent, received[agent]) for agent in agents]
         if "observations" in self._parameters:
             answers = self._call_batch(arguments)
@@ -179,15 +179,15 @@ class FunctionAgents(Agents[FunctionInputs]):
             raise FunctionError(f"agent {agent!r}: {self.settings.kind} raises {reason}") from error
 
     def _received(
-        self, inputs: FunctionInputs, turn: Turn
+        self, inputs: FunctionInputs, inbox: Inbox
     ) -> dict[int, dict[str, ReceivedMessage]]:
         """Return the messages of each agent by sender, in agent order, and count their size."""
-        received: dict[int, dict[str, ReceivedMessage]] = {a: {} for a in turn.agents.tolist()}
-        hears_contents = self.settings.hears == "contents" and bool(turn.contents)
-        contents = turn.contents if hears_contents else (None,) * len(turn.senders)
+        received: dict[int, dict[str, ReceivedMessage]] = {a: {} for a in inbox.agents.tolist()}
+        hears_contents = self.settings.hears == "contents" and bool(inbox.payloads)
+        contents = inbox.payloads if hears_contents else (None,) * len(inbox.senders)
         # A content that a sender tells several agents is one object, measured once.
         messages: dict[tuple[int, int, int], tuple[ReceivedMessage, int]] = {}
-        arrays = (turn.receivers.tolist(), turn.senders.tolist(), turn.actions.tolist())
+        arrays = (inbox.receivers.tolist(), inbox.senders.tolist(), inbox.actions.tolist())
         for receiver, sender, action, content in zip(*arrays, contents, strict=True):
             key = sender, action, id(content)
             if key not in messages:
@@ -200,12 +200,12 @@ class FunctionAgents(Agents[FunctionInputs]):
             inputs.message_bytes += size
         return received
 
-    def contents(self, inputs: FunctionInputs) -> Mapping[int, object]:
+    def payloads(self, inputs: FunctionInputs) -> Mapping[int, object]:
         """Return the contents of the messages of this decision by agent."""
         replies = inputs.replies.items()
         return {agent: reply.message for agent, reply in replies if reply.message is not None}
 
-    def spent(self, inputs: FunctionInputs) -> Mapping[str, float]:
+    def decision_costs(self, inputs: FunctionInputs) -> Mapping[str, float]:
         """Return the costs of all answers of a decision."""
         total = {measure.name: 0.0 for measure in self.costs}
         counts = (len(inputs.replies), inputs.message_bytes)
@@ -221,16 +221,16 @@ class FunctionAgents(Agents[FunctionInputs]):
         """Advance to the next decision."""
         self._step += 1
 
-    def memory(self) -> Memory:
+    def state_dict(self) -> StateDict:
         """Return the agents' indices; functions have no other state."""
         return {"members": self.members}
 
-    def restore(self, memory: Mapping[str, AnyArray]) -> None:
+    def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
         """Check that saved arrays are those of these agents."""
-        if memory.keys() != {"members"} or not np.array_equal(memory["members"], self.members):
+        if state.keys() != {"members"} or not np.array_equal(state["members"], self.members):
             raise ValueError(f"team: saved arrays are not of the function {self.settings.kind}")
 
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Do nothing, because functions do not learn."""
 
 

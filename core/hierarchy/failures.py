@@ -111,7 +111,7 @@ class MessageFailure(Scheduled):
         return f"{self.kind or 'failing'}: {', '.join(self.agents)}{rest}"
 
     @property
-    def memory(self) -> int:
+    def history_length(self) -> int:
         """How many decisions back it needs what was decided."""
         return 0
 
@@ -145,7 +145,7 @@ class DelayedMessages(MessageFailure):
     """How many; before as many have been made, nothing is said."""
 
     @property
-    def memory(self) -> int:
+    def history_length(self) -> int:
         """As many decisions back."""
         return self.decisions
 

@@ -1,4 +1,4 @@
-"""The messages of a team: who is told what in a decision, given what fails and who has left."""
+"""Delivery of messages: the inbox of every stage, given message failures and absent agents."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -18,53 +18,61 @@ from .failures import (
 )
 from .hierarchy import Hierarchy
 from .repair import without
-from .turns import Turn
+from .stages import DecisionStage, Inbox
 
-NOTHING: Mapping[int, object] = {}
-"""What is said beside actions by agents who tell nothing else."""
+Payloads = Mapping[int, object]
+"""Payloads of messages by sender."""
+NO_PAYLOADS: Payloads = {}
 
 
-class Arrived(NamedTuple):
-    """The messages that arrive at an agent."""
+class Received(NamedTuple):
+    """Messages that one agent receives."""
 
     senders: IntArray
-    """``(k,)`` whose they are."""
+    """``(k,)`` senders."""
     actions: IntArray
-    """``(k,)`` what these have decided, as it arrives."""
+    """``(k,)`` their decided actions, as received."""
     ages: IntArray
-    """``(k,)`` how many decisions ago that was said, or `GARBLED`."""
+    """``(k,)`` number of decisions since a message was sent, or `GARBLED`."""
 
 
 class Messages:
-    """The messages of a team: which agent is told which actions in a decision.
+    """The messages of a team.
 
-    What is said beside an action, its content, has the fate of the message. Agents who tell more
-    than actions are also told what their neighbours did and said in the decision before.
+    The payload of a message shares the fate of its action. Agents that send payloads also receive
+    the actions and payloads of their neighbors from the previous decision.
 
     Parameters
     ----------
     hierarchy
-        Who is told by whom.
+        Order of decisions and communication.
     failures
-        What fails, and when.
+        Message failures and absences, with their times.
     n_actions
-        Actions of every agent.
-    has_contents
-        Whether there are agents who tell more than actions.
+        Number of actions of every agent.
+    has_payloads
+        Whether some agents send payloads.
+
+    Attributes
+    ----------
+    hierarchy
+        Hierarchy of the agents that are present; repaired when agents leave.
+    left
+        ``(n,)`` whether an agent has left the team.
 
     Raises
     ------
     ValueError
-        If a failure names an agent that there is not, or a superior that decides too late.
+        If a failure names an unknown agent, or a superior that decides too late.
 
     Examples
     --------
     >>> from nested_agents.core.hierarchy.failures import LostMessages
     >>> chain = Hierarchy("abc", [("a", "b"), ("b", "c")])
     >>> messages = Messages(chain, [LostMessages(agents="a")], n_actions=4)
-    >>> messages.begin(0, episode=0)
-    >>> arrived = messages.heard(2, np.array([3, 1, 0]))
-    >>> arrived.senders.tolist(), arrived.actions.tolist()
+    >>> messages.reset(0, episode=0)
+    >>> received = messages.received(2, np.array([3, 1, 0]))
+    >>> received.senders.tolist(), received.actions.tolist()
     ([1], [1])
     """
 
@@ -74,177 +82,178 @@ class Messages:
         failures: Sequence[MessageFailure],
         n_actions: int,
         *,
-        has_contents: bool = False,
+        has_payloads: bool = False,
     ) -> None:
-        n = len(hierarchy)
-        self.failures, self._n_actions = tuple(failures), n_actions
-        """What is ever to fail."""
-        where = "topology.failures[{}]".format
-        self._masks = [f.mask(hierarchy.agents, where(k)) for k, f in enumerate(failures)]
-        self.hierarchy = hierarchy
-        """Who decides before whom of those who are there."""
-        self.gone: BoolArray = np.zeros(n, dtype=bool)
-        """``(n,)`` who has left."""
-        self.told: list[IntArray] = [
-            np.array(hierarchy.senders(i), dtype=np.int64) for i in range(n)
-        ]
-        """Per agent those who tell it, if no message fails."""
-        self._repaired: dict[tuple[int, ...], Hierarchy] = {(): hierarchy}
-        self._told_instead = {
-            k: _reparented(hierarchy, failure, np.flatnonzero(self._masks[k]), where(k))
-            for k, failure in enumerate(failures)
+        self.failures = tuple(failures)
+        self._n_actions = n_actions
+        keys = [f"topology.failures[{k}]" for k in range(len(failures))]
+        pairs = list(zip(failures, keys, strict=True))
+        self._masks = [failure.mask(hierarchy.agents, key) for failure, key in pairs]
+        self._reparented = {
+            k: reparented_senders(hierarchy, failure, np.flatnonzero(self._masks[k]), key)
+            for k, (failure, key) in enumerate(pairs)
             if isinstance(failure, ReparentedAgents)
         }
-        beside: list[list[int]] = [[] for _ in range(n)]
+        self._repaired: dict[tuple[int, ...], Hierarchy] = {(): hierarchy}
+        self._neighbors: list[list[int]] = [[] for _ in hierarchy.agents]
         for a, b in hierarchy.neighbors if hierarchy.communication != "none" else ():
-            beside[a].append(b)
-            beside[b].append(a)
-        self._beside = [np.array(sorted(others), dtype=np.int64) for others in beside]
-        self._memory = max([failure.memory for failure in failures], default=0) + has_contents
-        self.begin(0, 0)
+            self._neighbors[a].append(b)
+            self._neighbors[b].append(a)
+        self._history_length = max([f.history_length for f in failures], default=0) + has_payloads
+        self._departures: tuple[int, ...] | None = None
+        self.reset(0, 0)
 
-    def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:
-        """Start an episode; what is random in it follows from `seed`."""
+    def reset(self, seed: int | np.random.SeedSequence, episode: int) -> None:
+        """Start an episode; random failures follow from `seed`."""
         self._rng = stream_of(seed, STREAM)
-        self._episode, self._step = episode, 0
-        self._past: list[IntArray] = []
-        self._contents: list[Mapping[int, object]] = []
-        self._strike()
+        self._episode = episode
+        self._step = 0
+        self._past_actions: list[IntArray] = []
+        self._past_payloads: list[Payloads] = []
+        self._activate_failures()
 
-    def advance(self, joint_action: IntArray, contents: Mapping[int, object] = NOTHING) -> None:
-        """Note what all did in a decision, and said beside, after which the next one comes."""
-        if self._memory:
-            self._past = [*self._past, joint_action.copy()][-self._memory :]
-            self._contents = [*self._contents, contents][-self._memory :]
+    def advance(self, joint_action: IntArray, payloads: Payloads = NO_PAYLOADS) -> None:
+        """Keep the actions and payloads of a decision, and go on to the next one."""
+        if self._history_length:
+            past_actions = [*self._past_actions, joint_action.copy()]
+            past_payloads = [*self._past_payloads, payloads]
+            self._past_actions = past_actions[-self._history_length :]
+            self._past_payloads = past_payloads[-self._history_length :]
         self._step += 1
-        self._strike()
+        self._activate_failures()
 
-    def _strike(self) -> None:
-        now = self._episode, self._step
-        self._active = [k for k, f in enumerate(self.failures) if f.lasts(*now)]
-        self._arrange(tuple(k for k in self._active if isinstance(self.failures[k], LeftAgents)))
+    def deliver(
+        self, stage: DecisionStage, joint_action: IntArray, payloads: Payloads | None = None
+    ) -> Inbox:
+        """Return the inbox of a stage, given the actions ``(..., n)`` decided so far.
 
-    def _arrange(self, left: tuple[int, ...]) -> None:
-        """Repair the hierarchy for those whom some failures have let leave."""
-        if left in self._repaired and self._repaired[left] is self.hierarchy:
-            return
-        if left not in self._repaired:
-            self._repaired[left] = self._without(left)
-        self.hierarchy = self._repaired[left]
-        every = range(len(self.hierarchy))
-        self.told = [np.array(self.hierarchy.senders(i), dtype=np.int64) for i in every]
-        self.gone = np.zeros(len(self.hierarchy), dtype=bool)
-        for k in left:
-            self.gone |= self._masks[k]
-
-    def _without(self, left: Sequence[int]) -> Hierarchy:
-        """Return the hierarchy without those whom some failures name, one after the other."""
-        hierarchy = self._repaired[()]
-        for k in left:
-            failure = self.failures[k]
-            if isinstance(failure, LeftAgents):
-                names = np.flatnonzero(self._masks[k]).tolist()
-                hierarchy = without(hierarchy, names, failure.repair)
-        return hierarchy
-
-    def acting_for(self, actions: Sequence[int], neutral: int) -> IntArray:
-        """Return what agents do who have left ``(n,)``, by what each failure has them do."""
-        joint = np.full(len(self.told), neutral)
-        for k in self._active:
-            if isinstance(self.failures[k], LeftAgents):
-                joint[self._masks[k]] = actions[k]
-        return joint
-
-    def failing(self, episode: int, moments: int) -> BoolArray:
-        """Return whose messages fail before each of the first decisions of an episode.
-
-        The array is ``(moments, n)``; of agents with another superior, those to them fail.
+        Agents that have left do not decide. With `payloads`, absent agents do not decide either.
         """
-        when = [[f.lasts(episode, step) for f in self.failures] for step in range(moments)]
-        return np.array(when) @ np.array(self._masks)
+        agents, receivers, senders = stage[1:]
+        if not self.failures and payloads is None:
+            return Inbox(agents, receivers, senders, joint_action[..., senders])
+        agents = agents[~self.left[agents]]
+        if payloads is not None:
+            agents = agents[~np.isin(agents, self.absent(agents))]
+        mailboxes = []
+        for agent in agents.tolist():
+            mailboxes.append((agent, self.received(agent, joint_action)))
+            if payloads is not None:
+                mailboxes.append((agent, self.received_from_neighbors(agent)))
+        empty = np.zeros(0, dtype=np.int64)
+        received = [mailbox for _, mailbox in mailboxes]
+        counts = [len(mailbox.senders) for mailbox in received]
+        return Inbox(
+            agents,
+            np.repeat(np.array([agent for agent, _ in mailboxes], dtype=np.int64), counts),
+            np.concatenate([empty, *(mailbox.senders for mailbox in received)]),
+            np.concatenate([empty, *(mailbox.actions for mailbox in received)]),
+            () if payloads is None else self._payloads_of(received, payloads),
+        )
+
+    def received(self, agent: int, joint_action: IntArray) -> Received:
+        """Return the messages that reach an agent, given the actions decided so far."""
+        senders: IntArray = self._senders[agent]
+        for k in self._active:
+            if k in self._reparented:
+                senders = self._reparented[k][agent]
+        return self._transmit(senders, [*self._past_actions, joint_action], 0)
+
+    def received_from_neighbors(self, agent: int) -> Received:
+        """Return the messages that neighbors sent in the previous decision."""
+        senders = np.array(sorted(self._neighbors[agent]), dtype=np.int64)
+        if not self._past_actions:
+            return Received(senders[:0], senders[:0], senders[:0])
+        return self._transmit(senders, self._past_actions, 1)
 
     def absent(self, agents: IntArray) -> IntArray:
-        """Return who of some agents takes no part in the present decision."""
-        absent: BoolArray = np.zeros(len(self.told), dtype=bool)
+        """Return those of some agents that take no part in the present decision."""
+        absent: BoolArray = np.zeros(len(self.left), dtype=bool)
         for k in self._active:
             if isinstance(self.failures[k], AbsentAgents):
                 absent |= self._masks[k]
         return agents[absent[agents]]
 
-    def failed_turn(self, agents: IntArray, joint_action: IntArray) -> Turn:
-        """Return the turn of some agents, with what of the messages arrives and as it does."""
-        return _turn(agents, [self.heard(agent, joint_action) for agent in agents.tolist()])
-
-    def turn_with_contents(
-        self, agents: IntArray, joint_action: IntArray, contents: Mapping[int, object]
-    ) -> Turn:
-        """Return the turn of some agents who are also told what is said beside actions.
-
-        Their neighbours' actions and contents are those of the decision before.
-        """
-        every = [
-            arrived
-            for agent in agents.tolist()
-            for arrived in (self.heard(agent, joint_action), self.heard_before(agent))
-        ]
-        by_age = [contents, *reversed(self._contents)]
-        contents_of = [
-            None if age == GARBLED else by_age[age].get(sender)
-            for arrived in every
-            for sender, age in zip(arrived.senders.tolist(), arrived.ages.tolist(), strict=True)
-        ]
-        turn = _turn(np.repeat(agents, 2), every)
-        return turn._replace(agents=agents, contents=tuple(contents_of))
-
-    def heard(self, agent: int, joint_action: IntArray) -> Arrived:
-        """Return whom an agent hears of, and what, given what has been decided."""
-        senders = self.told[agent]
+    def actions_of_left(self, actions: Sequence[int], neutral: int) -> IntArray:
+        """Return the actions ``(n,)`` of agents that have left, by failure; others are neutral."""
+        joint_action = np.full(len(self.left), neutral)
         for k in self._active:
-            senders = self._told_instead[k][agent] if k in self._told_instead else senders
-        return self._arrived(senders, joint_action, self._past, 0)
+            if isinstance(self.failures[k], LeftAgents):
+                joint_action[self._masks[k]] = actions[k]
+        return joint_action
 
-    def heard_before(self, agent: int) -> Arrived:
-        """Return what an agent hears of its neighbours: what they did in the decision before."""
-        *past, last = self._past or [np.zeros(len(self.told), dtype=np.int64)]
-        senders = self._beside[agent] if self._past else self._beside[agent][:0]
-        return self._arrived(senders, last, past, 1)
+    def failing(self, episode: int, steps: int) -> BoolArray:
+        """Return whether messages of an agent fail in the first steps of an episode.
 
-    def _arrived(
-        self, senders: IntArray, joint_action: IntArray, before: Sequence[IntArray], age: int
-    ) -> Arrived:
-        """Return what arrives of what some agents say of a decision, an age ago."""
-        actions = joint_action[senders]
+        The array has shape ``(steps, n)``. For reparented agents, their own messages count.
+        """
+        active = [[f.lasts(episode, step) for f in self.failures] for step in range(steps)]
+        return np.array(active) @ np.array(self._masks)
+
+    def _activate_failures(self) -> None:
+        now = self._episode, self._step
+        self._active = [k for k, failure in enumerate(self.failures) if failure.lasts(*now)]
+        departures = [k for k in self._active if isinstance(self.failures[k], LeftAgents)]
+        if tuple(departures) != self._departures:
+            self._departures = tuple(departures)
+            self._repair_hierarchy(self._departures)
+
+    def _repair_hierarchy(self, departures: tuple[int, ...]) -> None:
+        """Remove the agents that failures of kind `LeftAgents` name, one after the other."""
+        if departures not in self._repaired:
+            hierarchy = self._repaired[()]
+            for k in departures:
+                failure = self.failures[k]
+                if isinstance(failure, LeftAgents):
+                    named = np.flatnonzero(self._masks[k]).tolist()
+                    hierarchy = without(hierarchy, named, failure.repair)
+            self._repaired[departures] = hierarchy
+        self.hierarchy = self._repaired[departures]
+        self._senders = [
+            np.array(self.hierarchy.senders(i), dtype=np.int64) for i in range(len(self.hierarchy))
+        ]
+        self.left: BoolArray = np.zeros(len(self.hierarchy), dtype=bool)
+        for k in departures:
+            self.left |= self._masks[k]
+
+    def _transmit(self, senders: IntArray, history: Sequence[IntArray], age: int) -> Received:
+        """Return what arrives of the last joint action of a history, sent `age` decisions ago."""
+        actions = history[-1][senders]
         ages = np.full(len(senders), age)
         for k in self._active:
-            concerned = np.flatnonzero(self._masks[k][senders])
-            past = [joint[senders[concerned]] for joint in before]
-            sent = Sent(actions[concerned], past, self._n_actions, self._rng)
-            passed = self.failures[k].passed(sent)
-            ages[concerned] = self.failures[k].ages(sent, passed, ages[concerned])
-            actions[concerned] = passed
-            arrive = actions != LOST
-            senders, actions, ages = senders[arrive], actions[arrive], ages[arrive]
-        return Arrived(senders, actions, ages)
+            affected = np.flatnonzero(self._masks[k][senders])
+            past = [joint_action[senders[affected]] for joint_action in history[:-1]]
+            sent = Sent(actions[affected], past, self._n_actions, self._rng)
+            arrived = self.failures[k].passed(sent)
+            ages[affected] = self.failures[k].ages(sent, arrived, ages[affected])
+            actions[affected] = arrived
+            is_received = actions != LOST
+            senders = senders[is_received]
+            actions = actions[is_received]
+            ages = ages[is_received]
+        return Received(senders, actions, ages)
+
+    def _payloads_of(self, received: Sequence[Received], payloads: Payloads) -> tuple[object, ...]:
+        """Return the payload of every received message."""
+        by_age = [payloads, *reversed(self._past_payloads)]
+        return tuple(
+            None if age == GARBLED else by_age[age].get(sender)
+            for mailbox in received
+            for sender, age in zip(mailbox.senders.tolist(), mailbox.ages.tolist(), strict=True)
+        )
 
 
-def _turn(agents: IntArray, arrived: Sequence[Arrived]) -> Turn:
-    """Return the turn of some agents at which messages arrive."""
-    receivers = np.repeat(agents, [len(own.senders) for own in arrived])
-    senders = np.concatenate([own.senders for own in arrived])
-    return Turn(agents, receivers, senders, np.concatenate([own.actions for own in arrived]))
-
-
-def _reparented(
-    hierarchy: Hierarchy, failure: ReparentedAgents, agents: IntArray, where: str
+def reparented_senders(
+    hierarchy: Hierarchy, failure: ReparentedAgents, agents: IntArray, key: str
 ) -> dict[int, IntArray]:
-    """Return who is told by whom when some agents have another superior."""
-    names, order = hierarchy.agents, hierarchy.order
-    known = f"{where}.superior = {failure.superior!r}"
+    """Return the senders of every agent when some agents have another superior."""
+    names = hierarchy.agents
+    known = f"{key}.superior = {failure.superior!r}"
     if failure.superior not in names:
         raise ValueError(f"{known}: no such agent, allowed {', '.join(names[:8])}")
     superior = names.index(failure.superior)
     for agent in agents:
-        if order.index(superior) >= order.index(agent):
+        if hierarchy.order.index(superior) >= hierarchy.order.index(agent):
             raise ValueError(f"{known}: must decide before {names[agent]!r}")
     edges = [(names[a], names[b]) for a, b in hierarchy.edges if b not in agents]
     edges += [(failure.superior, names[agent]) for agent in agents]

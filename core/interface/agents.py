@@ -1,10 +1,9 @@
-"""What every kind of agents is to a team: fuzzy agents, networks, whatever users write.
+"""Interface of all kinds of agents: fuzzy agents, policy networks, functions, users' classes.
 
-A team walks its hierarchy; its parts decide when it is their turn. `Agents` are one part: the
-members for whom they decide, of one kind. A decision goes round like this: all parts `perceive`;
-turn by turn members `decide` and are told of in later turns; all parts `conclude`. What a part
-perceived and made of it, its *inputs*, is kept with the decision and handed back to it when it
-learns.
+A team consists of one or several parts. A part, `Agents`, decides and learns for some members of
+the team. In a joint decision every part first calls `observe`, which returns its *inputs*. The
+members then `act`, stage by stage of the hierarchy, given the messages that they receive. The
+inputs are kept with the decision and passed to `learn` after the step.
 """
 
 from __future__ import annotations
@@ -17,95 +16,98 @@ from typing import ClassVar, Generic, Self, TypeVar
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..hierarchy.turns import Turn
-from ..numerics import AnyArray, BoolArray, IntArray
+from ..hierarchy.stages import Inbox
+from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from .environments import Transitions
 from .experience import Experience, Observation
 from .measures import Measure
 from .scenario import Scenario
 
-I = TypeVar("I")  # noqa: E741 - the inputs of a kind of agents
-Memory = dict[str, AnyArray]
-"""All that agents remember, as named arrays."""
+I = TypeVar("I")  # noqa: E741 - inputs of a kind of agents
+StateDict = dict[str, AnyArray]
+"""Saved state as named arrays."""
 
 
-def under(head: str, memory: Mapping[str, AnyArray]) -> Memory:
-    """Return the arrays whose names begin with a head, without it.
+def select_prefix(prefix: str, state: Mapping[str, AnyArray]) -> StateDict:
+    """Return the arrays whose names begin with a prefix, named without it.
 
-    >>> under("part1.", {"part1.seen": np.zeros(2), "part2.seen": np.ones(1)})
+    >>> select_prefix("part1.", {"part1.seen": np.zeros(2), "part2.seen": np.ones(1)})
     {'seen': array([0., 0.])}
     """
-    return {key.removeprefix(head): memory[key] for key in memory if key.startswith(head)}
+    return {name.removeprefix(prefix): state[name] for name in state if name.startswith(prefix)}
 
 
 @dataclass(frozen=True)
-class Placement:
-    """Where agents act: what their settings are built for."""
+class AgentContext:
+    """Scenario, hierarchy and random seed for which agents are built."""
 
     scenario: Scenario
-    """The world as they see it."""
+    """Scenario in which they act."""
     hierarchy: Hierarchy
-    """Who decides before whom, of all agents of the team."""
+    """Hierarchy of all agents of the team."""
     members: IntArray
-    """``(k,)`` the agents for whom they decide, in agent order: all of a team of one kind."""
+    """``(k,)`` agents of the team that belong to this part, in agent order."""
     seed: np.random.SeedSequence
-    """Source of everything random in them."""
+    """Seed of all random numbers of the part."""
     messages_fail: bool = False
-    """Whether messages may not arrive as they were sent."""
+    """Whether messages may be lost, late or wrong."""
 
     @property
     def is_whole(self) -> bool:
-        """Whether all agents of the team are theirs."""
+        """Whether the part is the whole team."""
         return len(self.members) == len(self.hierarchy)
 
 
 @dataclass
 class Counts:
-    """What agents have evaluated so far."""
+    """Number of evaluations and updates so far."""
 
     joint_actions: int = 0
     """Joint actions tried."""
     rule_evaluations: int = 0
-    """Joint actions tried times the rules of the rule base that valued each."""
+    """Joint actions tried times the number of rules evaluated for each."""
     weight_updates: int = 0
     """Consequent weights changed by learning."""
 
     def add(self, other: Counts) -> None:
-        """Add what others have evaluated."""
+        """Add the counts of other agents."""
         self.joint_actions += other.joint_actions
         self.rule_evaluations += other.rule_evaluations
         self.weight_updates += other.weight_updates
 
 
 class Agents(ABC, Generic[I]):
-    """A part of a team: agents of one kind."""
+    """A part of a team: agents of one kind.
 
-    at_once: bool = False
-    """Whether members who have been told all that they will be decide in one call; if not, one
-    after the other."""
+    Subclasses implement `observe`, `act`, `state_dict`, `load_state_dict` and `warm_start`. The
+    other members have defaults.
+    """
+
+    acts_in_parallel: bool = False
+    """Whether all members of a stage decide in one call. Otherwise a stage is one member."""
     is_vectorized: ClassVar[bool] = False
-    """Whether they can act and learn in many environments at once, ``(E, n, d)``."""
-    is_sampled: bool = False
-    """Whether their policy is one of probabilities, so that sampled actions are evaluated, too."""
+    """Whether the agents can act and learn in many environments at once, ``(E, n, d)``."""
+    is_stochastic: bool = False
+    """Whether the policy is stochastic, so that sampled actions are evaluated, too."""
+    sends_payload: ClassVar[bool] = False
+    """Whether messages of the agents contain more than their actions, see `payloads`."""
     rng: np.random.Generator
-    """Source of all that is random in what they do."""
-    has_contents: ClassVar[bool] = False
-    """Whether they tell and are told more than actions, and neighbours what was said before."""
+    """Source of the random numbers of all decisions."""
     costs: tuple[Measure, ...] = ()
-    """What is measured of an episode of what their decisions cost, see `spent`."""
+    """Measures of the costs of decisions, see `decision_costs`."""
 
     @property
     def counts(self) -> Counts:
-        """What they have evaluated so far, if they count it."""
+        """Number of evaluations so far, for agents that count them."""
         return Counts()
 
     @property
     def weight_bytes(self) -> int:
-        """How much memory the weights take that they have learned."""
-        return sum(array.nbytes for array in self.memory().values())
+        """Memory of the learned weights [bytes]."""
+        return sum(array.nbytes for array in self.state_dict().values())
 
-    def check(self, seen: Observation) -> None:
-        """Refuse a world without what they decide by.
+    def check(self, observation: Observation) -> None:
+        """Refuse a scenario that lacks what the agents decide by.
 
         Raises
         ------
@@ -113,49 +115,78 @@ class Agents(ABC, Generic[I]):
             One line.
         """
 
-    def begin_world(self, episode: int) -> None:
-        """Begin an episode, of learning or not."""
+    def check_scenario(self, scenario: Scenario) -> None:
+        """Refuse another scenario in which the trained agents cannot act.
+
+        Raises
+        ------
+        ValueError
+            One line.
+        """
+
+    def reset(self, episode: int) -> None:
+        """Start an episode, of training or of evaluation."""
+
+    def begin_episode(self) -> None:
+        """Start an episode of training."""
 
     def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
-        """Decide from now on in another hierarchy of the same agents: some have left, or come back.
+        """Decide in a repaired hierarchy, because agents have left or joined the team.
 
         Parameters
         ----------
         hierarchy
-            Who decides before whom of those who are there; the others are in no relation.
+            Repaired hierarchy; agents that have left have no edges.
         left
-            ``(k,)`` who has left.
+            ``(k,)`` agents that have left.
         actions
-            ``(k,)`` what these do meanwhile, which all know.
+            ``(k,)`` their actions meanwhile, which all agents know.
         """
 
-    def begin_episode(self) -> None:
-        """Begin an episode of learning."""
+    @abstractmethod
+    def observe(self, observation: Observation, *, explore: bool) -> I:
+        """Return the inputs of the next decision."""
 
     @abstractmethod
-    def perceive(self, seen: Observation, *, explore: bool) -> I:
-        """Return what a decision is made by: the inputs of all members."""
+    def act(self, inputs: I, inbox: Inbox) -> IntArray:
+        """Return the actions ``(k,)`` of the agents of a stage, given the messages to them."""
 
-    @abstractmethod
-    def decide(self, inputs: I, turn: Turn) -> IntArray:
-        """Return the actions ``(k,)`` of members whose turn it is; what they are told is noted."""
-
-    def contents(self, inputs: I) -> Mapping[int, object]:
-        """Return by agent what has been said beside its action, in this decision so far."""
-        return {}
-
-    def spent(self, inputs: I) -> Mapping[str, float]:
-        """Return what a decision has cost, by the names of `costs`."""
+    def payloads(self, inputs: I) -> Mapping[int, object]:
+        """Return the payloads of the messages sent so far in this decision, by agent."""
         return {}
 
     def conclude(self, inputs: I, joint_action: IntArray) -> None:
-        """Take in what all have decided, before it is done."""
+        """Receive the joint action before the step."""
+
+    def decision_costs(self, inputs: I) -> Mapping[str, float]:
+        """Return the costs of a decision by the names of `costs`."""
+        return {}
+
+    def record_values(self, inputs: I) -> None:
+        """Keep the values of actions in this decision, for `action_values`."""
+
+    def action_values(self, inputs: I) -> Mapping[int, FloatArray]:
+        """Return the recorded values ``(A,)`` of the actions of each member.
+
+        Policies return the log probabilities of actions; agents without values return nothing.
+        """
+        return {}
+
+    def value(self, agent: int, states: FloatArray) -> FloatArray:
+        """Return the value function of an agent at states ``(..., d)``.
+
+        Raises
+        ------
+        ValueError
+            If the agents have no value function of single states; one line.
+        """
+        raise ValueError(f"{type(self).__name__}: has no value function of an agent's states")
 
     def learn(self, experience: Experience, inputs: I) -> None:
-        """Learn from what a decision led to; of the `last` one of an episode, all of it."""
+        """Learn from a step; after the last step of an episode, also from the episode."""
 
     def learn_batch(self, joint: IntArray, inputs: I, steps: Transitions, last: BoolArray) -> None:
-        """Learn from one step of many environments; only vectorized agents can.
+        """Learn from one step of many environments; for vectorized agents only.
 
         Parameters
         ----------
@@ -171,12 +202,12 @@ class Agents(ABC, Generic[I]):
         raise NotImplementedError(f"{type(self).__name__} learns in one environment")
 
     @abstractmethod
-    def memory(self) -> Memory:
-        """Return all that they remember."""
+    def state_dict(self) -> StateDict:
+        """Return the saved state."""
 
     @abstractmethod
-    def restore(self, memory: Mapping[str, AnyArray]) -> None:
-        """Continue from what `memory` returned.
+    def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
+        """Continue from a `state_dict`.
 
         Raises
         ------
@@ -185,20 +216,11 @@ class Agents(ABC, Generic[I]):
         """
 
     @abstractmethod
-    def continue_from(self, former: Self) -> None:
-        """Begin where agents of the same settings ended in another world, or hierarchy.
+    def warm_start(self, former: Self) -> None:
+        """Start with what agents of the same settings learned in another scenario or hierarchy.
 
         Raises
         ------
         ValueError
-            If what those have learned means nothing here; one line.
-        """
-
-    def check_world(self, scenario: Scenario) -> None:
-        """Refuse another world for the very same agents.
-
-        Raises
-        ------
-        ValueError
-            If what they have learned means nothing there; one line.
+            If it cannot be used here; one line.
         """

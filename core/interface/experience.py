@@ -1,12 +1,12 @@
-"""What those who act are told, decide and experience: values that are handed on.
+"""Observation, decision and experience of a team: values that are passed on.
 
-Arrays of one environment are ``(n, d)`` and ``(n,)``. Where several environments are stepped
-together, their axis stands first: ``(E, n, d)`` and ``(E, n)``, see
-`nested_agents.core.interface.environments`.
+Arrays of one environment are ``(n, d)`` and ``(n,)``. In many environments their axis comes first:
+``(E, n, d)`` and ``(E, n)``, see `nested_agents.core.interface.environments`.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..numerics import FloatArray, IntArray
@@ -16,24 +16,24 @@ from .scenario import Scenario, Transition
 
 
 class Observation(NamedTuple):
-    """What may be known when a decision begins."""
+    """States of all agents when a decision begins."""
 
     present: FloatArray
-    """``(n, d)`` states that all agents are in."""
+    """``(n, d)`` states of the agents."""
     scenario: Scenario
-    """Where they are; it predicts from there until its next step."""
+    """Scenario in these states, from which predictions start."""
     previous: IntArray | None = None
-    """``(n,)`` what all did in the decision before; none: there was none, all were neutral."""
+    """``(n,)`` previous joint action; None in the first decision of an episode."""
     imagined: Prediction | None = None
-    """What to decide by in place of what agents predict themselves: a situation thought of."""
+    """Prediction to use in place of the agents' own, for situations that are only imagined."""
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(m, d)`` of `agent` as the scenario predicts them.
+        """Return the next states ``(m, d)`` of `agent` that the scenario predicts.
 
         Raises
         ------
         ValueError
-            If it predicts nothing.
+            If the scenario predicts nothing.
         """
         prediction = self.imagined or as_prediction(self.scenario.predict())
         if prediction is None:
@@ -41,23 +41,43 @@ class Observation(NamedTuple):
         return prediction.states(agent, joint_actions)
 
 
+@dataclass(frozen=True)
+class AgentDecision:
+    """Decision of one agent, for inspection."""
+
+    agent: str
+    """Name of the agent."""
+    action: str
+    """Name of the action taken."""
+    values: dict[str, float]
+    """Values of the actions by name; log probabilities of policies; empty without values."""
+    received: dict[str, str]
+    """Received actions by the name of the sender."""
+    payloads: dict[str, object]
+    """Payloads received with these actions by the name of the sender, where there are any."""
+    explored: bool
+    """Whether another action has a greater value: the agent explored, or its policy drew."""
+
+
 class Decision(NamedTuple):
-    """What a team has decided."""
+    """Joint decision of a team."""
 
     joint_action: IntArray
-    """``(n,)`` an action of every agent."""
+    """``(n,)`` action of every agent."""
     inputs: tuple[object, ...]
-    """What each part of the team decided by: its own affair, kept for what it learns of it."""
+    """Inputs of the parts of the team, for learning."""
+    agents: tuple[AgentDecision, ...] = ()
+    """Decisions of single agents in the order of decision, if the team was asked to inspect."""
 
 
 class Experience(NamedTuple):
-    """A decision and what it led to."""
+    """A decision and its result."""
 
     before: Observation
-    """Where it was taken."""
+    """Observation on which the decision was made."""
     decision: Decision
-    """What was decided."""
+    """The decision."""
     transition: Transition
-    """What it led to."""
+    """Result of the step."""
     last: bool
-    """Whether the episode ends with it: terminated, truncated, or out of steps."""
+    """Whether the episode ends: terminated, truncated, or out of steps."""

@@ -1,8 +1,7 @@
 """A world with a task: what a scenario promises, and what a step of it returns.
 
-Conventions are those of `spaces`. Scenarios inherit `Scenario`, whose defaults say what holds
-without more; plain classes of users that have its five necessary members are taken in by
-`nested_agents.core.interface.plain`.
+Conventions are those of `spaces`. Scenarios inherit `Scenario` and define five members: `agents`,
+`state_space`, `action_set`, `reset` and `step`.
 """
 
 from __future__ import annotations
@@ -303,6 +302,27 @@ class Scenario(ABC):
     def animate(self, recording: Mapping[str, Any], path: Path) -> None:
         """Draw a recording (arrays by name) as GIF or MP4, by the suffix of `path`."""
         raise ValueError(f"the scenario {type(self).__name__} draws no recordings")
+
+
+def checked_scenario(thing: object) -> Scenario:
+    """Return what a user's class or function has built, if it is a complete scenario.
+
+    Raises
+    ------
+    ValueError
+        If it is no `Scenario`, or lacks a necessary attribute; one line.
+    """
+    name = type(thing).__name__
+    if not isinstance(thing, Scenario):
+        hint = ""
+        if hasattr(thing, "action_space"):
+            kind = "pettingzoo" if hasattr(thing, "possible_agents") else "gymnasium"
+            hint = f"; a spec names it by scenario.id, with scenario.kind = {kind!r}"
+        raise ValueError(f"scenario.kind: {name} must inherit nested_agents.Scenario{hint}")
+    missing = [key for key in ("agents", "state_space", "action_set") if not hasattr(thing, key)]
+    if missing:
+        raise ValueError(f"scenario.kind: {name} lacks {', '.join(missing)}")
+    return thing
 
 
 class Members(NamedTuple):

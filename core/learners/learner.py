@@ -21,7 +21,7 @@ from ..decision.exploration import (
 )
 from ..decision.settings import DecisionSettings
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.agents import Agents, Placement
+from ..interface.agents import AgentContext, Agents
 from ..interface.scenario import Scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
@@ -140,7 +140,7 @@ class TeamSettings(PartSettings):
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
     """Discount per decision, gamma of Eq. 7: low for immediate rewards, high for delayed ones."""
 
-    def agents(self, placement: Placement) -> Agents[Any]:
+    def agents(self, context: AgentContext) -> Agents[Any]:
         """Return the agents for a scenario and a hierarchy.
 
         Raises
@@ -148,7 +148,7 @@ class TeamSettings(PartSettings):
         ValueError
             If they cannot act there.
         """
-        agents: Agents[Any] = resolve_name(self.kind_of_agents)(self, placement)
+        agents: Agents[Any] = resolve_name(self.kind_of_agents)(self, context)
         return agents
 
     def members(self, scenario: Scenario, hierarchy: Hierarchy) -> list[MembersOf]:

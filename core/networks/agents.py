@@ -14,14 +14,14 @@ from typing import Self
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..hierarchy.turns import Turn
-from ..interface.agents import Agents, Counts, Memory, Placement, under
+from ..hierarchy.stages import Inbox
+from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
 from ..interface.environments import Transitions
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Scenario
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray, set_words, words_of
 from .inputs import InputEncoder
-from .policy import InputNames, Policy
+from .policy import InputNames, Policy, log_sum_exp
 from .rollout import PolicyShape
 from .settings import MultiAgentPPOSettings, PPOSettings
 
@@ -39,7 +39,7 @@ class PolicyInputs:
     noise: FloatArray
     """``(E, n, A)`` noise that is added to logits."""
     logits: FloatArray
-    """``(E, n, A)``, filled in turn by turn."""
+    """``(E, n, A)``, filled in stage by stage."""
 
 
 class PPOAgents(Agents[PolicyInputs]):
@@ -49,7 +49,7 @@ class PPOAgents(Agents[PolicyInputs]):
     ----------
     settings
         Settings of PPO.
-    placement
+    context
         Scenario, hierarchy and members.
 
     Attributes
@@ -65,12 +65,14 @@ class PPOAgents(Agents[PolicyInputs]):
         If some agents are neighbors, or messages may fail in many environments; one line.
     """
 
-    is_sampled = True
+    is_stochastic = True
     is_vectorized = True
 
-    def __init__(self, settings: MultiAgentPPOSettings | PPOSettings, placement: Placement) -> None:
-        scenario = placement.scenario
-        hierarchy = placement.hierarchy
+    def __init__(
+        self, settings: MultiAgentPPOSettings | PPOSettings, context: AgentContext
+    ) -> None:
+        scenario = context.scenario
+        hierarchy = context.hierarchy
         if not settings.uses_hierarchy:
             hierarchy = Hierarchy(scenario.agents, [])
         if hierarchy.neighbors:
@@ -78,20 +80,20 @@ class PPOAgents(Agents[PolicyInputs]):
                 f"learner.kind = {settings.kind!r}: neighbors act at the same time and tell each "
                 "other nothing; use a topology without neighbors"
             )
-        if placement.messages_fail and settings.environments > 1:
+        if context.messages_fail and settings.environments > 1:
             raise ValueError(
                 f"learner.environments = {settings.environments}: messages may fail in one "
                 "environment only; use learner.environments = 1 or no topology.failures"
             )
-        self.rng = np.random.Generator(np.random.PCG64(placement.seed))
+        self.rng = np.random.Generator(np.random.PCG64(context.seed))
         self.settings = settings
         self.scenario = scenario
-        self.members = placement.members
+        self.members = context.members
         self.encoder = InputEncoder(scenario, numbered=settings.numbered)
         self._n_actions = len(scenario.action_set)
         # Messages that fail may reach an agent from anyone who acts before it, one after the other.
-        is_unreliable = placement.messages_fail and settings.uses_hierarchy
-        self.at_once = not is_unreliable
+        is_unreliable = context.messages_fail and settings.uses_hierarchy
+        self.acts_in_parallel = not is_unreliable
         senders = sorted(hierarchy.order[:-1]) if is_unreliable else senders_of(hierarchy)
         self._told_columns: IntArray = np.zeros(len(scenario.agents), dtype=np.int64)
         self._told_columns[senders] = self._n_actions * np.arange(len(senders))
@@ -108,7 +110,7 @@ class PPOAgents(Agents[PolicyInputs]):
         self._groups: dict[bytes, list[tuple[Policy, IntArray]]] = {}
         self._counts = Counts()
         if is_unreliable:  # initial weights and random numbers as without failures
-            self.continue_from(type(self)(settings, replace(placement, messages_fail=False)))
+            self.warm_start(type(self)(settings, replace(context, messages_fail=False)))
 
     def _rows_by_policy(self) -> dict[str, IntArray]:
         """Return by policy the rows ``(k,)`` of `PolicyInputs.actor` for which it acts."""
@@ -153,7 +155,7 @@ class PPOAgents(Agents[PolicyInputs]):
             return own, self.encoder.joint(own)
         return own, np.zeros((len(own), 0), np.float32)
 
-    def perceive(self, seen: Observation, *, explore: bool) -> PolicyInputs:
+    def observe(self, seen: Observation, *, explore: bool) -> PolicyInputs:
         """Return the inputs of a decision, with noise if the agents explore."""
         states = seen.present
         own, joint = self._encode(states.reshape(-1, *states.shape[-2:]))
@@ -164,16 +166,16 @@ class PPOAgents(Agents[PolicyInputs]):
         noise = self.rng.gumbel(size=shape) if explore else np.zeros(shape)
         return PolicyInputs(states.shape[:-2], actor, joint, noise, np.zeros(shape, np.float32))
 
-    def decide(self, inputs: PolicyInputs, turn: Turn) -> IntArray:
+    def act(self, inputs: PolicyInputs, inbox: Inbox) -> IntArray:
         """Return the actions ``(..., k)`` of a turn: sampled, or the most probable ones."""
         count = len(inputs.actor)
-        if self.told_names and len(turn.senders):
-            columns = self._told_columns[turn.senders] + turn.actions.reshape(count, -1)
-            inputs.actor[np.arange(count)[:, None], turn.receivers, columns] = 1.0
-        for policy, agents in self._grouped(turn.agents):
+        if self.told_names and len(inbox.senders):
+            columns = self._told_columns[inbox.senders] + inbox.actions.reshape(count, -1)
+            inputs.actor[np.arange(count)[:, None], inbox.receivers, columns] = 1.0
+        for policy, agents in self._grouped(inbox.agents):
             actor = inputs.actor[:, agents].reshape(count * len(agents), -1)
             inputs.logits[:, agents] = policy.logits(actor).reshape(count, len(agents), -1)
-        return self._choose(inputs, turn)
+        return self._choose(inputs, inbox)
 
     def _grouped(self, agents: IntArray) -> list[tuple[Policy, IntArray]]:
         """Return the policies by which some agents act, each with its agents."""
@@ -183,12 +185,17 @@ class PPOAgents(Agents[PolicyInputs]):
             self._groups[key] = [(self.policies[name], own) for name, own in groups if len(own)]
         return self._groups[key]
 
-    def _choose(self, inputs: PolicyInputs, turn: Turn) -> IntArray:
+    def _choose(self, inputs: PolicyInputs, inbox: Inbox) -> IntArray:
         """Return the actions of a turn, whose logits are known."""
-        logits = inputs.logits[:, turn.agents]
+        logits = inputs.logits[:, inbox.agents]
         self._counts.joint_actions += logits.size
-        chosen: IntArray = (logits + inputs.noise[:, turn.agents]).argmax(axis=2)
+        chosen: IntArray = (logits + inputs.noise[:, inbox.agents]).argmax(axis=2)
         return chosen.reshape(*inputs.batch_shape, -1)
+
+    def action_values(self, inputs: PolicyInputs) -> Mapping[int, FloatArray]:
+        """Return the log probabilities ``(A,)`` of the actions of each member."""
+        log_probs = inputs.logits[0] - log_sum_exp(inputs.logits[0])[:, None]
+        return {agent: log_probs[agent] for agent in self.members.tolist()}
 
     def learn(self, experience: Experience, inputs: PolicyInputs) -> None:
         """Learn from a step of one environment."""
@@ -231,7 +238,7 @@ class PPOAgents(Agents[PolicyInputs]):
         """Return logits ``(E, k, h, A)`` and actions ``(E, k, h)`` of the rows of a policy."""
         return logits[:, rows, None], joint[:, rows, None]
 
-    def check_world(self, scenario: Scenario) -> None:
+    def check_scenario(self, scenario: Scenario) -> None:
         """Refuse a scenario with other states or actions."""
         if scenario.state_space != self.scenario.state_space:
             raise ValueError(f"{self._trained(scenario)}: the state spaces differ")
@@ -244,7 +251,7 @@ class PPOAgents(Agents[PolicyInputs]):
         )
         return f"a team trained with {there} cannot act with {here}"
 
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Start with the weights of agents with the same settings elsewhere.
 
         Raises
@@ -252,7 +259,7 @@ class PPOAgents(Agents[PolicyInputs]):
         ValueError
             If states, actions, or the owners of weights differ; one line.
         """
-        former.check_world(self.scenario)
+        former.check_scenario(self.scenario)
         if self.policies.keys() != former.policies.keys():
             raise ValueError(
                 f"{former._trained(self.scenario)}: learner.weights = {self.settings.weights!r}; "
@@ -262,30 +269,30 @@ class PPOAgents(Agents[PolicyInputs]):
             policy.warm_start(former.policies[name], self.input_names, former.input_names)
         self.rng.bit_generator.state = former.rng.bit_generator.state
 
-    def memory(self) -> Memory:
+    def state_dict(self) -> StateDict:
         """Return the state of the generator and of all policies."""
-        state: Memory = {"generator": words_of(self.rng)}
+        state: StateDict = {"generator": words_of(self.rng)}
         for name, policy in self.policies.items():
             state |= {f"{name}.{key}": array for key, array in policy.state_dict().items()}
         return state
 
-    def restore(self, memory: Mapping[str, AnyArray]) -> None:
-        """Continue from what `memory` returned.
+    def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
+        """Continue from a `state_dict`.
 
         Raises
         ------
         ValueError
             If it is that of other agents; one line.
         """
-        saved = {name: under(f"{name}.", memory) for name in self.policies}
+        saved = {name: select_prefix(f"{name}.", state) for name in self.policies}
         missing = [name for name, own in saved.items() if not own]
         if missing:
             raise ValueError(f"team: no weights of {missing[0]!r} have been saved")
-        if sum(len(own) for own in saved.values()) < len(memory) - 1:
+        if sum(len(own) for own in saved.values()) < len(state) - 1:
             raise ValueError(f"team: more has been saved than of {', '.join(saved)}")
         for name, policy in self.policies.items():
             policy.load_state_dict(saved[name])
-        set_words(self.rng, memory["generator"])
+        set_words(self.rng, state["generator"])
 
 
 class CentralPPOAgents(PPOAgents):
@@ -310,15 +317,15 @@ class CentralPPOAgents(PPOAgents):
         own = self.encoder.joint(self.encoder.own(states))[:, None]
         return own, np.zeros((len(own), 0), np.float32)
 
-    def perceive(self, seen: Observation, *, explore: bool) -> PolicyInputs:
+    def observe(self, seen: Observation, *, explore: bool) -> PolicyInputs:
         """Return the inputs of a decision, and the logits of all members."""
-        inputs = super().perceive(seen, explore=explore)
+        inputs = super().observe(seen, explore=explore)
         inputs.logits[:, self.members] = self.policies["all"].logits(inputs.actor[:, 0])
         return inputs
 
-    def decide(self, inputs: PolicyInputs, turn: Turn) -> IntArray:
-        """Return the actions ``(..., k)`` of the agents of a turn."""
-        return self._choose(inputs, turn)
+    def act(self, inputs: PolicyInputs, inbox: Inbox) -> IntArray:
+        """Return the actions ``(..., k)`` of the agents of a stage."""
+        return self._choose(inputs, inbox)
 
     def _by_head(
         self, logits: FloatArray, joint: IntArray, rows: IntArray
@@ -326,9 +333,9 @@ class CentralPPOAgents(PPOAgents):
         """Return logits ``(E, 1, h, A)`` and actions ``(E, 1, h)``."""
         return logits[:, None, self.members], joint[:, None, self.members]
 
-    def check_world(self, scenario: Scenario) -> None:
+    def check_scenario(self, scenario: Scenario) -> None:
         """Refuse a scenario with other states, actions or agents."""
-        super().check_world(scenario)
+        super().check_scenario(scenario)
         if tuple(scenario.agents) != tuple(self.scenario.agents):
             raise ValueError(f"{self._trained(scenario)}: one policy acts for all of them")
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..interface.agents import Memory
+from ..interface.agents import StateDict
 from ..numerics import AnyArray, FloatArray
 
 HIDDEN_GAIN = float(np.sqrt(2.0))
@@ -153,7 +153,7 @@ class Adam:
         scale = np.sqrt(self._squares / np.float32(square_share)) + np.float32(self.EPSILON)
         self._weights -= np.float32(learning_rate / mean_share) * self._mean / scale
 
-    def state_dict(self) -> Memory:
+    def state_dict(self) -> StateDict:
         """Return moments and number of steps."""
         steps = np.array(self._steps)
         return {"mean": self._mean.copy(), "squares": self._squares.copy(), "steps": steps}

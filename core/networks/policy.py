@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..interface.agents import Memory, under
+from ..interface.agents import StateDict, select_prefix
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from .mlp import MLP, Adam, RunningMoments
 from .rollout import Batch, PolicyShape, Rollout, generalized_advantages
@@ -252,7 +252,7 @@ class Policy:
         bonuses = entropy * entropies.sum(axis=-1).mean()
         return float(-clipped.mean() - bonuses + 0.5 * (errors**2).mean())
 
-    def state_dict(self) -> Memory:
+    def state_dict(self) -> StateDict:
         """Return weights, moments, and the unfinished rollout."""
         steps = self.rollout.steps
         rollout = {f"rollout.{k}": a[:steps].copy() for k, a in self.rollout.arrays().items()}
@@ -283,11 +283,11 @@ class Policy:
             if shape != expected:
                 raise ValueError(f"team: saved {name}: {shape}, this team's: {expected}")
         self.weights[:] = state["weights"]
-        self._adam.load_state_dict(under("adam.", state))
+        self._adam.load_state_dict(select_prefix("adam.", state))
         self._moments.load_state_dict(state["moments"])
         self._returns = state["returns"].copy()
         self._decisions = int(state["decisions"])
-        rollout = under("rollout.", state)
+        rollout = select_prefix("rollout.", state)
         self.rollout.steps = len(rollout["rewards"])
         for name, array in self.rollout.arrays().items():
             array[: self.rollout.steps] = rollout[name]

@@ -7,7 +7,7 @@ messages about mistakes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from fnmatch import fnmatchcase
 from pkgutil import resolve_name
@@ -223,8 +223,9 @@ class PartSettings(Settings):
     """Base class of the settings of registered things."""
 
     kind: str = ""
-    factory: ClassVar[str] = ""
-    """Place of the class that is built from the settings, imported on first use."""
+    factory: ClassVar[str | Callable[..., Any]] = ""
+    """Class or function that builds the thing from the settings, or its place, which is imported
+    on first use."""
     player: ClassVar[str] = ""
     """Module that replays recordings in a report, see `studies.report.replays`; empty if recordings
     are drawn as films."""
@@ -239,7 +240,8 @@ class PartSettings(Settings):
         """
         if not self.factory:
             raise TypeError(f"{type(self).__name__} {self.kind!r} has no factory")
-        return resolve_name(self.factory)(self, *given)
+        factory = self.factory
+        return (resolve_name(factory) if isinstance(factory, str) else factory)(self, *given)
 
 
 class PerceptionSettings(Settings):

@@ -16,7 +16,7 @@ LEVERS = ("left", "middle", "right")
 PLACES = (0.0, 1.0, 2.0)
 
 
-class Levers:
+class Levers(na.Scenario):
     """Agents who pull levers, play after play."""
 
     class Settings(na.ScenarioSettings):

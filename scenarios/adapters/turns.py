@@ -109,7 +109,7 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
             self._seed = seed
             self._episode = -1
         self._episode += 1
-        self._messages.begin(np.random.SeedSequence([self._seed, self._episode]), self._episode)
+        self._messages.reset(np.random.SeedSequence([self._seed, self._episode]), self._episode)
         self._begin_step()
 
     def _begin_step(self) -> None:
@@ -154,7 +154,7 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
             above = [names[i] for i in self.hierarchy.senders(index)]
             return {name: a for name in above if (a := self._actions.get(name)) is not None}
         if agent == self.agent_selection and agent not in self._inboxes:
-            senders, actions, _ = self._messages.heard(index, self._joint())
+            senders, actions, _ = self._messages.received(index, self._joint())
             inbox = zip(senders.tolist(), actions.tolist(), strict=True)
             self._inboxes[agent] = {names[i]: a for i, a in inbox if names[i] in self._actions}
         return self._inboxes.get(agent, {})

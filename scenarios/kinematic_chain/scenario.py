@@ -26,7 +26,7 @@ from ...core.plugins.words import expect
 from ...core.values.rule_base import RuleBase
 from ..faults.settings import Failures
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
-from .responses import Options, respond
+from .responses import Options, piecewise_linear, respond
 from .variables import ChainStates, ChainView, forward_kinematics
 
 MEASURES = (
@@ -359,23 +359,22 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
 
     def _respond(self, rules: RuleBase, search: Search) -> IntArray:
         plan = search.initial_joint_action()
-        speed, *others = rules.partitions
-        cuts = np.cumsum(rules.sizes)[:-1]
-        of_speed, of_bearing, *common = np.split(search.pooled.weights[0], cuts, axis=1)
-        distances, approaches = (
-            np.stack([partition.centres, values.sum(axis=0)])
-            for partition, values in zip(others[1:], common, strict=True)
-        )
+        speed, bearing, distance, approach = rules.partitions
+        weights = np.split(search.pooled.weights[0], np.cumsum(rules.sizes)[:-1], axis=1)
+        # On a circle, one period and the centers next to it.
+        period = slice(bearing.size - 1, 2 * bearing.size + 1)
+        bearing_values = np.tile(weights[1], 3)[:, period]
+        team_values = [values.sum(axis=0, keepdims=True) for values in weights[2:]]
         options = Options(
             self.turns,
             self.alike,
-            np.einsum("iam,im->ia", speed.strengths(self._fractions), of_speed),
-            others[0].knots,
-            np.tile(of_bearing, 1 + 2 * others[0].copies),
-            distances,
-            approaches,
+            np.einsum("iam,im->ia", speed.strengths(self._fractions), weights[0]),
+            piecewise_linear(bearing.knots[period], bearing_values),
+            piecewise_linear(distance.knots, team_values[0]),
+            piecewise_linear(approach.knots, team_values[1]),
         )
-        places = forward_kinematics(self.angles + self.turns[self._joints, plan], self.arm.length)
+        angles = self.angles + self.turns[self._joints, plan]
+        places = np.ascontiguousarray(forward_kinematics(angles, self.arm.length).T)
         order, exploring, rng = search.order, search.exploring, search.rng
         return respond(places, self.goal, self.before, plan, order, options, exploring, rng)
 

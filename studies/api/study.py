@@ -54,8 +54,8 @@ if TYPE_CHECKING:
     from ...core.agents.team import Team
     from ...core.interface.scenario import Scenario
     from ..scalability.laws import Scaling
+    from ..scalability.report import ScalabilityReport
     from .explaining import TeamExplanation
-    from .scalability import ScalabilityReport
 
 Place = str | PathLike[str]
 """Path of a directory or a file."""
@@ -313,7 +313,7 @@ class StudyResults:
         SpecError
             If there is only one size, or a cost of the budget was not measured; one line.
         """
-        from .scalability import analyze
+        from ..scalability.report import analyze
 
         results = self.results_by_size(size)
         settings = self.condition_settings()

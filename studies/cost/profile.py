@@ -86,6 +86,8 @@ class Profile(NamedTuple):
     """Joint actions by the formula."""
     seconds: Mapping[str, float]
     """Time per decision by part [s]."""
+    budget: int | None = None
+    """Maximum number of joint actions per decision; None: no limit."""
 
     @property
     def deciding(self) -> float:
@@ -177,8 +179,20 @@ def _profile(names: tuple[str, str], own: Arrangement, steps: int, wanted: float
         decisions=decisions,
         tried=(team.counts.joint_actions - before) / decisions,
         formula=team.hierarchy.count_joint_actions(len(team.action_set)),
+        budget=budget_of(team),
         seconds=each,
     )
+
+
+def budget_of(team: Team) -> int | None:
+    """Return the joint actions that a team may try in a decision; None if a part has no limit."""
+    total = 0
+    for part in team.parts:
+        budget = part.settings.decision.budget if isinstance(part, FuzzyAgents) else None
+        if budget is None:
+            return None
+        total += budget
+    return total
 
 
 def search_method(team: Team) -> str:
@@ -263,16 +277,19 @@ HEADS = ("condition", "evaluator", "tried", "formula", "ms", "us each")
 
 def _lines(rows: Sequence[Profile]) -> Iterator[str]:
     """Yield the tables of counts and of times by part, then sentences on growth."""
-    counted = [HEADS]
+    is_limited = any(row.budget is not None for row in rows)
+    counted = [[*HEADS, "budget"] if is_limited else [*HEADS]]
     timed: list[tuple[str, ...]] = [("ms", *PARTS)]
     for row in rows:
         each = _figures(1e6 * row.deciding / row.tried) if row.tried else "-"
         tried = format_count(round(row.tried), 10**7)
         formula = format_count(row.formula, 10**7)
         ms = _figures(1e3 * row.deciding)
-        counted.append((row.condition, row.evaluator, tried, formula, ms, each))
+        counted.append([row.condition, row.evaluator, tried, formula, ms, each])
+        if is_limited:
+            counted[-1].append("-" if row.budget is None else f"{row.budget:,}")
         timed.append((row.condition, *(_figures(1e3 * row.seconds[part]) for part in PARTS)))
-    yield from align(counted, "<<>>>>")
+    yield from align(counted, "<<>>>>>"[: len(counted[0])])
     yield ""
     yield from align(timed, f"<{'>' * len(PARTS)}")
     yield ""

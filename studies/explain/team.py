@@ -309,7 +309,7 @@ def _load_team(store: Store, trial: Trial) -> tuple[Session, BodyEffects | None]
     if arrays is None:
         _train(store, session, bodies)
     else:
-        session.team.restore(arrays)
+        session.team.load_state_dict(arrays)
     if model:
         bodies.note("after", model)
     return session, bodies if model else None
@@ -391,7 +391,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
     for episode in range(EVALUATION_WORLDS, EVALUATION_WORLDS + EPISODES):
         world = world_seed(seed, episode)
         states = scenario.reset(world, episode)
-        team.begin_world(world, episode)
+        team.reset(world, episode)
         for _ in range(DECISIONS):
             joint = team.act(Observation(states, scenario), explore=False).joint_action
             guesses = {"learned": _states(predictor.predict(states), joint), "persistence": states}

@@ -3,6 +3,7 @@
 import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,16 +22,19 @@ from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import identity_lines
 from ..results.comparison import compare_conditions, missing_reference
 from ..results.notation import whole
-from ..results.results import read
+from ..results.results import Results, read
+from ..results.scaling_law import columns_of
+from ..scalability.report import ScalabilityReport, analyze
+from ..spec.conditions import ConditionSettings
 from ..spec.controls import control_lines
 from ..spec.outline import StudyOutline, sources_of
-from ..spec.tables import dumps
+from ..spec.tables import SpecTable, dumps
 from ..store.database import RESULTS_VERSION
 from ..store.store import Store
 from ..workers.runner import installed
 from .pictures import hierarchy_pictures, pictures
 from .replays import Replays, replays
-from .sentences import condition_sentences, main_title, methods, significant, verdict
+from .sentences import SIZES, condition_sentences, main_title, methods, significant, verdict
 
 FOLDER = Path(__file__).parent
 CITATION = (
@@ -67,6 +71,7 @@ def page(directory: Path) -> str:
     with sources.active():
         analysis = analyse_as(outline.study, results)
         figures = dict(draw_figures(load_study(outline.study), analysis))
+        scalability = _scalability(results, settings)
     if outline.study == "scaling":
         figures |= growth_figures(results)
     notes = notes_of(analysis)
@@ -91,6 +96,8 @@ def page(directory: Path) -> str:
         notes=unfolded((*notes, *control_lines(there), *below_random(results, there))),
         table=table,
         pictures=pictures(dict(sorted(figures.items(), key=is_secondary))),
+        scalability=scalability,
+        panels=pictures({"scalability": scalability.figure()}, "panels") if scalability else [],
         replays=packed,
         topologies=topologies(outline),
         hierarchies=drawn,
@@ -103,6 +110,22 @@ def page(directory: Path) -> str:
         js=_read_own("page.js"),
         replay_js=Markup(packed.script),
     )
+
+
+def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> ScalabilityReport | None:
+    """Return the scalability of a study with two or more team sizes; None of another study."""
+    keys = {key for columns in columns_of(results).values() for key in columns}
+    size = next((key for key in sorted(keys) if key.rpartition(".")[2] in SIZES), None)
+    if size is None:
+        return None
+    validated = {}
+    with suppress(ValueError, KeyError, ImportError):  # the scaling is unknown then
+        for condition, own in settings.items():
+            validated[condition] = ConditionSettings.model_validate(own)
+    try:
+        return analyze(results, validated, None, size, None, None, "")
+    except SpecError:  # one size, or two conditions of a size
+        return None
 
 
 def comparison_page(

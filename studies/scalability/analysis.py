@@ -255,10 +255,7 @@ class Scalability:
                 }
                 for line in self.summaries
             ],
-            "laws": {
-                line.condition: {title: _plain(e) for title, e in line.estimates.items()}
-                for line in self.law_summaries
-            },
+            "laws": {name: self._law_to_dict(name) for name in self.laws},
             "best_sizes": {name: own._asdict() for name, own in self.best_sizes.items()},
             "crossovers": [
                 {"better": c.better, "worse": c.worse, "size": _plain(c.size)}
@@ -269,6 +266,16 @@ class Scalability:
             "paragraph": self.paragraph,
         }
 
+    def _law_to_dict(self, hierarchy: str) -> dict[str, object]:
+        law = self.laws[hierarchy]
+        return {
+            "contention": _plain(law.contention),
+            "coherency": _plain(law.coherency),
+            "describes_times": law.is_plausible,
+            "best_size": _plain(law.best_size) if law.is_plausible else None,
+            "sentence": _place(law, self.data.sizes(hierarchy)[-1], self.data.size),
+        }
+
 
 def _place(law: UniversalLaw, largest: float, size: str) -> str:
     """Return where the throughput of a law has its maximum, in words."""
@@ -277,10 +284,15 @@ def _place(law: UniversalLaw, largest: float, size: str) -> str:
         return "the universal scalability law does not describe these times"
     if value > largest and low <= 1.0:
         return "no best team size can be determined from these seeds"
+    if low >= largest:
+        return (
+            "the team of maximum throughput is not within the sizes measured: more than "
+            f"{largest:g} {size}"
+        )
     if value > largest:
         return (
-            f"the team of maximum throughput is not within the sizes measured: more than "
-            f"{format_number(min(low, largest))} {size}"
+            "the team of maximum throughput may be larger than the sizes measured: more than "
+            f"{math.floor(low)} {size}"
         )
     if math.isinf(high):
         return (

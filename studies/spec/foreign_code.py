@@ -1,15 +1,16 @@
 """Code outside the toolkit that a study runs: modules that it names, their imports, libraries.
 
-Small packages are compared by the text of their files, large ones by their version.
+Released packages are compared by their version. Others, which their authors may be changing, are
+compared by the text of their files: those on the path of Python and those installed from a folder.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping
-from importlib.metadata import PackageNotFoundError, version
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution, packages_distributions, version
 from importlib.util import find_spec
-from itertools import islice
 from pathlib import Path
 
 from ...core.plugins.syntax import imported
@@ -17,9 +18,6 @@ from ...core.plugins.trust import modules_in
 
 LIBRARIES = ("llvmlite", "numba", "numpy", "scipy")
 """Libraries with versions on which the results of every study may depend."""
-
-MAX_FILES = 300
-"""A package with more files counts as a library, which its version identifies."""
 
 OURS = __name__.partition(".")[0]
 
@@ -44,7 +42,7 @@ def foreign_code(
     Returns
     -------
     tuple
-        Files by name, such as ``arms/seven.py``, and versions of libraries by name.
+        Files of unreleased packages by name, such as ``arms/seven.py``, and versions of libraries.
     """
     files: dict[str, Path] = {}
     versions = library_versions()
@@ -57,11 +55,11 @@ def foreign_code(
         if package in done:
             continue
         done.add(package)
-        paths = list(islice(python_files(package), MAX_FILES + 1))
-        if len(paths) > MAX_FILES:
-            versions[package] = _version(package)
+        released = _released().get(package)
+        if released is not None:
+            versions[package] = " ".join(map(_version, released))
             continue
-        for name, path in paths:
+        for name, path in python_files(package):
             files[name] = path
             left += imported(path.read_text(encoding="utf-8", errors="replace"))
     return files, versions
@@ -85,6 +83,22 @@ def python_files(package: str) -> Iterator[tuple[str, Path]]:
     for folder in map(Path, spec.submodule_search_locations):
         for path in sorted(folder.rglob("*.py")):
             yield f"{package}/{path.relative_to(folder).as_posix()}", path
+
+
+@cache
+def _released() -> dict[str, list[str]]:
+    """Return the distributions of each installed package or module that came from no folder."""
+    installed = packages_distributions()
+    return {
+        package: sorted(set(names))
+        for package, names in installed.items()
+        if not any(map(_is_from_folder, names))
+    }
+
+
+def _is_from_folder(name: str) -> bool:
+    """Tell whether a distribution was installed from a folder, as PEP 610 records it."""
+    return "dir_info" in (distribution(name).read_text("direct_url.json") or "")
 
 
 def _version(name: str) -> str:

@@ -16,8 +16,7 @@ from ...core.agents.loop import policy_seed
 from ...core.agents.team import Team
 from ...core.interface.experience import Observation
 from ...core.interface.measures import Measure, measures_of
-from ...core.interface.plain import as_scenario
-from ...core.interface.scenario import Scenario
+from ...core.interface.scenario import Scenario, checked_scenario
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings, Stage
@@ -52,7 +51,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     ValueError
         If the settings do not fit together; one line.
     """
-    world = as_scenario(settings.scenario.build())
+    world = checked_scenario(settings.scenario.build())
     scenario, hierarchy = settings.arrange(world)
     failures = settings.topology.failures
     team = Team(settings.learner, scenario, hierarchy, policy_seed(seed), failures)
@@ -76,12 +75,12 @@ def teach(
         with _naming(f"curriculum.{stage.name}"):
             there = arrange(settings.model_copy(update={"scenario": stage.scenario}), seed)
             if reached is not None:
-                there.team.continue_from(reached.team)
+                there.team.warm_start(reached.team)
         yield stage, there
         reached = there
     if reached is not None:
         with _naming("curriculum"):
-            own.team.continue_from(reached.team)
+            own.team.warm_start(reached.team)
 
 
 def transfer(
@@ -101,10 +100,10 @@ def transfer(
         with _naming(f"evaluations.{name}"):
             there = arrange(other, seed)
             if other.acts_as(settings) and there.scenario.agents == own.scenario.agents:
-                own.team.check_world(there.scenario)
+                own.team.check_scenario(there.scenario)
                 there = there._replace(team=own.team)
             else:
-                there.team.continue_from(own.team)
+                there.team.warm_start(own.team)
         yield name, there
 
 
@@ -167,10 +166,10 @@ def _check_saved(settings: ConditionSettings) -> None:
     """Refuse a team that arrays cannot bring back."""
     team = arrange(settings, 0).team
     try:
-        arrays = {name: np.array(array) for name, array in team.arrays().items()}
+        arrays = {name: np.array(array) for name, array in team.state_dict().items()}
         if objects := [name for name, array in arrays.items() if array.dtype.hasobject]:
             raise TypeError(f"its array {objects[0]!r} holds objects")
-        team.restore(arrays)
+        team.load_state_dict(arrays)
     except Exception as error:  # a learner may be anybody's
         raise ValueError(
             f"keep_teams = true: a team of learner.kind = {settings.learner.kind!r} cannot be "

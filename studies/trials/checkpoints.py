@@ -1,4 +1,4 @@
-"""Checkpoints: what a trial under way has come to, so that one that was killed goes on from there.
+"""Checkpoints: the state of a running trial, from which an interrupted trial continues.
 
 A file per trial in the folder of the study, replaced every few minutes and at evaluations on the
 way, gone when its trial is kept. It holds arrays of numbers and a table of JSON, behind a digest of
@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.interface.agents import under
+from ...core.interface.agents import select_prefix
 from ...core.learners import LEARNERS
 from ...core.plugins.sources import Checkpoints
 from ..store.durable import Recording, read_bytes, write
@@ -33,7 +33,7 @@ DIGEST = 64
 
 
 class Reached(NamedTuple):
-    """What a trial under way has come to."""
+    """What a trial select_prefix way has come to."""
 
     rows: Sequence[EpisodeRow]
     """Of the episodes so far."""
@@ -113,9 +113,11 @@ class Checkpoint:
                 seconds=table["seconds"],
                 usage=table["usage"],
                 spent=float(table["spent"]),
-                recordings={name: under(f"recordings/{name}/", arrays) for name in recordings},
-                team=under("team/", arrays),
-                environments=under("environments/", arrays),
+                recordings={
+                    name: select_prefix(f"recordings/{name}/", arrays) for name in recordings
+                },
+                team=select_prefix("team/", arrays),
+                environments=select_prefix("environments/", arrays),
             )
         except (OSError, ValueError, KeyError, TypeError, EOFError):
             return None

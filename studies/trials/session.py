@@ -19,8 +19,8 @@ from ...core.agents.loop import (
 )
 from ...core.agents.many_environments import ManyEnvironmentsLoop
 from ...core.agents.team import Team
-from ...core.interface.plain import as_scenario
 from ...core.interface.recording import EpisodeRecorder
+from ...core.interface.scenario import checked_scenario
 from ...core.interface.stacked import LoopedEnvironments
 from ...core.plugins.words import expect
 from ..spec.controls import LEARN_NOTHING
@@ -116,7 +116,7 @@ class Session:
         return session
 
     def _go_on_from(self, reached: Reached) -> None:
-        self.team.restore(reached.team)
+        self.team.load_state_dict(reached.team)
         if reached.environments:
             self._many.load_state_dict(reached.environments)
         self._rows = list(reached.rows)
@@ -139,7 +139,7 @@ class Session:
                 self.usage,
                 self.spent,
                 self._recordings,
-                self.team.arrays(),
+                self.team.state_dict(),
                 self._many.state_dict() if is_many else {},
             )
         )
@@ -170,7 +170,7 @@ class Session:
             If the trial cannot be built, or the arrays are of another team.
         """
         session = cls(trial)
-        session.team.restore(arrays)
+        session.team.load_state_dict(arrays)
         session._stages = ()
         return session
 
@@ -248,7 +248,7 @@ class Session:
         if name is None:
             return
         if record.step == 0:  # no record holds what there was before
-            scenario = as_scenario(self.trial.settings.scenario.build())
+            scenario = checked_scenario(self.trial.settings.scenario.build())
             scenario.reset(world_seed(self.trial.seed, record.episode), record.episode)
             self._recorder = EpisodeRecorder(scenario)
         self._recorder.add(record.transition)
@@ -270,7 +270,7 @@ class Session:
 
     def evaluate_sampled(self, phase: str = SAMPLED) -> None:
         """Evaluate by actions drawn from the policy, if the team has one of probabilities."""
-        if self.team.is_sampled:
+        if self.team.is_stochastic:
             with self.team.drawing_apart():
                 self._evaluate(self._own, phase, None, explore=True)
 
@@ -279,7 +279,7 @@ class Session:
 
         The same agents are the same team; others take over what it has learned. The steps of each
         are shown to the observer of its name, if there is one. A team whose policy is one of
-        probabilities, which says so by ``is_sampled``, is evaluated by sampled actions as well.
+        probabilities, which says so by ``is_stochastic``, is evaluated by sampled actions as well.
         """
         self._go_through_curriculum()
         trial = self.trial
@@ -299,7 +299,7 @@ class Session:
 
     def _keep_team(self) -> None:
         if self.trial.keep_teams:
-            arrays = self.team.arrays()
+            arrays = self.team.state_dict()
             self._recordings[TEAM] = {name: array.copy() for name, array in arrays.items()}
 
     def _go_through_curriculum(self) -> None:
@@ -340,7 +340,7 @@ class Session:
         for record in control_loop(there.scenario, there.team, seed=self.trial.seed, **loop):
             if record.step == 0:
                 meter = EpisodeMeter(phase, record.episode - counted_from, measures)
-            meter.add(record.transition, record.spent)
+            meter.add(record.transition, record.decision_costs)
             for observe in filter(None, observers):
                 observe(record)
             if record.last:

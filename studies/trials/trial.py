@@ -13,8 +13,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from ...core.interface.measures import Measure
-from ...core.interface.plain import as_scenario
-from ...core.interface.scenario import Scenario
+from ...core.interface.scenario import Scenario, checked_scenario
 from ...core.plugins.settings import Settings, changed_values
 from ...core.plugins.sources import Sources, files_in
 from ..spec.conditions import ConditionSettings, Stage
@@ -119,7 +118,7 @@ class Trial:
     def world(self) -> Scenario:
         """Return its scenario as the settings describe it, built anew."""
         with self.sources.active():
-            return as_scenario(self.settings.scenario.build())
+            return checked_scenario(self.settings.scenario.build())
 
     @property
     def planned(self) -> Planned:

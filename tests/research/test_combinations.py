@@ -45,7 +45,7 @@ def test_cells_of_each_verdict(axis: str, case: str, learner: str, verdict: str)
 def test_a_team_that_is_not_restored_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     from nested_agents.core.agents.team import Team
 
-    monkeypatch.setattr(Team, "restore", lambda self, arrays: None)
+    monkeypatch.setattr(Team, "load_state_dict", lambda self, state: None)
     with pytest.raises(RuntimeError, match="td-lambda: the kept team acts otherwise"):
         attempt(spec_of("td-lambda", AXES["further"]["kept team"]))
 

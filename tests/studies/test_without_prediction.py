@@ -23,7 +23,7 @@ MUTE = """
 import numpy as np
 import nested_agents as na
 
-class Mute:
+class Mute(na.Scenario):
     measures = (na.SUCCESS,)
     agents = ("one", "two")
     action_set = na.ActionSet()

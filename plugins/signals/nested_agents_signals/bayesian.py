@@ -52,7 +52,7 @@ class BayesianAgents(na.Agents[Beliefs]):
     ----------
     settings
         Decision rule of indifferent agents.
-    placement
+    context
         Scenario, hierarchy, and random seed of the agents.
 
     Raises
@@ -62,58 +62,58 @@ class BayesianAgents(na.Agents[Beliefs]):
         cannot weigh.
     """
 
-    at_once = True
+    acts_in_parallel = True
     is_vectorized: ClassVar[bool] = True
 
-    def __init__(self, settings: Bayesian, placement: na.Placement) -> None:
-        self.rng = np.random.Generator(np.random.PCG64(placement.seed))
+    def __init__(self, settings: Bayesian, context: na.AgentContext) -> None:
+        self.rng = np.random.Generator(np.random.PCG64(context.seed))
         self.indifferent = settings.indifferent
-        scenario = placement.scenario
+        scenario = context.scenario
         if not isinstance(scenario, Signals):
             raise ValueError(f"learner.kind = {settings.kind!r}: needs scenario.kind = 'signals'")
         self.accuracy = scenario.settings.accuracy
-        if placement.messages_fail:
+        if context.messages_fail:
             raise ValueError(
                 f"learner.kind = {settings.kind!r}: assumes that all messages arrive; remove "
                 "topology.failures"
             )
-        names = placement.hierarchy.agents
-        problem = unweighed(placement.hierarchy)
+        names = context.hierarchy.agents
+        problem = unweighed(context.hierarchy)
         if problem is not None:
             raise ValueError(
                 f"topology: {names[problem[0]]} hears {names[problem[1]]}, but not all agents that "
                 "this one hears; set topology.communication = 'ancestors' or 'none'"
             )
 
-    def perceive(self, seen: na.Observation, *, explore: bool) -> Beliefs:
+    def observe(self, seen: na.Observation, *, explore: bool) -> Beliefs:
         """Return the signals; no message has been received yet."""
         signals = seen.present[..., 0] > 0.5
         return Beliefs(signals, np.zeros((*signals.shape, 2)))
 
-    def decide(self, inputs: Beliefs, turn: na.Turn) -> IntArray:
+    def act(self, inputs: Beliefs, inbox: na.Inbox) -> IntArray:
         """Return the named states of the agents of a stage; store the evidence that they give."""
         lead = inputs.signals.shape[:-1]
-        public: FloatArray = np.zeros((*lead, len(turn.agents)))
-        if len(turn.senders):
-            told = inputs.tells[..., turn.senders, :]
-            adds = np.where(turn.actions == 1, told[..., 1], told[..., 0])
-            first = np.flatnonzero(np.diff(turn.receivers, prepend=-1))
-            places = np.searchsorted(turn.agents, turn.receivers[first])
+        public: FloatArray = np.zeros((*lead, len(inbox.agents)))
+        if len(inbox.senders):
+            told = inputs.tells[..., inbox.senders, :]
+            adds = np.where(inbox.actions == 1, told[..., 1], told[..., 0])
+            first = np.flatnonzero(np.diff(inbox.receivers, prepend=-1))
+            places = np.searchsorted(inbox.agents, inbox.receivers[first])
             public[..., places] = np.add.reduceat(adds, first, axis=-1)
-        inputs.tells[..., turn.agents, :] = evidence(public, self.accuracy, self.indifferent)
+        inputs.tells[..., inbox.agents, :] = evidence(public, self.accuracy, self.indifferent)
         by_signal = naming(public, self.accuracy, self.indifferent)
-        own = inputs.signals[..., turn.agents]
+        own = inputs.signals[..., inbox.agents]
         chance = np.where(own, by_signal[..., 1], by_signal[..., 0])
         if self.indifferent == "coin":
             return (self.rng.random(chance.shape) < chance).astype(np.int64)
         return (chance > 0.5).astype(np.int64)
 
-    def memory(self) -> Mapping[str, NDArray[Any]]:
+    def state_dict(self) -> Mapping[str, NDArray[Any]]:
         """Return no arrays, because nothing is learned."""
         return {}
 
-    def restore(self, memory: Mapping[str, NDArray[Any]]) -> None:
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Do nothing, because nothing is learned."""
 
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Do nothing, because nothing is learned."""

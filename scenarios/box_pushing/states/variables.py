@@ -27,12 +27,12 @@ import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit, wrap_one
 from ....core.plugins.registry import Registry
+from ...angles import angle_of
 from ...state_variables import StateVariable, state_variable
 from .situations import (
     Robot,
     Situation,
     SituationBatch,
-    angle_of,
     away_fraction,
     contacts_of,
     summarize,

@@ -61,7 +61,7 @@ def measure(trial: Trial) -> TrialResult:
         "agents": float(len(hierarchy)),
         "messages": float(hierarchy.n_messages),
         "joint_actions": tried / len(session.deciding),
-        "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
+        "team_bytes": float(sum(array.nbytes for array in team.state_dict().values())),
         "weight_bytes": float(team.weight_bytes),
     }
     period = trial.settings.scenario.period

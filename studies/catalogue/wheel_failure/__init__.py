@@ -110,9 +110,9 @@ def _keeping_weights(session: Session) -> Team:
     common = {name: value for name, value in settings.learner if name in shared}
     frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
     team = arrange(frozen, session.trial.seed).team
-    own = team.arrays()
-    arrays = session.team.arrays()
-    team.restore({name: arrays.get(name, own[name]) for name in own})
+    own = team.state_dict()
+    arrays = session.team.state_dict()
+    team.load_state_dict({name: arrays.get(name, own[name]) for name in own})
     return team
 
 

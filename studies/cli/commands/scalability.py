@@ -71,6 +71,8 @@ def scalability(
         print_data(report.json)
     elif form != "table":
         print_data(in_form(report.table, form))
+        if form in ("latex", "markdown") and report.analysis.laws:
+            print_data(f"\n{in_form(report.laws, form)}")
     else:
         print_table(report.table, report.table.legend)
         if report.analysis.laws:

@@ -162,7 +162,7 @@ WORLDS: dict[str, Callable[[], Scenario]] = {
 }
 
 
-class Predicting:
+class Predicting(Scenario):
     """A scenario whose prediction is the learned one, for the checks of predictions."""
 
     def __init__(self, scenario: Any, predictor: LearnedPredictor, states: np.ndarray) -> None:
@@ -171,6 +171,12 @@ class Predicting:
             if hasattr(scenario, name):
                 setattr(self, name, getattr(scenario, name))
         self.prediction = predictor.predict(states)
+
+    def reset(self, seed: Any, episode: int = 0) -> Any:
+        raise NotImplementedError
+
+    def step(self, joint_action: Any) -> Transition:
+        raise NotImplementedError
 
     def predict(self) -> Any:
         # Tables are compared where there are tables of rewards, too.
@@ -212,13 +218,13 @@ def episodes(scenario: Any, team: Team, count: int, **options: Any) -> list[list
 def test_it_is_frozen_in_evaluation_and_saved_with_the_team() -> None:
     scenario, team = Rails(), team_of(Rails())
     episodes(scenario, team, 3)
-    kept = {name: array.copy() for name, array in team.arrays().items()}
+    kept = {name: array.copy() for name, array in team.state_dict().items()}
     assert kept["predictor.gram"].any()
     episodes(scenario, team, 1, learn=False)
-    assert np.array_equal(team.arrays()["predictor.gram"], kept["predictor.gram"])
+    assert np.array_equal(team.state_dict()["predictor.gram"], kept["predictor.gram"])
     other = team_of(Rails(), seed=1)
-    other.restore(kept)
-    ours, theirs = ({k: v.copy() for k, v in t.arrays().items()} for t in (team, other))
+    other.load_state_dict(kept)
+    ours, theirs = ({k: v.copy() for k, v in t.state_dict().items()} for t in (team, other))
     del ours["generator"], theirs["generator"]
     assert all(np.array_equal(ours[name], theirs[name]) for name in ours)
 
@@ -227,7 +233,8 @@ def test_a_restored_team_goes_on_to_the_same_bits() -> None:
     whole, first, second = (team_of(Rails()) for _ in range(3))
     every = episodes(Rails(), whole, 4)
     begun = episodes(Rails(), first, 2)
-    second.restore({name: array.copy() for name, array in first.arrays().items()})
+    state = {name: array.copy() for name, array in first.state_dict().items()}
+    second.load_state_dict(state)
     assert begun + episodes(Rails(), second, 2, first_episode=2) == every
     assert np.array_equal(
         fuzzy(whole).foresight.predictor.memory["weights"],

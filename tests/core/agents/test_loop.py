@@ -156,11 +156,11 @@ def test_worlds_may_be_numbered_apart_from_episodes(world) -> None:
 def test_evaluation_leaves_what_was_learned_alone(settings, world) -> None:
     team = team_of(world, settings)
     run(world, team)
-    before = {k: v.copy() for k, v in team.arrays().items() if k != "generator"}
+    before = {k: v.copy() for k, v in team.state_dict().items() if k != "generator"}
     updates = fuzzy(team).evaluator.counts.weight_updates
     assert updates > 0
     run(world, team, learn=False)
-    after = team.arrays()
+    after = team.state_dict()
     assert all((after[k] == v).all() for k, v in before.items())
     assert fuzzy(team).evaluator.counts.weight_updates == updates
 

@@ -13,7 +13,7 @@ from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
 from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.hierarchy.turns import levels_of, slots_of
+from nested_agents.core.hierarchy.stages import communication_levels, decision_stages
 from nested_agents.core.interface.experience import Experience
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.learners import LEARNERS
@@ -98,7 +98,7 @@ def test_frozen_leaders_and_followers_that_learn(world, tmp_path) -> None:
     other.load(tmp_path / "team.npz")
     assert (other.parts[1].learner.theta == followers.learner.theta).all()
     successor = Team(settings, world, chain_of(world.agents), policy_seed(2))
-    successor.continue_from(team)
+    successor.warm_start(team)
     assert (successor.parts[1].learner.theta == followers.learner.theta).all()
 
 
@@ -161,16 +161,18 @@ def test_a_team_of_equal_parts_decides_as_one_of_one_kind(world) -> None:
 
 def test_slots_follow_who_is_told() -> None:
     tree = Hierarchy("abcd", [("a", "b"), ("a", "c"), ("c", "d")])
-    assert levels_of(tree) == [0, 1, 1, 2]
+    assert communication_levels(tree) == [0, 1, 1, 2]
     parts = [0, 1, 0, 1]
-    together = [slot.agents.tolist() for slot in slots_of(tree, parts, [True, True])]
+    together = [slot.agents.tolist() for slot in decision_stages(tree, parts, [True, True])]
     assert together == [[0], [2], [1], [3]]
-    one_by_one = slots_of(tree, [0] * 4, [False])
+    one_by_one = decision_stages(tree, [0] * 4, [False])
     assert [slot.agents.tolist() for slot in one_by_one] == [[0], [1], [2], [3]]
     assert one_by_one[3].senders.tolist() == [0, 2]
     assert one_by_one[3].receivers.tolist() == [3, 3]
     silent = Hierarchy("abc", [("a", "b"), ("b", "c")], communication="none")
-    assert [slot.agents.tolist() for slot in slots_of(silent, [0] * 3, [True])] == [[0, 1, 2]]
+    assert [slot.agents.tolist() for slot in decision_stages(silent, [0] * 3, [True])] == [
+        [0, 1, 2]
+    ]
 
 
 def test_a_reward_of_a_terminal_state_that_does_not_absorb_is_received_once(world) -> None:
@@ -208,7 +210,7 @@ def test_frequencies_of_a_role_are_the_mean_of_its_agents(line_world) -> None:
     former = Team(settings, small, chain_of(small.agents), policy_seed(0))
     former.only(FuzzyAgents).seen = np.array([[4.0, 0.0, 2.0, 2.0], [0.0, 8.0, 0.0, 0.0]])
     successor = Team(settings, large, chain_of(large.agents), policy_seed(1))
-    successor.continue_from(former)
+    successor.warm_start(former)
     assert fuzzy(successor).seen.tolist() == [[2.0, 4.0, 1.0, 1.0]] * 3
 
 
@@ -216,7 +218,7 @@ def test_messages_between_parts_fail_too(world) -> None:
     lost = LostMessages(agents="cart0.*")
     settings = mixed(("cart0", TD), ("cart1", {"kind": "fitted-q"}))
     team = Team(settings, world, chain_of(world.agents), policy_seed(0), [lost])
-    team.begin_world(0, 0)
+    team.reset(0, 0)
     decision = team.act(look(world, world.reset(0)))
     neutral = world.action_set.neutral
     told = decision.inputs[1].left[2, world.state_space.n_variables :]

@@ -93,7 +93,8 @@ def run_episode(team: Team, world, seed: int, steps: int = 12) -> list[list[int]
 
 
 def same(one: Team, two: Team) -> bool:
-    a, b = one.arrays(), two.arrays()
+    a = one.state_dict()
+    b = two.state_dict()
     return a.keys() == b.keys() and all((a[k] == b[k]).all() for k in a)
 
 
@@ -148,7 +149,7 @@ def test_a_file_holds_arrays_only(world, tmp_path: Path) -> None:
 
 def test_pickles_are_refused(world, tmp_path: Path) -> None:
     team = team_of("frozen", world)
-    arrays = {**team.arrays(), "seen": np.array([{"a": 1}], dtype=object)}
+    arrays = {**team.state_dict(), "seen": np.array([{"a": 1}], dtype=object)}
     np.savez(tmp_path / "team.npz", **arrays)
     with pytest.raises(ValueError, match="allow_pickle=False"):
         team.load(tmp_path / "team.npz")
@@ -183,10 +184,10 @@ def test_a_team_of_other_size_is_refused(world, line_world, tmp_path: Path) -> N
 
 def test_bounds_of_traces_by_other_rows_are_refused(world) -> None:
     team = team_of("td-lambda, paper", world)
-    arrays = team.arrays()
+    arrays = team.state_dict()
     arrays["learner.trace"] = arrays["learner.trace"][:, :-1]
     with pytest.raises(ValueError, match=r"saved learner.trace has shape"):
-        team.restore(arrays)
+        team.load_state_dict(arrays)
 
 
 class Witness:
@@ -231,7 +232,7 @@ def test_frequencies_are_what_was_seen(world) -> None:
     for _ in range(6):
         joint_of(team, world)
     # One of each to begin with, then six times the same: 7 in 10.
-    assert team.arrays()["seen"].tolist() == [
+    assert team.state_dict()["seen"].tolist() == [
         [7, 1, 1, 1],
         [1, 7, 1, 1],
         [1, 1, 1, 7],
@@ -243,11 +244,11 @@ def test_frequencies_are_what_was_seen(world) -> None:
 def test_acting_without_exploring_leaves_the_memory_alone(name: str, world) -> None:
     team = team_of(name, world)
     run_episode(team, world, 0)
-    before = {k: v.copy() for k, v in team.arrays().items() if k != "generator"}
+    before = {k: v.copy() for k, v in team.state_dict().items() if k != "generator"}
     world.reset(1)
     for _ in range(5):
         world.step(joint_of(team, world, explore=False))
-    after = team.arrays()
+    after = team.state_dict()
     assert all((after[k] == v).all() for k, v in before.items())
 
 
@@ -342,7 +343,7 @@ def test_a_team_that_takes_over_goes_on_as_the_former_one_would(name: str, world
     run_episode(former, world, seed=5)
     same = copy.deepcopy(former)
     successor = team_of(name, world, seed=2)
-    successor.continue_from(former)
+    successor.warm_start(former)
     assert run_episode(successor, world, seed=6) == run_episode(same, world, seed=6)
     assert (fuzzy(successor).learner.theta == fuzzy(same).learner.theta).all()
 
@@ -357,10 +358,11 @@ def test_a_larger_team_takes_over_by_role(line_world) -> None:
         for world in (small, large)
     )
     run_episode(former, small, seed=5)
-    successor.continue_from(former)
+    successor.warm_start(former)
     assert (fuzzy(successor).learner.theta == fuzzy(former).learner.theta).all()
     assert fuzzy(successor).explorer.memory[0] == 0.0  # one episode has been begun
-    seen, before = successor.arrays()["seen"], former.arrays()["seen"]
+    seen = successor.state_dict()["seen"]
+    before = former.state_dict()["seen"]
     assert (seen == np.tile(before, (3, 1))).all()
     run_episode(successor, large, seed=6)
     assert (fuzzy(successor).learner.theta != fuzzy(former).learner.theta).any()
@@ -396,7 +398,7 @@ def test_parts_that_cannot_take_over_are_named(part: str, world) -> None:
     door = {"learner": as_learner, "explorer": as_explorer}[part]
     setattr(fuzzy(successor), part, door(plain))
     with pytest.raises(ValueError, match=r"learner\..*kind: SimpleNamespace has no continue_from"):
-        successor.continue_from(former)
+        successor.warm_start(former)
 
 
 def acting(world, unseen: str, told: str, failures=()) -> tuple[Team, list[np.ndarray]]:
@@ -406,7 +408,7 @@ def acting(world, unseen: str, told: str, failures=()) -> tuple[Team, list[np.nd
     team = Team(settings, world, hierarchy, np.random.SeedSequence(1), failures)
     joints = []
     world.reset(4)
-    team.begin_world(4, 0)
+    team.reset(4, 0)
     previous = None
     for _ in range(5):
         joints.append(joint_of(team, world, explore=False, previous=previous))

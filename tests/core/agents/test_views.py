@@ -72,12 +72,12 @@ def test_what_was_expected_and_communicated_is_measured(world) -> None:
     assert plain.costs == ()
     told = team_of(world, value_of="own", errors=ErrorSettings(weights=0.2))
     told.act(seen, explore=False)
-    assert told.spent["received"] == 3.0
-    assert told.spent["broadcast"] == 6.0
-    assert 0.0 <= told.spent["agreement"] <= 1.0
+    assert told.decision_costs["received"] == 3.0
+    assert told.decision_costs["broadcast"] == 6.0
+    assert 0.0 <= told.decision_costs["agreement"] <= 1.0
     silent = team_of(world, "none", value_of="own", errors=ErrorSettings(weights=0.2))
     silent.act(seen, explore=False)
-    assert silent.spent["received"] == 0.0
+    assert silent.decision_costs["received"] == 0.0
 
 
 def test_who_makes_no_plans_has_no_agreement(world) -> None:
@@ -85,8 +85,8 @@ def test_who_makes_no_plans_has_no_agreement(world) -> None:
     world.reset(0)
     team.act(look(world, world.present()), explore=False)
     assert {m.name for m in team.costs} >= {"received", "broadcast"}
-    assert "agreement" not in team.spent
-    assert (team.spent["received"], team.spent["broadcast"]) == (3.0, 6.0)
+    assert "agreement" not in team.decision_costs
+    assert (team.decision_costs["received"], team.decision_costs["broadcast"]) == (3.0, 6.0)
 
 
 def test_agents_without_errors_that_tell_expect_what_is_done(world) -> None:
@@ -94,7 +94,7 @@ def test_agents_without_errors_that_tell_expect_what_is_done(world) -> None:
     team = team_of(world, value_of="team", errors=ErrorSettings())
     world.reset(0)
     team.act(look(world, world.present()), explore=False)
-    assert team.spent["agreement"] >= 2 / 3
+    assert team.decision_costs["agreement"] >= 2 / 3
 
 
 @pytest.mark.parametrize(

@@ -71,8 +71,8 @@ def test_what_has_been_learned_is_pooled_once(evaluator, line_world, watched) ->
     world = line_world(carts=3, wheels=2)
     world.reset(3)
     team = chain_of_six(world, evaluator, "team")
-    arrays = team.arrays()
-    team.restore({**arrays, "learner.theta": np.ones_like(arrays["learner.theta"])})
+    arrays = team.state_dict()
+    team.load_state_dict({**arrays, "learner.theta": np.ones_like(arrays["learner.theta"])})
     for _ in range(2):
         team.act(look(world, world.present()))
     # One look tells that something has been learned; that is not asked again.

@@ -57,7 +57,7 @@ def team_of(name: str, n: int = 3, hierarchy: Hierarchy | None = None, failures=
         team = Team(settings, world, hierarchy, policy_seed(3), failures)
         calls = sources.load("f.py:CALLS")
         calls.clear()
-    team.begin_world(0, 0)
+    team.reset(0, 0)
     return team, world, calls
 
 
@@ -74,14 +74,14 @@ def test_a_function_is_given_names_and_is_told_by_name() -> None:
     }
     assert (actions, step, far) == (world.action_set.names, 0, 0.25)
     # three messages of {"from":"cart1"}, 16 bytes each; two tokens each
-    assert team.spent == {"calls": 3, "messages": 3, "message_bytes": 48, "tokens": 6}
+    assert team.decision_costs == {"calls": 3, "messages": 3, "message_bytes": 48, "tokens": 6}
 
 
 def test_random_numbers_follow_from_agent_step_and_episode_alone() -> None:
     def drawn(hierarchy: Hierarchy | None) -> dict:
         team, world, calls = team_of("plain", hierarchy=hierarchy, costs={"tokens": "1"})
         for episode in (0, 1):
-            team.begin_world(0, episode)
+            team.reset(0, episode)
             for _ in range(2):
                 team.act(look(world))
         return {(k // 6, call[0], call[5]): call[3] for k, call in enumerate(calls)}
@@ -204,7 +204,7 @@ def test_actions_alone_are_heard_if_the_receiver_wants_no_more() -> None:
     team, world, calls = team_of("echo", 2, hears="actions")
     team.act(look(world))
     assert calls[1][2] == {"cart1": ("increase", None)}
-    assert team.spent == {"calls": 2, "messages": 1, "message_bytes": 0}
+    assert team.decision_costs == {"calls": 2, "messages": 1, "message_bytes": 0}
 
 
 def test_whoever_has_another_superior_is_told_what_that_one_decides() -> None:
@@ -231,4 +231,4 @@ def test_functions_and_learners_are_one_team() -> None:
     seen = look(world, world.reset(0))
     assert [int(team.act(seen).joint_action[0]) for _ in range(3)] == [0, 0, 0]
     assert isinstance(team.parts[0], FunctionAgents)
-    team.restore(team.arrays())
+    team.load_state_dict(team.state_dict())

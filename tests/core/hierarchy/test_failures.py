@@ -22,12 +22,12 @@ DECIDED = np.array([3, 1, 0, 2])
 
 def messages(*failures: MessageFailure, hierarchy: Hierarchy = CHAIN) -> Messages:
     made = Messages(hierarchy, failures, n_actions=4)
-    made.begin(5, episode=0)
+    made.reset(5, episode=0)
     return made
 
 
 def heard(made: Messages, agent: int, decided: np.ndarray = DECIDED) -> dict[int, int]:
-    senders, actions, _ = made.heard(agent, decided)
+    senders, actions, _ = made.received(agent, decided)
     return dict(zip(senders.tolist(), actions.tolist(), strict=True))
 
 
@@ -56,7 +56,7 @@ def test_late_messages_say_what_was_done_before() -> None:
     for past in ([0, 2, 0, 0], [0, 3, 0, 0]):
         made.advance(np.array(past))
     assert heard(made, 3) == {0: 3, 1: 2, 2: 0}
-    made.begin(5, episode=1)
+    made.reset(5, episode=1)
     assert heard(made, 3) == {0: 3, 2: 0}
 
 
@@ -71,10 +71,10 @@ def test_who_is_absent_says_nothing() -> None:
     made = messages(AbsentAgents(agents="a", episode=1, end_episode=2))
     every = np.arange(4)
     assert (made.absent(every).tolist(), len(heard(made, 3))) == ([], 3)
-    made.begin(5, episode=1)
+    made.reset(5, episode=1)
     assert (made.absent(every).tolist(), made.absent(every[1:]).tolist()) == ([0], [])
     assert heard(made, 1) == {}
-    made.begin(5, episode=2)
+    made.reset(5, episode=2)
     assert not made.absent(every).size
 
 
@@ -88,7 +88,7 @@ def test_who_has_another_superior_is_told_by_that_one_and_those_above_it() -> No
 
 def test_the_same_seed_loses_the_same_messages() -> None:
     one, same, other = (messages(LostMessages(agents="*", probability=0.5)) for _ in range(3))
-    other.begin(6, episode=0)
+    other.reset(6, episode=0)
     lost = [[tuple(heard(made, 3)) for _ in range(50)] for made in (one, same, other)]
     assert lost[0] == lost[1] != lost[2]
 

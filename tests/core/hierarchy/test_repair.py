@@ -66,9 +66,9 @@ def test_who_is_told_changes_when_agents_leave_and_come_back() -> None:
     messages = Messages(chain, [left], n_actions=4)
     heard = []
     for episode in range(3):
-        messages.begin(0, episode)
+        messages.reset(0, episode)
         for _ in range(2):
-            senders, actions, _ = messages.heard(2, np.array([3, 1, 0, 2]))
+            senders, actions, _ = messages.received(2, np.array([3, 1, 0, 2]))
             heard.append((senders.tolist(), actions.tolist()))
             messages.advance(np.zeros(4, dtype=int))
     assert heard == [([1], [1])] * 3 + [([0], [3])] + [([1], [1])] * 2
@@ -87,14 +87,14 @@ def test_whoever_has_left_is_neither_asked_nor_considered() -> None:
     agents = fuzzy(team)
     costs = []
     for episode in range(2):
-        team.begin_world(0, episode)
+        team.reset(0, episode)
         before = agents.counts.joint_actions
         joint = team.act(look(world, world.reset(1)), explore=False).joint_action
         costs.append(agents.counts.joint_actions - before)
     # 4^4 + 4^3 + 4^2 + 4, then a chain of three
     assert costs == [340, 84]
     assert world.action_set.names[joint[1]] == "zero"
-    team.begin_world(0, 0)
+    team.reset(0, 0)
     team.act(look(world), explore=False)
     assert agents.hierarchy is team.hierarchy
 
@@ -109,7 +109,7 @@ def test_a_team_without_some_decides_as_the_smaller_team(evaluator: str) -> None
     }
     team, world = carts([left], learner)
     smaller, two = carts([], learner, 2)
-    team.begin_world(0, 0)
+    team.reset(0, 0)
     states = world.reset(3)
     two._places = world._places[:2].copy()
     # Those who have left stay where they are: what is level with them is not what two see.
@@ -129,9 +129,9 @@ def test_functions_that_have_left_are_not_called_and_pay_nothing() -> None:
         team, world = carts([left], {"kind": "f.py:decide"}, 3)
         spent = []
         for episode in range(2):
-            team.begin_world(0, episode)
+            team.reset(0, episode)
             team.act(look(world))
-            spent.append((team.spent["calls"], team.spent["messages"]))
+            spent.append((team.decision_costs["calls"], team.decision_costs["messages"]))
     assert spent == [(3, 3), (2, 1)]
 
 
@@ -139,10 +139,10 @@ def test_functions_that_are_absent_are_not_called_either() -> None:
     source = "def decide(observation):\n    return 0\n"
     with Sources(texts={"f.py": source}).active():
         team, world = carts([AbsentAgents(agents="cart2")], {"kind": "f.py:decide"}, 3)
-        team.begin_world(0, 0)
+        team.reset(0, 0)
         assert team.act(look(world)).joint_action.tolist() == [0, 2, 0]
     # cart2 says nothing, and cart3 hears cart1 alone
-    assert (team.spent["calls"], team.spent["messages"]) == (2, 1)
+    assert (team.decision_costs["calls"], team.decision_costs["messages"]) == (2, 1)
 
 
 def test_an_action_that_there_is_not_is_refused() -> None:

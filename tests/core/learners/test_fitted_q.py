@@ -122,7 +122,7 @@ def team(hierarchy: Hierarchy, *failures: LostMessages, **keys: object) -> Team:
 def told_in(team: Team, decisions: int = 20) -> tuple[np.ndarray, np.ndarray]:
     """What every agent was told ``(T, 3, k)``, and what all did ``(T, 3)``."""
     told, did = [], []
-    team.begin_world(0, 0)
+    team.reset(0, 0)
     team.begin_episode()
     previous = None
     for _ in range(decisions):
@@ -218,7 +218,7 @@ def test_a_team_goes_on_with_all_it_has_learned() -> None:
     former, later = team(chain()), team(chain())
     told_in(former)
     fuzzy(former).learner.theta[:] = 1.0
-    later.continue_from(former)
+    later.warm_start(former)
     assert (fuzzy(later).learner.theta == 1.0).all()
 
 

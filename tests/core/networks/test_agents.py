@@ -11,9 +11,9 @@ from acting import look
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.hierarchy.messages import Messages
-from nested_agents.core.hierarchy.turns import slots_of
+from nested_agents.core.hierarchy.stages import decision_stages
 from nested_agents.core.interface.experience import Experience
-from nested_agents.core.interface.scenario import Transition
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios.line_up import LineUpSettings
@@ -40,7 +40,7 @@ def spec_of(topology: Any = "chain", **learner: Any) -> Spec:
     )  # fmt: skip
 
 
-class Players:
+class Players(Scenario):
     """Agents who see nothing of a world in which nothing happens."""
 
     state_space = StateSpace("one", (Variable("x", "1", 0, 1),))
@@ -83,15 +83,15 @@ def sequence(scenario: Any, team: Team, steps: int) -> None:
 def told_of(team: Team, joint: Any) -> Any:
     """What all agents are told ``(n, width)`` who are made to decide a joint action."""
     agents: Any = team.parts[0]
-    inputs = agents.perceive(look(agents.scenario), explore=False)
+    inputs = agents.observe(look(agents.scenario), explore=False)
     inputs.noise[0, np.arange(len(joint)), joint] = 1e9
-    team.messages.advance(team._walk(look(agents.scenario), (inputs,)))
+    team.messages.advance(team._decide(look(agents.scenario), (inputs,)))
     return inputs.actor[0, :, : len(agents.told_names)]
 
 
 def test_turns_and_messages_by_hand() -> None:
     hierarchy = Hierarchy("abcd", TREE)
-    slots = slots_of(hierarchy, [0] * 4, [True])
+    slots = decision_stages(hierarchy, [0] * 4, [True])
     assert [slot.agents.tolist() for slot in slots] == [[0], [1, 2], [3]]
     told = [list(zip(slot.senders, slot.receivers, strict=True)) for slot in slots]
     assert told == [[], [(0, 1), (0, 2)], [(0, 3), (1, 3)]]
@@ -108,11 +108,11 @@ def test_turns_and_messages_by_hand() -> None:
 
 def test_parents_alone_are_heard() -> None:
     chain = Hierarchy("abc", pairwise("abc"), communication="parents")
-    slots = slots_of(chain, [0] * 3, [True])
+    slots = decision_stages(chain, [0] * 3, [True])
     assert [slot.receivers.tolist() for slot in slots] == [[], [1], [2]]
     assert [slot.senders.tolist() for slot in slots] == [[], [0], [1]]
     silent = Hierarchy("abc", pairwise("abc"), communication="none")
-    (slot,) = slots_of(silent, [0] * 3, [True])
+    (slot,) = decision_stages(silent, [0] * 3, [True])
     assert (slot.agents.tolist(), slot.receivers.tolist()) == ([0, 1, 2], [])
     assert not team_of(Players("abc", 2), silent)[1].told_names
 
@@ -168,9 +168,9 @@ def decided(agents: Any, hierarchy: Hierarchy, states: Any, noise: Any) -> tuple
     team = Team(agents.settings, agents.scenario, hierarchy, np.random.SeedSequence(0))
     team.parts = (agents,)
     seen = look(agents.scenario, states)
-    inputs = agents.perceive(seen, explore=False)
+    inputs = agents.observe(seen, explore=False)
     inputs.noise[0] = noise
-    joint = team._walk(seen, (inputs,))
+    joint = team._decide(seen, (inputs,))
     return inputs.logits[0], joint
 
 
@@ -210,7 +210,7 @@ def test_what_is_told_is_what_arrives(failure: str, edges: Any) -> None:
     failures = failures_of(FAILURES[failure])
     team, agents = team_of(Players("abc", n_actions), hierarchy, failures)
     messages = Messages(hierarchy, failures, n_actions)
-    for begun in (team.begin_world, messages.begin):
+    for begun in (team.reset, messages.reset):
         begun(7, 0)
     rng = np.random.default_rng(0)
     for _ in range(8):
@@ -218,7 +218,7 @@ def test_what_is_told_is_what_arrives(failure: str, edges: Any) -> None:
         joint[messages.absent(np.arange(3))] = 0
         arriving = np.zeros((3, 2, n_actions))
         for agent in hierarchy.order:
-            senders, actions, _ = messages.heard(agent, joint)
+            senders, actions, _ = messages.received(agent, joint)
             arriving[agent, senders, actions] = 1.0
         messages.advance(joint)
         assert len(agents.told_names) == 2 * n_actions, "of a and b, who decide before another"
@@ -291,9 +291,9 @@ def test_what_arrives_is_learned_from() -> None:
         transition = Transition(np.zeros((3, 1)), reward, True, False, {})
         team.learn(Experience(seen, decision, transition, last=True))
     for action in (0, 1):
-        inputs = agents.perceive(look(world), explore=False)
+        inputs = agents.observe(look(world), explore=False)
         inputs.noise[0, 1, action] = 1e9
-        assert team._walk(look(world), (inputs,))[2] == action
+        assert team._decide(look(world), (inputs,))[2] == action
 
 
 def test_without_edges_it_is_mappo_and_by_own_critics_ippo() -> None:

@@ -10,7 +10,7 @@ from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Experience
-from nested_agents.core.interface.scenario import Transition
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
 from nested_agents.studies.errors import SpecError
@@ -51,7 +51,7 @@ def spec_of(name: str, **changes: Any) -> Spec:
 
 
 def same(one: Session, other: Session) -> bool:
-    first, second = one.team.arrays(), other.team.arrays()
+    first, second = one.team.state_dict(), other.team.state_dict()
     assert first.keys() == second.keys()
     return all((first[name] == second[name]).all() for name in first)
 
@@ -65,12 +65,12 @@ def test_a_restored_team_goes_on_to_the_same_bits(name: str, failing: bool) -> N
     (trial,) = trials_of(spec_of(name, topology=topology))
     session = Session(trial)
     for episode in range(6):
-        kept = {key: array.copy() for key, array in session.team.arrays().items()}
+        kept = {key: array.copy() for key, array in session.team.state_dict().items()}
         restored = Session.restored(trial, kept)
         session.train(1, episode)
         restored.train(1, episode)
         assert same(session, restored), f"after episode {episode}"
-    kept = {key: array.copy() for key, array in session.team.arrays().items()}
+    kept = {key: array.copy() for key, array in session.team.state_dict().items()}
     restored = Session.restored(trial, kept)
     for one in (session, restored):
         one.evaluate()
@@ -86,7 +86,7 @@ def test_networks_are_parts_of_a_team() -> None:
     (trial,) = trials_of(spec_of("ppo", scenario=world, learner=learner))
     session = Session(trial)
     for episode in range(3):
-        restored = Session.restored(trial, session.team.arrays())
+        restored = Session.restored(trial, session.team.state_dict())
         session.train(1, episode)
         restored.train(1, episode)
         assert same(session, restored)
@@ -118,10 +118,10 @@ def test_the_team_that_a_trial_keeps_is_the_one_that_was_evaluated(name: str) ->
 @pytest.mark.parametrize("name", KINDS)
 def test_arrays_of_other_teams_are_refused(name: str) -> None:
     other = "mappo" if name == "ppo" else "ppo"
-    arrays = arrange(spec_of(other).conditions()[0].settings, 0).team.arrays()
+    arrays = arrange(spec_of(other).conditions()[0].settings, 0).team.state_dict()
     team = arrange(spec_of(name).conditions()[0].settings, 0).team
     with pytest.raises(ValueError, match=r"^team: ") as raised:
-        team.restore(arrays)
+        team.load_state_dict(arrays)
     assert "\n" not in str(raised.value)
 
 
@@ -129,7 +129,7 @@ def test_arrays_of_more_policies_are_refused() -> None:
     settings = [spec_of(name).conditions()[0].settings for name in ("own weights", "ippo")]
     own, every = (arrange(each, 0).team for each in settings)
     with pytest.raises(ValueError, match=r"^team: more has been saved than of all$"):
-        every.restore({**own.arrays(), **every.arrays()})
+        every.load_state_dict({**own.state_dict(), **every.state_dict()})
 
 
 ELSEWHERE: dict[str, dict[str, Any]] = {
@@ -177,7 +177,7 @@ def test_weights_go_on_with_the_names_of_inputs(critic: str) -> None:
         )
         there = arrange(spec.conditions()[0].settings, 0)
         agents: Any = there.team.parts[0]
-        agents.continue_from(former)
+        agents.warm_start(former)
         before = dict(zip(former.input_names.actor, weights_into(former), strict=True))
         after = dict(zip(agents.input_names.actor, weights_into(agents), strict=True))
         for input_, column in after.items():
@@ -186,10 +186,10 @@ def test_weights_go_on_with_the_names_of_inputs(critic: str) -> None:
         states = np.random.default_rng(0).random((5, there.scenario.state_space.n_variables))
         first = int(there.team.hierarchy.order[0])
         seen = look(there.scenario, states[: len(there.scenario.agents)])
-        inputs = agents.perceive(seen, explore=False)
-        there.team._walk(seen, (inputs,))
+        inputs = agents.observe(seen, explore=False)
+        there.team._decide(seen, (inputs,))
         alike = look(former.scenario, states[:3])
-        own = former.perceive(alike, explore=False)
+        own = former.observe(alike, explore=False)
         own.actor[..., : len(former.told_names)] = 0.0
         if first < 3:
             expected = former.policies["all"].logits(own.actor[0, [first]])[0, 0]
@@ -242,7 +242,7 @@ def test_only_an_episode_that_was_cut_off_is_worth_what_would_have_come(name: st
     assert rewards[1] - rewards[0] == pytest.approx(agents.settings.discount * ahead, rel=1e-3)
 
 
-class Beacons:
+class Beacons(Scenario):
     """Agents see which of four beacons is lit, and are paid for naming it; an episode is a step."""
 
     agents = ("a", "b")
@@ -271,7 +271,7 @@ def test_equal_seeds_give_equal_bits(name: str) -> None:
     session.evaluate()
     session.run_other_evaluations()
     assert session.result().rows == first.rows
-    assert all(np.isfinite(array).all() for array in session.team.arrays().values())
+    assert all(np.isfinite(array).all() for array in session.team.state_dict().values())
     (other,) = trials_of(spec_of(name, seeds=[10_001]))
     assert run_trial(other).rows != first.rows
 

@@ -14,6 +14,7 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.plugins.sources import Sources
@@ -88,13 +89,19 @@ TABLE = {
 }
 
 
-class FewMembers:
+class FewMembers(Scenario):
     """What a scenario must have, and no more: predictions give next states only."""
 
     def __init__(self, world) -> None:
         self.agents, self.state_space = world.agents, world.state_space
-        self.action_set, self.reset, self.step = world.action_set, world.reset, world.step
+        self.action_set = world.action_set
         self._world = world
+
+    def reset(self, seed, episode=0) -> np.ndarray:
+        return self._world.reset(seed, episode)
+
+    def step(self, joint_action) -> Transition:
+        return self._world.step(joint_action)
 
     def predict(self) -> SimpleNamespace:
         return SimpleNamespace(states=self._world.predict().states)

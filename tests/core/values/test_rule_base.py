@@ -1,7 +1,7 @@
 """Rule bases: the paper's eight rules by hand, orders, products, values of states and codes."""
 
 import re
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 from math import comb
 
 import numpy as np
@@ -199,3 +199,40 @@ def test_wrong_shapes_are_refused_in_one_line(membership: str) -> None:
     ):
         with pytest.raises(ValueError, match=f"^{re.escape(complaint)}$"):
             call()
+
+
+def sigmoid(x: float) -> float:
+    return float(1.0 / (1.0 + np.exp(-x)))
+
+
+def sigmoid_degrees(x: float, centres: tuple[float, ...], steepness: float) -> list[float]:
+    """Return the membership degrees of Eq. 6 for evenly spaced centers."""
+    falls = [1.0]
+    for left, right in pairwise(centres):
+        falls.append(sigmoid(steepness / (right - left) * (x - (left + right) / 2)))
+    falls.append(0.0)
+    return [before - after for before, after in pairwise(falls)]
+
+
+def test_sigmoid_products_equal_sums_over_single_rules() -> None:
+    # Three terms that overlap, of one, two and three variables with 2, 3 and 4 functions: a factor
+    # that is left out, taken twice or from the wrong variable changes the value.
+    centres = [(0.0, 1.0), (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0, 2.0)]
+    terms = [(1,), (0, 2), (0, 1, 2)]
+    base = RuleBase([Partition(c, "sigmoid", steepness=6.0) for c in centres], terms, n_own=1)
+    theta = np.random.default_rng(3).normal(size=base.n_rules)
+    states = np.array([[0.2, 0.5, 0.75], [0.9, -0.1, 0.3], [0.45, 0.65, -0.6]])
+    features = []
+    for state in states.tolist():
+        degrees = [sigmoid_degrees(x, c, 6.0) for x, c in zip(state, centres, strict=True)]
+        rules = [product(*(degrees[j] for j in term)) for term in terms]
+        features.append([float(np.prod(rule)) for of_term in rules for rule in of_term])
+    expected = np.array(features) @ theta
+    np.testing.assert_allclose(base.features(states), features, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(base.values(theta, states), expected, rtol=1e-12)
+    np.testing.assert_allclose(
+        base.squared_lengths(states), (np.array(features) ** 2).sum(axis=1), rtol=1e-12
+    )
+    blocks = Blocks(states[:, :1], states[:, 1:], 1)
+    found = base.block_values(theta, blocks, np.arange(3))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)

@@ -207,34 +207,34 @@ class Mine(na.Peer):
     def act(self, seen, *, explore=True):
         return np.repeat(self.taken, self.n)
 
-    def arrays(self):
+    def state_dict(self):
         return {"taken": self.taken}
 """
 RESTORE = """
-    def restore(self, arrays):
-        self.taken = arrays["taken"]
+    def load_state_dict(self, state):
+        self.taken = state["taken"]
 """
 
 
 def test_a_learner_that_acts_by_itself_is_kept_if_it_can_be_restored(tmp_path):
     table = {**TABLE, "seeds": [3], "curriculum": [], "overrides": [],
              "learner": {"kind": "mine.py:Mine"}}  # fmt: skip
-    with pytest.raises(na.SpecError, match=r"keep_teams = true: a team of .* no method rest"):
+    with pytest.raises(na.SpecError, match=r"keep_teams = true: .* has no method load_state_dict"):
         check_conditions(Spec.of(table, Sources(texts={"mine.py": PEER})))
     spec = Spec.of(table, Sources(texts={"mine.py": PEER + RESTORE}))
     with spec.sources.active():
         study = na.load(kept_at(tmp_path, spec))
     scenario, team = study.team()
     seen = na.Observation(scenario.reset(0), scenario)
-    assert team.arrays()["taken"] == team.act(seen).joint_action[0]
+    assert team.state_dict()["taken"] == team.act(seen).joint_action[0]
     own = study.episodes.query("phase == 'evaluation'")["return"]
     assert na.reevaluate(study, ["chain"], jobs=1)["return"].tolist() == own.tolist()
-    with pytest.raises(na.SpecError, match="Mine has no continue_from"):
+    with pytest.raises(na.SpecError, match="Mine has no warm_start"):
         na.reevaluate(study, ["tree:2"])
 
 
 def test_arrays_of_objects_are_no_arrays_that_are_kept(monkeypatch):
-    monkeypatch.setattr(na.Team, "arrays", lambda team: {"seen": np.array([{}])})
+    monkeypatch.setattr(na.Team, "state_dict", lambda team: {"seen": np.array([{}])})
     with pytest.raises(na.SpecError, match="its array 'seen' holds objects"):
         check_conditions(SPEC)
 

@@ -24,6 +24,8 @@ topology = ["chain", "tree:2"]
 scenario.carts = [2, 6]
 """
 
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+
 
 def test_what_is_tried_stands_beside_the_formulas(tmp_path: Path, capsys) -> None:
     spec = tmp_path / "spec.toml"
@@ -61,7 +63,7 @@ def test_a_team_that_is_timed_learns_the_same() -> None:
         team = na.Team(na.BatchTDSettings(), scenario, hierarchy, na.policy_seed(3))
         for _ in control_loop(scenario, team, episodes=2, steps=10, seed=3):
             pass
-        return team.arrays()["learner.theta"]
+        return team.state_dict()["learner.theta"]
 
     plain = trained()
     before = signal.getsignal(signal.SIGALRM)
@@ -97,6 +99,15 @@ def test_teams_without_a_predictor_have_profiles() -> None:
     (row,) = na.profile(spec, seconds=0.05).rows
     assert row.seconds["value"] > 0.0
     assert row.evaluator == "fitted-q"
+
+
+def test_hierarchies_and_the_single_agent_keep_to_equal_budgets() -> None:
+    table = na.profile(EXAMPLES / "equal_computing.toml", seconds=0.01)
+    assert {row.budget for row in table.rows} == {16, 64, 256}
+    assert all(0 < row.tried <= row.budget for row in table.rows if row.budget is not None)
+    single = {row.budget: row.tried for row in table.rows if "single" in row.condition}
+    assert single == {16: 16, 64: 64, 256: 256}
+    assert str(table).splitlines()[0].split()[-1] == "budget"
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,8 @@ from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.trials.trial import trials_of
 from research import SPECS
 
+SIZES = {"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2}
+
 
 @pytest.fixture(scope="module")
 def finished(kept, tmp_path_factory):
@@ -170,3 +172,18 @@ def test_every_study_has_a_report_before_it_has_begun(path, kept, tmp_path):
     assert f"<h1>{html_escape(spec.title or spec.study)}</h1>" in html
     assert f"report of study <code>{spec.study}</code>" in html
     assert "There is nothing to show yet." in html
+
+
+def test_a_study_of_team_sizes_has_a_section_on_scalability(kept, tmp_path):
+    spec = Spec.of({**SIZES, "sweep": {"scenario.robots": [2, 4], "topology": ["chain", "star"]}})
+    html = page(kept(tmp_path, spec, done=12))
+    assert "scalability" in sections(html)
+    section = html[html.index('<section id="scalability">') :].partition("</section>")[0]
+    assert "Evaluation success was measured with 2 to 4 robots" in section
+    assert section.count("<svg viewBox") >= 4, "four panels"
+    assert '<pre id="scalability-csv" hidden>condition,seeds,evaluation success' in section
+    assert len(re.findall(r'\bid="', html)) == len(set(re.findall(r'\bid="([^"]*)"', html)))
+
+
+def test_a_study_of_one_team_size_has_none(html):
+    assert "scalability" not in sections(html)

@@ -93,7 +93,7 @@ def test_experience_and_exploration_go_on():
     trial = only(curriculum=[{"name": "more", "episodes": 2}], learner={}, episodes=1)
     session = Session(trial)
     session.train(1)
-    arrays, steps = session.team.arrays(), [row.steps for row in session.result().rows]
+    arrays, steps = session.team.state_dict(), [row.steps for row in session.result().rows]
     assert arrays["explorer"][0] == 2.0  # its third episode
     assert len(arrays["learner.states"]) == steps[-1]
     assert len(arrays["learner.earlier_states"]) == 3 * sum(steps[:-1])

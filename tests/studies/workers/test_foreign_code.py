@@ -31,7 +31,7 @@ import nested_agents as na
 os.chdir("/")
 
 
-class Arm:
+class Arm(na.Scenario):
     """A walker on a line; one of its measures shows the surroundings of its trial."""
 
     class Settings(na.ScenarioSettings):
@@ -144,6 +144,20 @@ def test_another_version_of_a_library_is_told(monkeypatch):
     monkeypatch.setattr(foreign_code, "version", lambda name: f"9.{name}")
     here = present(before, {}, {"mine.py": "import numpy, pandas"})
     assert {*changed(before, here)} == {*foreign_code.LIBRARIES, "pandas"}
+
+
+def test_released_packages_are_compared_by_version_and_not_read():
+    files, versions = foreign_code.foreign_code({}, {"mine.py": "import matplotlib, yaml"})
+    assert not files
+    assert versions["matplotlib"] == foreign_code.version("matplotlib")
+    assert versions["yaml"] == foreign_code.version("PyYAML")
+
+
+def test_packages_installed_from_a_folder_are_compared_by_their_files():
+    files, versions = foreign_code.foreign_code({}, {"mine.py": "import nested_agents_signals"})
+    assert all(name.startswith("nested_agents_signals/") for name in files)
+    assert "nested_agents_signals/__init__.py" in files
+    assert "nested_agents_signals" not in versions
 
 
 def test_only_code_of_others_gets_a_process_of_its_own(installed):

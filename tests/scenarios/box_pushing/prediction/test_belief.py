@@ -11,7 +11,7 @@ from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.interface.experience import Decision, Experience
-from nested_agents.core.interface.plain import as_scenario
+from nested_agents.core.interface.scenario import checked_scenario
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
@@ -143,12 +143,12 @@ def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
     assert fuzzy(team).foresight.calibration.constants.any()
     team.save(tmp_path / "team.npz")
     other.load(tmp_path / "team.npz")
-    for name, array in team.arrays().items():
-        np.testing.assert_array_equal(other.arrays()[name], array)
+    for name, array in team.state_dict().items():
+        np.testing.assert_array_equal(other.state_dict()[name], array)
 
 
 def test_robots_of_other_scenarios_have_no_constants(line_world):
-    joined = join_agents(as_scenario(line_world(2, 2)), "body")
+    joined = join_agents(checked_scenario(line_world(2, 2)), "body")
     assert joined.embodiment() is None
 
 

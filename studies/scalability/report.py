@@ -14,10 +14,10 @@ from ..results.analysis import Summary
 from ..results.notation import wrapped
 from ..results.results import Results
 from ..results.scaling_law import columns_of, size_key
-from ..scalability.analysis import Scalability
-from ..scalability.data import collect
-from ..scalability.laws import Scaling
 from ..spec.conditions import ConditionSettings
+from .analysis import Scalability
+from .data import collect
+from .laws import Scaling
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,7 +68,7 @@ class ScalabilityReport:
 
     def figure(self) -> Figure:
         """Return four panels: performance, efficiency, a cost, and performance against the cost."""
-        from ..scalability.figure import draw  # matplotlib takes its time
+        from .figure import draw  # matplotlib takes its time
 
         return draw(self.analysis)
 
