@@ -208,6 +208,16 @@ class Sampling(Aggregation):
         return deliberation.rng.integers(self.n_actions, size=(samples, len(below)))
 
 
+class ExactSettings(EvaluatorSettings):
+    """Exact enumeration of the joint actions of the agents below."""
+
+    kind: Literal["exact"] = "exact"
+
+    def build(self, problem: DecisionProblem) -> Evaluator:
+        """Return the evaluator of a team."""
+        return ExactEnumeration(problem)
+
+
 class AutoSettings(EvaluatorSettings):
     """Exact enumeration for small teams, then sampling, then best responses."""
 

@@ -152,7 +152,7 @@ EVALUATORS = SettingsRegistry(
     "evaluator",
     {
         "auto": f"{__package__}.enumeration:AutoSettings",
-        "exact": f"{__package__}.enumeration:ExactEnumeration",
+        "exact": f"{__package__}.enumeration:ExactSettings",
         "sampling": f"{__package__}.enumeration:SamplingSettings",
         "variable-elimination": f"{__package__}.coordination:VariableEliminationSettings",
         "max-plus": f"{__package__}.coordination:MaxPlusSettings",
