@@ -247,16 +247,13 @@ class SettingsRegistry(Registry):
     def _new_model(self, name: str, thing: object) -> type[PartSettings]:
         thing = checked_origin(name, thing, self.kind, self.root)
         is_class = isinstance(thing, type)
-        if not is_class:
-            settings: object = self.function_base
-        elif issubclass(thing, self.root):
-            settings = thing
-        else:
-            settings = getattr(thing, "Settings", None)
+        settings: object = self.function_base
+        if isinstance(thing, type):
+            settings = thing if issubclass(thing, self.root) else getattr(thing, "Settings", None)
         if not (isinstance(settings, type) and issubclass(settings, self.root)):
             base = f"{self.base.__module__}.{self.base.__qualname__}"
             raise ValueError(f"is no {self.kind}: it needs a class Settings that inherits {base}")
-        model: Any = create_model(
+        derived = create_model(
             settings.__qualname__,
             __base__=settings,
             __module__=settings.__module__,
@@ -264,6 +261,7 @@ class SettingsRegistry(Registry):
             kind=(cast(Any, Literal[name]), name),
             **({} if is_class else _parameters(thing)),
         )
+        model = cast(Any, derived)
         if settings is not thing:
             model.factory = staticmethod(self._factory(name, thing))
             model.build = PartSettings.build  # evaluators have their own
