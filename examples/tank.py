@@ -65,7 +65,7 @@ class Tank(na.Scenario):
         return np.stack([flows, np.broadcast_to(np.asarray(missing)[..., None], flows.shape)], -1)
 
 
-class Forecast:
+class Forecast(na.Prediction):
     """What joint actions would lead to. No more is needed; the reward is for planners."""
 
     def __init__(self, tank):

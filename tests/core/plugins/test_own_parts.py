@@ -21,6 +21,7 @@ from nested_agents.core.plugins.sources import Sources
 
 MINE = """
 import numpy as np
+from nested_agents.core.decision.exploration import ExplorationSettings
 from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
 from nested_agents.core.learners.learner import LearnerSettings
 
@@ -68,7 +69,10 @@ class Fixed:
 class Least:
     '''Takes the action of least value.'''
 
-    def __init__(self, n_agents):
+    class Settings(ExplorationSettings):
+        pass
+
+    def __init__(self, settings, n_agents):
         self.memory = np.zeros(n_agents)
 
     def begin_episode(self):

@@ -428,9 +428,6 @@ def test_described_boxes_are_called_by_their_names():
     labels = [condition.label for condition in spec.conditions()]
     assert labels[:2] == ["square", "kite"]
     assert labels[2].startswith("described ")
-    # Without a name nothing of a box changes, its trials included.
-    table = spec.conditions()[2].settings.model_dump(mode="json")["scenario"]["box"]
-    assert "name" not in table
     assert spec.conditions()[1].settings.scenario.box.name == "kite"
 
 
