@@ -5,7 +5,6 @@ received on entering them, R(s) of Eq. 7. The first state of an episode has no r
 learned from. A terminal state counts as entered forever: its value is R(s) / (1 - discount).
 """
 
-from ..functions.settings import FunctionSettings
 from ..interface.scenario import Scenario
 from ..plugins.registry import SettingsRegistry
 from .learner import CORE, LearnerSettings, TeamSettings
@@ -33,7 +32,7 @@ LEARNERS = SettingsRegistry(
     },
     LearnerSettings,
     TeamSettings,
-    function_base=FunctionSettings,
+    function_base=f"{CORE}.functions.settings:FunctionSettings",
 )
 """Learners by name."""
 

@@ -188,7 +188,7 @@ class SettingsRegistry(Registry):
     root
         Base class of all settings of this kind. By default, `base`.
     function_base
-        Base class of the settings of users' functions. By default, `base`.
+        Place of the base class of the settings of users' functions. By default, `base`.
 
     Examples
     --------
@@ -211,11 +211,11 @@ class SettingsRegistry(Registry):
         base: type[PartSettings],
         root: type[PartSettings] | None = None,
         moved: Mapping[str, str] | None = None,
-        function_base: type[PartSettings] | None = None,
+        function_base: str = "",
     ) -> None:
         super().__init__(kind, built_in, moved)
         self.base = base
-        self.function_base = function_base or base
+        self.function_base = function_base
         self.root = root or base
         self._models: dict[tuple[str, int], tuple[object, type[PartSettings]]] = {}
 
@@ -247,7 +247,7 @@ class SettingsRegistry(Registry):
     def _new_model(self, name: str, thing: object) -> type[PartSettings]:
         thing = checked_origin(name, thing, self.kind, self.root)
         is_class = isinstance(thing, type)
-        settings: object = self.function_base
+        settings: object = resolve_name(self.function_base) if self.function_base else self.base
         if isinstance(thing, type):
             settings = thing if issubclass(thing, self.root) else getattr(thing, "Settings", None)
         if not (isinstance(settings, type) and issubclass(settings, self.root)):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
@@ -20,18 +20,32 @@ from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.words import closest, show
 from ...topologies.config import parse
 from ..errors import SpecError, refused
-from .conditions import Condition, ConditionSettings, Override, Stage
+from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings
 from .controls import LEARN_NOTHING, for_control
 from .presets import PRESETS
 from .tables import SWEEP, SpecTable, TomlTable, flat, label, merge, nested, override, scalar
-
-if TYPE_CHECKING:
-    from .spec import Spec
 
 SECTIONS = ("scenario", "topology", "learner")
 """Tables that describe a condition."""
 Point = dict[str, object]
 """Swept values by dotted key."""
+
+
+class UserTables(NamedTuple):
+    """What a spec says about its conditions."""
+
+    preset: str
+    """Preset of conditions that name no other."""
+    sections: SpecTable
+    """Scenario, topology and learner, which all conditions share."""
+    sweep: Mapping[str, Sequence[object]]
+    """Lists of values by dotted key."""
+    overrides: Sequence[Override]
+    """Named tables over the sections; crossed with the sweep."""
+    evaluations: Mapping[str, SpecTable]
+    """Changes of each condition for further evaluations, by name."""
+    curriculum: Sequence[StageSettings]
+    """Stages of training of conditions without stages of their own."""
 
 
 def resolve(preset: object, user: SpecTable, where: str = "") -> ConditionSettings:
@@ -62,7 +76,7 @@ def resolve(preset: object, user: SpecTable, where: str = "") -> ConditionSettin
     return _validate(override(base, user), where)
 
 
-def conditions_of(spec: Spec) -> tuple[Condition, ...]:
+def conditions_of(spec: UserTables) -> tuple[Condition, ...]:
     """Return the conditions: override by override, the last key of the sweeps varying fastest.
 
     Raises
@@ -102,15 +116,17 @@ def _points(
             yield table, dict(zip(crossed, values, strict=True))
 
 
-def _condition(spec: Spec, table: Override | None, point: Point, keys: Iterable[str]) -> Condition:
+def _condition(
+    spec: UserTables, table: Override | None, point: Point, keys: Iterable[str]
+) -> Condition:
     """Return the condition of an override (None for the spec alone) and a point of the sweeps."""
     name = label(point, table.name if table else "") or spec.preset
     where = f" (condition {name!r})" if point or table else ""
     preset = point.get("preset", table.preset if table and table.preset else spec.preset)
-    user: SpecTable = _sections(spec)
+    user = spec.sections
     if table and table.preset and "preset" not in point:
         user = for_control(_learner_of(preset), user)
-    layers = [_sections(table)] if table else []
+    layers = [sections_of(table)] if table else []
     layers += [expand_sections(nested(key, v)) for key, v in point.items() if key != "preset"]
     for layer in layers:
         user = merge(for_control(layer.get("learner", {}), user), layer)
@@ -142,14 +158,10 @@ def _learner_of(preset: object) -> SpecTable:
     return learner
 
 
-def _sections(own: Spec | Override) -> TomlTable:
+def sections_of(own: Settings) -> TomlTable:
     """Return the tables of a spec or an override that describe a condition."""
-    table: TomlTable = {
-        "scenario": own.scenario,
-        "topology": own.topology,
-        "learner": own.learner,
-    }
-    return table if own.agents is None else table | {"agents": own.agents}
+    table = own.model_dump(include={"agents", *SECTIONS})
+    return {key: value for key, value in table.items() if value is not None}
 
 
 def _differing(point: Point, other: Point) -> str:

@@ -33,7 +33,14 @@ from .conditions import Condition, Curriculum, Length, Name, Override
 from .controls import LEARN_NOTHING, planning_remark, tuning_keys
 from .objects import plain
 from .presets import PRESETS
-from .resolution import conditions_of, expand, expand_section, known_tables
+from .resolution import (
+    UserTables,
+    conditions_of,
+    expand,
+    expand_section,
+    known_tables,
+    sections_of,
+)
 from .studies import STUDIES
 from .tables import SWEEP, SpecTable, TomlTable, assignment, override, spec_text
 
@@ -185,7 +192,16 @@ class Spec(Settings):
         if points * len(spec.seeds) > MOST_TRIALS:
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
-        spec._conditions = conditions_of(spec)
+        spec._conditions = conditions_of(
+            UserTables(
+                spec.preset,
+                sections_of(spec),
+                spec.sweep,
+                spec.overrides,
+                spec.evaluations,
+                spec.curriculum,
+            )
+        )
         if spec.decisions is not None and [c.label for c in spec._conditions] == ["default"]:
             (only,) = spec._conditions
             spec._conditions = (only._replace(label=only.settings.learner.kind),)
