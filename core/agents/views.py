@@ -15,16 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..adaptation.foresight import Foresight
-from ..decision.errors import Errors
-from ..evaluators.evaluator import concerned
 from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import AgentContext
 from ..interface.experience import Observation
 from ..interface.measures import Measure
 from ..interface.prediction import Prediction
 from ..learners.learner import LearnerSettings
+from ..models.team_model import TeamModel
 from ..numerics import FloatArray, IntArray
+from ..search.errors import Errors
+from ..search.evaluator import concerned
 
 UNKNOWN: FloatArray = np.zeros(0)
 """The weights of agents of another part."""
@@ -88,7 +88,7 @@ class Views:
         Per agent of the team the row of its weights; none: they are not known.
     n_rules
         Rules of the rule base.
-    foresight
+    model
         What they predict by.
     plans
         Whether they make plans, so that they expect something of the others.
@@ -110,14 +110,14 @@ class Views:
         context: AgentContext,
         rows: list[int | None],
         n_rules: int,
-        foresight: Foresight,
+        model: TeamModel,
         *,
         plans: bool,
     ) -> None:
         self.costs = COSTS if plans else COSTS[1:]
         self._members = context.members.tolist()
         self._rows = rows
-        self._foresight = foresight
+        self._model = model
         hierarchy = context.hierarchy
         # Who values its own actions where it is predicts nothing, and needs no state but its own.
         perceived = context.scenario.perceived[context.members]
@@ -143,7 +143,7 @@ class Views:
                 own = self._errors.weights(agent, theta)
                 constants = self._errors.constants(agent)
                 if constants is not None:
-                    prediction = self._foresight.predict(seen, constants) or shared
+                    prediction = self._model.predict(seen, constants) or shared
             views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
         return views
 

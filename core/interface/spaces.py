@@ -76,7 +76,7 @@ class Variable:
     """Words for the membership functions, in the order of `centres`; empty: numbered."""
     mirrored: Literal["same", "opposite"] | None = None
     """What it is in the mirror image of a world: the ``same``, or of ``opposite`` sign; none: it is
-    not known, see `core.adaptation.predictors`."""
+    not known, see `core.models.predictors`."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
