@@ -29,6 +29,7 @@ from .core.isolation import ignore_settings_files
 ignore_settings_files()
 
 _PLACES = {
+    "AgentDecision": ("core.interface.experience", "AgentDecision"),
     "Agents": ("core.interface.agents", "Agents"),
     "ActionSet": ("core.interface.spaces", "ActionSet"),
     "Analysis": ("studies.results.analysis", "Analysis"),
@@ -89,6 +90,7 @@ _PLACES = {
     "cost_table": ("studies.cost.table", "cost_table"),
     "control_loop": ("core.agents.loop", "control_loop"),
     "detectable": ("studies.results.power", "detectable"),
+    "explain_decision": ("core.agents.inspection", "explain_decision"),
     "from_gymnasium": ("scenarios.adapters.scenario", "from_gymnasium"),
     "from_pettingzoo": ("scenarios.adapters.scenario", "from_pettingzoo"),
     "greatest": ("core.numerics", "greatest"),

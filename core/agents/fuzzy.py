@@ -310,12 +310,23 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         return inputs.values or {}
 
     def value(self, agent: int, states: FloatArray) -> FloatArray:
-        """Return the value function of an agent at states ``(..., d)``."""
+        """Return the value function of an agent at states ``(..., d)``.
+
+        Raises
+        ------
+        ValueError
+            If the states have other variables; one line.
+        """
         row = self._row_of[agent]
         assert row is not None  # the team asks the part of the agent
-        flat = states.reshape(-1, states.shape[-1])
-        theta = np.broadcast_to(self.learner.theta[row], (len(flat), self.learner.theta.shape[1]))
-        return self.rules.values(theta, flat).reshape(states.shape[:-1])
+        variables = [variable.name for variable in self.space.variables]
+        if not states.ndim or states.shape[-1] != len(variables):
+            raise ValueError(
+                f"states: shape {states.shape}, allowed: (..., {len(variables)}), the variables "
+                f"{', '.join(variables)}"
+            )
+        flat = states.reshape(-1, len(variables))
+        return self.rules.values(self.learner.theta[row], flat).reshape(states.shape[:-1])
 
     def learn(self, experience: Experience, inputs: FuzzyInputs) -> None:
         """Revise predictions, and learn from the states entered; after an episode, all of it."""

@@ -16,13 +16,14 @@ from ..hierarchy.messages import NO_PAYLOADS, Messages, Payloads
 from ..hierarchy.stages import DecisionStage, Inbox, decision_stages
 from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
 from ..interface.environments import Transitions
-from ..interface.experience import AgentDecision, Decision, Experience, Observation
+from ..interface.experience import Decision, Experience, Observation
 from ..interface.measures import Measure
 from ..interface.plain import as_scenario
 from ..interface.scenario import Scenario
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from ..plugins.settings import Settings
 from ..plugins.words import expect
+from .inspection import inspect_agents
 from .kept import begin_with
 
 if TYPE_CHECKING:
@@ -210,7 +211,8 @@ class Team:
             team changes only the random numbers that break ties.
         inspect
             Whether the decision contains the values, received actions and exploration of single
-            agents, see `AgentDecision`. The joint action is the same.
+            agents, see `AgentDecision`. The joint action is the same; agents that would share one
+            search then search one after the other, which takes longer.
 
         Examples
         --------
@@ -222,13 +224,16 @@ class Team:
         >>> observation = Observation(carts.reset(0), carts)
         >>> decision = team.act(observation, explore=False, inspect=True)
         >>> [list(agent.received) for agent in decision.agents]
-        [[], ['cart0']]
+        [[], ['cart1']]
         """
         if self._present is not self.messages.hierarchy:
             self._rearrange()
+        if inspect and observation.present.ndim > 2:
+            raise ValueError("inspect = True: a decision of one environment only")
         inputs = tuple(part.observe(observation, explore=explore) for part in self.parts)
-        inboxes: list[Inbox] | None = [] if inspect else None
+        inboxes: list[Inbox] | None = None
         if inspect:
+            inboxes = []
             for part, own in zip(self.parts, inputs, strict=True):
                 part.record_values(own)
         joint_action = self._decide(observation, inputs, inboxes)
@@ -240,7 +245,13 @@ class Team:
             self.decision_costs = self._costs_of_decision(inputs)
         if inboxes is None:
             return Decision(joint_action, inputs)
-        return Decision(joint_action, inputs, self._inspected(joint_action, inputs, inboxes))
+        values: dict[int, FloatArray] = {}
+        for part, own in zip(self.parts, inputs, strict=True):
+            values.update(part.action_values(own))
+        agents = inspect_agents(
+            self.hierarchy.agents, self.action_set.names, joint_action, values, inboxes
+        )
+        return Decision(joint_action, inputs, agents)
 
     def _decide(
         self,
@@ -269,33 +280,6 @@ class Team:
             if fail:
                 joint_action[self.messages.absent(inbox.agents)] = self.action_set.neutral
         return joint_action
-
-    def _inspected(
-        self, joint_action: IntArray, inputs: tuple[object, ...], inboxes: Sequence[Inbox]
-    ) -> tuple[AgentDecision, ...]:
-        """Return the decision of every agent of one environment, in the order of decision."""
-        if joint_action.ndim > 1:
-            raise ValueError("inspect = True: one environment only")
-        names = self.hierarchy.agents
-        actions = self.action_set.names
-        values: dict[int, FloatArray] = {}
-        for part, own in zip(self.parts, inputs, strict=True):
-            values.update(part.action_values(own))
-        decisions = []
-        for inbox in inboxes:
-            received: dict[int, dict[str, str]] = {agent: {} for agent in inbox.agents.tolist()}
-            messages = zip(inbox.receivers, inbox.senders, inbox.actions, strict=True)
-            for receiver, sender, action in messages:
-                received[int(receiver)][names[sender]] = actions[action]
-            for agent, messages_of in received.items():
-                action = int(joint_action[agent])
-                own_values = values.get(agent, np.zeros(0))
-                is_best = not len(own_values) or own_values[action] == own_values.max()
-                by_name = dict(zip(actions, own_values.tolist(), strict=False))
-                decisions.append(
-                    AgentDecision(names[agent], actions[action], by_name, messages_of, not is_best)
-                )
-        return tuple(decisions)
 
     def value(self, agent: str, states: FloatArray) -> FloatArray:
         """Return the value function of an agent at some states.

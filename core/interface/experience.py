@@ -53,8 +53,10 @@ class AgentDecision:
     """Values of the actions by name; log probabilities of policies; empty without values."""
     received: dict[str, str]
     """Received actions by the name of the sender."""
+    payloads: dict[str, object]
+    """Payloads received with these actions by the name of the sender, where there are any."""
     explored: bool
-    """Whether the action is not one of greatest value."""
+    """Whether another action has a greater value: the agent explored, or its policy drew."""
 
 
 class Decision(NamedTuple):

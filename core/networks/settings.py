@@ -1,6 +1,6 @@
 """Settings of PPO, as in the ``[learner]`` table of a spec.
 
-Defaults are those of stable-baselines3, except for the ones that docs/peers.md lists.
+Defaults are those of stable-baselines3, except for the ones that research/notebooks/ppo.md lists.
 """
 
 from typing import Annotated, ClassVar, Literal

@@ -196,6 +196,15 @@ class KinematicChain(Scenario, Embodiment):
 
         animate(recording, path)
 
+    def draw(self, path: Path) -> None:
+        """Draw the present posture and the goal to a picture file."""
+        from .drawing import snapshot
+
+        state = self.measure()
+        recording = {name: np.asarray(state[name])[None] for name in self.recorded}
+        constants = {name: np.asarray(it) for name, it in self.constants_of_episode().items()}
+        snapshot(recording | constants, path)
+
     def _reward(self, distance: FloatArray, approach: FloatArray) -> FloatArray:
         """Return the reward ``(m,)`` for distance and approach [m]."""
         s = self.settings.reward

@@ -40,7 +40,7 @@ from ..results.notation import wrapped
 from ..results.results import Results, read
 from ..spec.conditions import ConditionSettings
 from ..spec.controls import LEARN_NOTHING, control_lines, control_of
-from ..spec.outline import StudyOutline, other_spec, sources_of
+from ..spec.outline import StudyOutline, older_results, other_spec, sources_of
 from ..spec.tables import SpecTable, TomlTable
 from ..store import durable
 from ..store.store import Store
@@ -94,12 +94,12 @@ class StudyResults:
     @classmethod
     def of(cls, store: Store) -> StudyResults:
         """Return the results of an open study."""
-        remark = other_spec(store)
+        remarks = (older_results(store), None if store.is_older else other_spec(store))
         return cls(
             outline=StudyOutline.kept(store),
             results=read(store),
             failed=tuple(store.failed()),
-            remarks=() if remark is None else (remark,),
+            remarks=tuple(remark for remark in remarks if remark is not None),
             _sources=sources_of(store),
             _settings=store.settings(),
             _directories=(store.directory,),

@@ -55,6 +55,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "keys": (".commands.describing", "List the tables of a spec, or the keys of one table."),
         "schema": (".commands.describing", "Write the JSON schema of specs, for editors."),
         "topology": (".commands.describing", "List the topologies, or show one of them."),
+        "draw": (".commands.drawing", "Draw environments before anything runs."),
         "check": (".commands.checking", "Check that scenarios satisfy their interface."),
         "cost": (".commands.describing", "Print the cost of hierarchies, by formula or measured."),
         "profile": (".commands.describing", "Show the time of a decision, part by part."),

@@ -27,9 +27,8 @@ from ..results.scaling_law import columns_of
 from ..scalability.report import ScalabilityReport, analyze
 from ..spec.conditions import ConditionSettings
 from ..spec.controls import control_lines
-from ..spec.outline import StudyOutline, sources_of
+from ..spec.outline import StudyOutline, older_results, sources_of
 from ..spec.tables import SpecTable, dumps
-from ..store.database import RESULTS_VERSION
 from ..store.store import Store
 from ..workers.runner import installed
 from .pictures import hierarchy_pictures, pictures
@@ -68,6 +67,8 @@ def page(directory: Path) -> str:
         sources = sources_of(store)
         settings = store.settings()
         drawn = hierarchy_pictures(store)
+        older = older_results(store)
+        results_version = store.version
     with sources.active():
         analysis = analyse_as(outline.study, results)
         figures = dict(draw_figures(load_study(outline.study), analysis))
@@ -78,6 +79,8 @@ def page(directory: Path) -> str:
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = compare_conditions(results, results.main.name).notes  # with the identity lines
     notes = (*missing_reference(results), *notes)
+    if older is not None:
+        notes = (older, *notes)
     there = {label: own for label, own in settings.items() if label in results.conditions}
     table = tabulate(analysis.table)
     rate = main_title(table)
@@ -105,7 +108,7 @@ def page(directory: Path) -> str:
         seeds=runs(outline.seeds),
         spec=dumps(outline.table),
         versions=versions(),
-        results_version=RESULTS_VERSION,
+        results_version=results_version,
         css=_read_own("page.css"),
         js=_read_own("page.js"),
         replay_js=Markup(packed.script),

@@ -108,14 +108,25 @@ def aggregate(compared: ComparisonTable) -> Aggregates:
             pairs = list(zip(better, worse, strict=True))
             estimates["P(improvement)"] = probability_higher(pairs)
         table.append(Summary(name, sum(map(len, own)), estimates))
-    is_trained = all(name in group.training for group in groups for name in names)
-    trained = names if is_trained else []
+    measure = compared.measure.name
+    labels = {name: [group.members[name] for group in groups] for name in names}
+    is_trained = compared.phase and all(
+        compared.results.has(label, "training", measure) for own in labels.values() for label in own
+    )
+    training = {
+        name: [
+            compared.results.by_seed(label, "training", measure).dropna(axis=1).to_numpy()
+            for label in own
+        ]
+        for name, own in labels.items()
+        if is_trained
+    }
     return Aggregates(
         title=compared.title,
         table=tuple(table),
         thresholds=np.linspace(every.min(), every.max(), THRESHOLDS),
         scores=scores,
-        training={name: [g.training[name] for g in groups] for name in trained},
+        training=training,
         notes=(
             f"{compared.title}. Intervals: percentiles, seeds resampled within "
             f"{len(groups)} of {len(compared.groups)} tasks.",

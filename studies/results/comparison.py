@@ -37,10 +37,10 @@ class ComparisonGroup(NamedTuple):
     differences: tuple[Difference, ...]
     table: tuple[Summary, ...]
     """A line for each condition, the reference first."""
+    members: Mapping[str, str]
+    """Label of each condition by its name in the group."""
     values: Mapping[str, Array]
-    """Means of the seeds ``(n_seeds,)`` by condition."""
-    training: Mapping[str, Array]
-    """Values of the training episodes ``(n_seeds, n_episodes)`` by condition, where measured."""
+    """Means of the seeds ``(n_seeds,)`` by name."""
     left_out: tuple[str, ...] = ()
     """For each condition, the number of runs or scores without a partner."""
 
@@ -52,8 +52,8 @@ class ComparisonTable(NamedTuple):
     phase: str
     """Phase of the episodes; empty for a number of whole trials."""
     groups: tuple[ComparisonGroup, ...]
-    identical: tuple[tuple[str, ...], ...] = ()
-    """Conditions without any difference, see `Results.identical`."""
+    results: Results
+    """The compared results."""
 
     @property
     def differences(self) -> tuple[Difference, ...]:
@@ -84,7 +84,7 @@ class ComparisonTable(NamedTuple):
         values = [own for group in self.groups for own in group.values.values()]
         if self.measure.name == SUCCESS.name and not any(own.any() for own in values):
             lines += wrapped(f"No run has any {self.title}.")
-        return (*(lines or [NOTHING]), *identity_lines(self.identical))
+        return (*(lines or [NOTHING]), *identity_lines(self.results.identical))
 
 
 def title_of(measure: Measure, phase: str) -> str:
@@ -141,7 +141,7 @@ def compare_conditions(
         _group(results, setting, members, values, compared[setting], (shown, phase))
         for setting, members in groups
     ]
-    return ComparisonTable(shown, phase, tuple(compared_groups), results.identical)
+    return ComparisonTable(shown, phase, tuple(compared_groups), results)
 
 
 def _group(
@@ -171,12 +171,8 @@ def _group(
         reference=members[0][0],
         differences=compared,
         table=tuple(lines),
+        members=dict(members),
         values={name: row_means(values[c]).to_numpy() for name, c in members},
-        training={
-            name: results.by_seed(c, "training", measure.name).dropna(axis=1).to_numpy()
-            for name, c in members
-            if phase and results.has(c, "training", measure.name)
-        },
         left_out=tuple(left_out),
     )
 

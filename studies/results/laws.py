@@ -222,7 +222,7 @@ def _fitted(
         def slopes(p: Array) -> Array:
             return roots[:, None] * curve.slopes(p, x)
 
-        fits = [optimize.least_squares(off, own, slopes) for own in begins]
+        fits = [optimize.least_squares(off, own, slopes, method="lm") for own in begins]
         return np.asarray(min(fits, key=lambda one: one.cost).x)
 
     def lack(p: Array) -> float:

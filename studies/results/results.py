@@ -151,7 +151,7 @@ class Results:
         """
         rows = self._rows[phase, condition]
         values = self._measured[measure][rows]
-        seeds = self.episodes["seed"].to_numpy()[rows]
+        seeds = self._places["seed"][rows]
         starts = 1 + np.flatnonzero(seeds[1:] != seeds[:-1])
         series = [own[part] for own in np.split(values, starts)]
         values = pad_rows(series)
@@ -168,8 +168,10 @@ class Results:
         An episode that a seed lacks is not a number.
         """
         rows = self._rows[phase, condition]
-        places = self.episodes[["seed", "episode"]].iloc[rows]
-        frame = places.assign(value=self._measured[measure][rows]).dropna(subset="value")
+        values = self._measured[measure][rows]
+        rows = rows[~np.isnan(values)]
+        places = {name: own[rows] for name, own in self._places.items()}
+        frame = pd.DataFrame({**places, "value": values[~np.isnan(values)]})
         wide = frame.pivot(index="seed", columns="episode", values="value")
         return wide.loc[frame["seed"].unique()]
 
@@ -224,6 +226,11 @@ class Results:
             condition: {n: own[rows] for n, (own, known) in columns.items() if known[rows].all()}
             for condition, rows in done.groupby("condition", sort=False).indices.items()
         }
+
+    @cached_property
+    def _places(self) -> dict[str, Array]:
+        """Seed and number of each row of episodes."""
+        return {name: self.episodes[name].to_numpy() for name in ("seed", "episode")}
 
     @cached_property
     def _measured(self) -> dict[str, Array]:

@@ -7,7 +7,7 @@ with runs as clusters. A single seed has no interval.
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from numbers import Real
 from typing import NamedTuple
@@ -115,15 +115,9 @@ def bootstrap(
         low, high = value - half, value + half
     else:
         tail = special.ndtr(-t * math.sqrt(n_runs / (n_runs - 1)))
-        low, high = stats.bootstrap(
-            (array,),
-            np.mean,
-            method="percentile",
-            confidence_level=1.0 - 2.0 * tail,
-            n_resamples=RESAMPLES,
-            batch=max(1, MAX_VALUES // array.size),
-            rng=np.random.default_rng(0),
-        ).confidence_interval
+        deviations = (array - value).T  # so that equal runs have exactly their value
+        means = [deviations @ weights.T for weights in resample_weights(n_runs, RESAMPLES)]
+        low, high = value + np.quantile(np.concatenate(means, -1), [tail, 1.0 - tail], axis=-1)
     minimum, maximum = bounds
     low = np.clip(low, *bounds)
     high = np.clip(high, *bounds)
@@ -133,6 +127,29 @@ def bootstrap(
         low = np.where(value >= maximum, np.minimum(low, maximum - reach), low)
         high = np.where(value <= minimum, np.maximum(high, minimum + reach), high)
     return Estimate(value, low, high)
+
+
+def resample_weights(n_runs: int, count: int, seed: int = 0) -> Iterable[Array]:
+    """Return the share of each run in `count` resamples, in blocks ``(m, n_runs)``.
+
+    The product with values is their resampled means: a bootstrap without a copy of the values,
+    equal to that of SciPy except for rounding. Few runs share their resamples in all tables.
+    """
+    is_small = count * n_runs <= MAX_VALUES
+    return (_kept_weights if is_small else _drawn_weights)(n_runs, count, seed)
+
+
+@lru_cache(maxsize=8)
+def _kept_weights(n_runs: int, count: int, seed: int) -> tuple[Array, ...]:
+    return tuple(_drawn_weights(n_runs, count, seed))
+
+
+def _drawn_weights(n_runs: int, count: int, seed: int) -> Iterator[Array]:
+    rng = np.random.default_rng(seed)
+    for rows in blocks(count, n_runs):
+        m = rows.stop - rows.start
+        drawn = rng.integers(n_runs, size=(m, n_runs)) + n_runs * np.arange(m)[:, None]
+        yield np.bincount(drawn.ravel(), minlength=m * n_runs).reshape(m, n_runs) / n_runs
 
 
 def blocks(rows: int, width: int) -> Iterator[slice]:
@@ -256,9 +273,11 @@ def probability_higher(pairs: Sequence[tuple[Array, Array]]) -> Estimate:
     wins = [0.5 + 0.5 * np.sign(np.subtract.outer(own, base)) for own, base in pairs]
     drawn = np.zeros(PROBABILITY_RESAMPLES)
     for task, won in enumerate(wins):
-        n_own, n_base = won.shape
-        means = _resample_weights(n_own, 2 * task) @ won
-        drawn += (means * _resample_weights(n_base, 2 * task + 1)).sum(axis=1) / len(wins)
+        own, base = (
+            np.concatenate([*resample_weights(n_runs, PROBABILITY_RESAMPLES, seed)])
+            for seed, n_runs in enumerate(won.shape, 2 * task)
+        )
+        drawn += ((own @ won) * base).sum(axis=1) / len(wins)
     value = np.mean([won.mean() for won in wins])
     low, high = np.quantile(drawn, [0.025, 0.975])
     z = float(special.ndtri(0.975))
@@ -266,11 +285,3 @@ def probability_higher(pairs: Sequence[tuple[Array, Array]]) -> Estimate:
     low = min(low, 1.0 - reach) if value == 1.0 else low
     high = max(high, reach) if value == 0.0 else high
     return Estimate(value, low, high)
-
-
-@lru_cache(maxsize=8)
-def _resample_weights(n_runs: int, seed: int) -> Array:
-    """Return the share of each run in resamples ``(PROBABILITY_RESAMPLES, n_runs)``."""
-    rng = np.random.default_rng(seed)
-    shares = np.full(n_runs, 1.0 / n_runs)
-    return rng.multinomial(n_runs, shares, size=PROBABILITY_RESAMPLES) / n_runs

@@ -49,7 +49,7 @@ def control_of(condition: str, settings: Mapping[str, Settings]) -> str | None:
     return None
 
 
-TROUBLESHOOTING = "docs/not_learned.md"
+TROUBLESHOOTING = "docs/troubleshooting.md"
 """Page that says what to try if a team does not learn."""
 
 

@@ -204,7 +204,8 @@ class Spec(Settings):
         for module, key in dict(modules_in(tables)).items():
             with refused(f"{key}: "):
                 sources.permit(module)
-        spec._sources = sources.only(set(names))
+        data_files = {name for name in sources.texts if name.endswith(".csv")}
+        spec._sources = sources.only({*names, *data_files})
         spec._check_decisions()
         return spec
 

@@ -28,8 +28,9 @@ from Box2D import _Box2D
 
 from ....core.numerics import BoolArray, FloatArray, IntArray
 from ...faults.settings import Failures, FailureSettings, Free
-from .boxes import UNIT, BoxSpec
+from .boxes import BoxSpec
 from .geometry import gaps, infrared_readings
+from .polygons import UNIT
 from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
 from .stepping import (

@@ -32,6 +32,24 @@ def test_the_interval_has_the_percentiles_of_resampled_means():
     assert (estimate.low, estimate.high) == (pytest.approx(low), pytest.approx(high))
 
 
+@pytest.mark.parametrize("shape", [(8,), (20, 5), (700,)])  # 700 runs are resampled in blocks
+def test_the_bootstrap_is_that_of_scipy(shape):
+    values = np.random.default_rng(3).normal(size=shape)
+    n_runs = shape[0]
+    tail = stats.norm.cdf(stats.t.ppf(0.025, n_runs - 1) * np.sqrt(n_runs / (n_runs - 1)))
+    reference = stats.bootstrap(
+        (values,),
+        np.mean,
+        method="percentile",
+        confidence_level=1.0 - 2.0 * tail,
+        n_resamples=RESAMPLES,
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    estimate = bootstrap(values)
+    assert np.allclose(estimate.low, reference.low, rtol=0.0, atol=1e-12)
+    assert np.allclose(estimate.high, reference.high, rtol=0.0, atol=1e-12)
+
+
 def test_points_are_estimated_apart():
     values = RNG.normal(size=(8, 3))
     together = bootstrap(values)
