@@ -16,9 +16,10 @@ NAVIGATION = {
     "Get started": ("install", "tutorials/first_study", "concepts"),
     "Tutorials": ("tutorials/index", "gallery/index"),
     "Guide": (
-        "topologies", "communication", "learners", "dynamics_models", "search",
+        "topologies", "communication", "learners", "dynamics_models", "joint_action_search",
         "coordination_graphs", "specs", "running", "statistics", "reading_results", "report",
-        "explain", "faults", "cost", "scalability", "python", "extending", "troubleshooting",
+        "explain", "faults", "cost", "scalability", "resilience", "python", "extending",
+        "troubleshooting",
     ),
     "Environments": (
         "environments/index", "environments/box_pushing", "environments/arms",

@@ -1,7 +1,7 @@
-"""The door for plain classes of users: scenarios and predictions that inherit nothing of ours.
+"""Adapters for classes of users that do not inherit from `Scenario` or `Prediction`.
 
-What they may have is asked for by name here, once, and nowhere else. Bodies that are open to
-self-models inherit `Scenario`.
+This is the only module that looks up optional members by name. Scenarios with bodies for
+self-models must inherit from `Scenario`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from .prediction import Blocks, Prediction, Tables
 from .scenario import Scenario, Transition
 from .spaces import real_copy
 
-NECESSARY = ("agents", "state_space", "action_set", "reset", "step")
-"""What a scenario cannot do without."""
+REQUIRED = ("agents", "state_space", "action_set", "reset", "step")
+"""Required members of a scenario."""
 DECLARED = (
     "agents",
     "state_space",
@@ -33,13 +33,13 @@ DECLARED = (
     "roles",
     "bounds",
 )
-"""What a scenario says of itself."""
+"""Attributes that describe a scenario."""
 MISSING = object()
-"""What an object has not."""
+"""Default that marks a missing member."""
 
 
 def offered(thing: object, name: str, otherwise: Any = None) -> Any:
-    """Return what an object of a user has by a name, or something else if it has not."""
+    """Return a member of a user's object, or a default."""
     return getattr(thing, name, otherwise)
 
 
@@ -55,14 +55,14 @@ def decides(thing: object) -> bool:
 
 
 def as_scenario(thing: object) -> Scenario:
-    """Return a scenario: the thing itself if it is one, else one that plays it.
+    """Return an object as a scenario, with an adapter if it does not inherit from `Scenario`.
 
     Raises
     ------
     ValueError
-        If the thing lacks what is necessary; one line.
+        If it lacks a required member; one line.
     """
-    missing = ", ".join(name for name in NECESSARY if offered(thing, name) is None)
+    missing = ", ".join(name for name in REQUIRED if offered(thing, name) is None)
     if missing:
         hint = ""
         if offered(thing, "action_space") is not None:
@@ -73,19 +73,19 @@ def as_scenario(thing: object) -> Scenario:
 
 
 def as_prediction(thing: Any) -> Prediction | None:
-    """Return a prediction: the thing itself if it is one, else one that asks it."""
+    """Return an object as a prediction, with an adapter if it does not inherit from it."""
     if thing is None or isinstance(thing, Prediction):
         return thing
     return PlainPrediction(thing)
 
 
 class PlainScenario(Scenario):
-    """A scenario of a user's plain class.
+    """Adapter for a scenario that does not inherit from `Scenario`.
 
     Parameters
     ----------
     plain
-        An object that has what is `NECESSARY`; whatever else it has can be reached through this.
+        Object with the `REQUIRED` members; its other members are attributes of the adapter, too.
     """
 
     def __init__(self, plain: Any) -> None:
@@ -96,8 +96,8 @@ class PlainScenario(Scenario):
                 setattr(self, name, own)
 
     def __getattr__(self, name: str) -> Any:
-        """Return what the user's object has by this name."""
-        if name == "plain":  # not there yet: an object that is being copied or unpickled
+        """Return a member of the user's object."""
+        if name == "plain":  # missing while an object is copied or unpickled
             raise AttributeError(name)
         value = offered(self.plain, name, MISSING)
         if value is MISSING:
@@ -110,18 +110,18 @@ class PlainScenario(Scenario):
         return states
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Carry out a joint action ``(n,)``."""
+        """Execute a joint action ``(n,)``."""
         transition: Transition = self.plain.step(joint_action)
         return transition
 
     @property
     def predicts(self) -> bool:
-        """Whether the user's object has a method predict."""
+        """Whether the user's object has a method `predict`."""
         return offered(self.plain, "predict") is not None
 
     @property
     def lacks_prediction(self) -> str:
-        """Why it predicts nothing, in the user's words if there are any."""
+        """Reason why the scenario has no prediction."""
         unnamed = f"the scenario {type(self.plain).__name__} has no method predict"
         return str(offered(self.plain, "lacks_prediction", unnamed))
 
@@ -130,48 +130,48 @@ class PlainScenario(Scenario):
         return as_prediction(self.plain.predict()) if self.predicts else None
 
     def with_exact_prediction(self) -> Scenario | None:
-        """Return the user's exactly predicting scenario, if there is one."""
-        own_way = offered(self.plain, "with_exact_prediction")
-        if own_way is None:
+        """Return the user's scenario with exact predictions, if there is one."""
+        method = offered(self.plain, "with_exact_prediction")
+        if method is None:
             return None
-        exact = own_way()
+        exact = method()
         return self if exact is self.plain else as_scenario(exact)
 
     def partners(self) -> Sequence[int] | None:
-        """Return who stands in whose place in the mirror, if the user's object knows."""
-        own_way = offered(self.plain, "partners")
-        return None if own_way is None else own_way()
+        """Return the mirror image of every agent, if the user's object defines it."""
+        method = offered(self.plain, "partners")
+        return None if method is None else method()
 
     def measure(self) -> Mapping[str, Any]:
-        """Return the measurements of the present state, if the user's object takes them."""
-        own_way = offered(self.plain, "measure")
-        return {} if own_way is None else own_way()
+        """Return the measurements of the present state, if the user's object has them."""
+        method = offered(self.plain, "measure")
+        return {} if method is None else method()
 
     def constants_of_episode(self) -> Mapping[str, Any]:
-        """Return what the user's object keeps once an episode."""
-        own_way = offered(self.plain, "constants_of_episode")
-        return {} if own_way is None else own_way()
+        """Return recorded constants of the episode, if the user's object has them."""
+        method = offered(self.plain, "constants_of_episode")
+        return {} if method is None else method()
 
     @property
     def draws(self) -> bool:
-        """Whether the user's object draws recordings."""
+        """Whether the user's object can animate recordings."""
         return bool(self.recorded) and offered(self.plain, "animate") is not None
 
     def animate(self, recording: Mapping[str, Any], path: Path) -> None:
-        """Let the user's object draw a recording."""
+        """Write an animation."""
         if not self.draws:
             super().animate(recording, path)
         self.plain.animate(recording, path)
 
 
 class PlainPrediction(Prediction, Tables):
-    """A prediction of a user's plain class.
+    """Adapter for a prediction that does not inherit from `Prediction`.
 
     Parameters
     ----------
     plain
-        An object that has ``states(agent, joint_actions)``, and perhaps methods of the names that
-        `Prediction` and `Tables` have.
+        Object with ``states(agent, joint_actions)``, and optionally the other methods of
+        `Prediction` and `Tables`.
     """
 
     def __init__(self, plain: Any) -> None:
@@ -180,7 +180,7 @@ class PlainPrediction(Prediction, Tables):
         self.alike = offered(plain, "alike", None)
 
     @property
-    def rewarded(self) -> bool:  # type: ignore[override]  # of users' classes it is not known before
+    def rewarded(self) -> bool:  # type: ignore[override]  # depends on the object
         """Whether there is a table of rewards."""
         return offered(self.plain, "reward_table") is not None
 
@@ -189,27 +189,27 @@ class PlainPrediction(Prediction, Tables):
         return real_copy(self.plain.states(agent, joint_actions), "predicted states")
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray] | None:
-        """Return own and shared variables of all, if the user's object knows a way."""
-        own_way = offered(self.plain, "states_by_group", None)
-        if own_way is None or (parts := own_way(joint_actions)) is None:
+        """Return own and shared variables, if the user's object has the method."""
+        method = offered(self.plain, "states_by_group", None)
+        if method is None or (parts := method(joint_actions)) is None:
             return None
         own, shared = parts
         return real_copy(own, "predicted states"), real_copy(shared, "predicted states")
 
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
         """Return rewards, if the user's object predicts them."""
-        own_way = offered(self.plain, "rewards", None)
-        if own_way is None or (rewards := own_way(joint_actions)) is None:
+        method = offered(self.plain, "rewards", None)
+        if method is None or (rewards := method(joint_actions)) is None:
             return None
         return real_copy(rewards, "predicted rewards")
 
     def after(self, joint_action: IntArray) -> Prediction | None:
-        """Return the prediction from where a joint action leads, if it goes on."""
-        own_way = offered(self.plain, "after", None)
-        return None if own_way is None else as_prediction(own_way(joint_action))
+        """Return the prediction from the states after a joint action, if there is one."""
+        method = offered(self.plain, "after", None)
+        return None if method is None else as_prediction(method(joint_action))
 
     def tables(self) -> Tables | None:
-        """Return its tables, if it has such."""
+        """Return tables, if the user's object has them."""
         return self if self._has_tables else None
 
     def blocks(self, agent: int) -> Blocks:

@@ -61,15 +61,15 @@ def test_parts_by_role(world) -> None:
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        ((("cart0", TD),), r"learner\.parts: nobody decides for agent 'cart1\.wheel0'"),
-        ((("*", TD), ("cart1", TD)), r"learner\.parts\[1\]\.agents = \['cart1'\]: nobody is"),
+        ((("cart0", TD),), r"learner\.parts: agent 'cart1\.wheel0' belongs to no part"),
+        ((("*", TD), ("cart1", TD)), r"learner\.parts\[1\]\.agents = \['cart1'\]: lists no agent"),
         (
             (("cart0", TD), (["cart1", "cart0.wheel1"], TD)),
-            r"learner\.parts\[1\].* agent 'cart0\.wheel1' is of learner\.parts\[0\] already; a pat",
+            r"learner\.parts\[1\].* agent 'cart0\.wheel1' belongs to learner\.parts\[0\] already",
         ),
         (
             (("cart0", {**TD, "decision": {"value_of": "below"}}), ("*", TD)),
-            r"value_of = 'below': values of 'cart1\.wheel0' are not known to 'cart0\.wheel0'",
+            r"value_of = 'below': values of 'cart1\.wheel0' are unknown to 'cart0\.wheel0'",
         ),
     ],
 )

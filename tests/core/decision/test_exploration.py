@@ -78,7 +78,7 @@ def test_the_clock_counts_the_run_or_the_episode(clock: str, expected: float) ->
 
 
 def test_of_values_that_are_no_numbers_none_is_greatest(rng: np.random.Generator) -> None:
-    with pytest.raises(ArithmeticError, match="none of 2 actions is worth most"):
+    with pytest.raises(ArithmeticError, match="2 action values have no maximum"):
         greatest(np.full(2, np.nan), rng)
 
 

@@ -69,7 +69,7 @@ def test_a_saved_team_continues_to_the_same_bits(kind, extra):
         for loop in loops:
             loop.step()
     resumed = team_of(kind, seed=5, **extra)
-    resumed.restore({name: array.copy() for name, array in broken.arrays().items()})
+    resumed.load_state_dict({name: a.copy() for name, a in broken.state_dict().items()})
     loop = loop_of(resumed, table)
     loop.load_state_dict(loops[1].state_dict())
     for _ in range(13):

@@ -133,7 +133,7 @@ def test_values_of_other_than_all_actions_are_refused(line_world) -> None:
     fuzzy(team).evaluator = SimpleNamespace(values=lambda deliberation: np.zeros(2))
     team.begin_episode()
     world.reset(0)
-    with pytest.raises(ValueError, match=r"^the evaluator gave 2 values of 4 actions$"):
+    with pytest.raises(ValueError, match=r"^the evaluator returned 2 values for 4 actions$"):
         joint_of(team, world)
 
 
