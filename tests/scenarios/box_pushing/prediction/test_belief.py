@@ -14,11 +14,11 @@ from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.models.calibration import CalibrationSettings
 from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import (
     CONSTANTS,
     believing,
     least_gap,
+    mean_twists,
     outcomes,
     push,
 )
