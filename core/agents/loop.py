@@ -1,10 +1,10 @@
 """The three-layer control loop (Section VIII) as a generator of step records.
 
-1. *Error observation*: the scenario turns the goal and what it senses into the agents' states.
-2. *Action selection*, coupled with learning: the team predicts, values and chooses a joint action.
-3. *Servo control*: the scenario turns it into commanded speeds and moves the bodies.
+1. *Error observation*: the scenario computes the agents' states from the goal and its sensors.
+2. *Action selection*, with learning: the team predicts, evaluates and chooses a joint action.
+3. *Servo control*: the scenario converts the joint action to commanded speeds and moves the bodies.
 
-Recording, progress and plotting consume the records; none of them enters the loop.
+Recordings, progress bars and plots use the records; the loop knows none of them.
 """
 
 from __future__ import annotations
@@ -36,24 +36,24 @@ class StepRecord:
     joint_action: IntArray
     """``(n,)`` action indices, in agent order."""
     transition: Transition
-    """What the step led to."""
+    """Result of the step."""
     last: bool
     """Whether the episode ends with this step."""
     deciding: float
-    """Seconds that the team took to decide; the scenario reports its own in ``transition.info``."""
+    """Duration of the decision [s]; scenarios report their own times in ``transition.info``."""
     learning: float
-    """Seconds that the team took to learn."""
+    """Duration of learning [s]."""
     decision_costs: Mapping[str, float]
-    """What the decision cost, by the names of `Team.costs`."""
+    """Costs of the decision, by the names of `Team.costs`."""
 
 
 def world_seed(seed: int, episode: int) -> np.random.SeedSequence:
-    """Return the seed of an episode's world: the same for every condition of a study."""
+    """Return the seed of an episode's environment, equal for all conditions of a study."""
     return np.random.SeedSequence(seed, spawn_key=(0, episode))
 
 
 def policy_seed(seed: int) -> np.random.SeedSequence:
-    """Return the seed of a team, independent of all worlds."""
+    """Return the seed of a team, independent of all environments."""
     expect("a whole number from 0", Integral, seed=seed)
     return np.random.SeedSequence(seed, spawn_key=(1,))
 

@@ -20,13 +20,13 @@ def as_prediction(thing: Any) -> Prediction | None:
 
 
 class PlainPrediction(Prediction, Tables):
-    """A prediction of a user's plain class.
+    """Adapter for a prediction that does not inherit from `Prediction`.
 
     Parameters
     ----------
     plain
-        An object that has ``states(agent, joint_actions)``, and perhaps methods of the names that
-        `Prediction` and `Tables` have.
+        Object with ``states(agent, joint_actions)``, and optionally the other methods of
+        `Prediction` and `Tables`.
     """
 
     def __init__(self, plain: Any) -> None:
@@ -35,7 +35,7 @@ class PlainPrediction(Prediction, Tables):
         self.alike = getattr(plain, "alike", None)
 
     @property
-    def rewarded(self) -> bool:  # type: ignore[override]  # of users' classes it is not known before
+    def rewarded(self) -> bool:  # type: ignore[override]  # depends on the object
         """Whether there is a table of rewards."""
         return getattr(self.plain, "reward_table", None) is not None
 
@@ -44,27 +44,27 @@ class PlainPrediction(Prediction, Tables):
         return real_copy(self.plain.states(agent, joint_actions), "predicted states")
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray] | None:
-        """Return own and shared variables of all, if the user's object knows a way."""
-        own_way = getattr(self.plain, "states_by_group", None)
-        if own_way is None or (parts := own_way(joint_actions)) is None:
+        """Return own and shared variables, if the user's object has the method."""
+        method = getattr(self.plain, "states_by_group", None)
+        if method is None or (parts := method(joint_actions)) is None:
             return None
         own, shared = parts
         return real_copy(own, "predicted states"), real_copy(shared, "predicted states")
 
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
         """Return rewards, if the user's object predicts them."""
-        own_way = getattr(self.plain, "rewards", None)
-        if own_way is None or (rewards := own_way(joint_actions)) is None:
+        method = getattr(self.plain, "rewards", None)
+        if method is None or (rewards := method(joint_actions)) is None:
             return None
         return real_copy(rewards, "predicted rewards")
 
     def after(self, joint_action: IntArray) -> Prediction | None:
-        """Return the prediction from where a joint action leads, if it goes on."""
-        own_way = getattr(self.plain, "after", None)
-        return None if own_way is None else as_prediction(own_way(joint_action))
+        """Return the prediction from the states after a joint action, if there is one."""
+        method = getattr(self.plain, "after", None)
+        return None if method is None else as_prediction(method(joint_action))
 
     def tables(self) -> Tables | None:
-        """Return its tables, if it has such."""
+        """Return tables, if the user's object has them."""
         return self if self._has_tables else None
 
     def blocks(self, agent: int) -> Blocks:

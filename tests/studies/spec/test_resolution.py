@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from nested_agents.core.decision.exploration import EXPLORATIONS, BurstExploration
-from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.learners import LEARNERS, LearnerSettings
 from nested_agents.core.learners.fitted_q import FittedQSettings
 from nested_agents.core.learners.td import FrozenSettings
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.exploration import EXPLORATIONS, BurstExploration
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.spec import Spec
