@@ -18,11 +18,11 @@ import numpy as np
 from pydantic import Field, NonNegativeInt
 from typing_extensions import TypeAliasType
 
-from ..core.coordination import graphs
-from ..core.coordination.graphs import Shape
 from ..core.hierarchy.hierarchy import Hierarchy
 from ..core.numerics import nx
 from ..core.plugins.settings import Fraction, unwritten
+from ..core.search import coordination_graphs as graphs
+from ..core.search.coordination_graphs import Shape
 
 
 def check_names(

@@ -17,7 +17,6 @@ from typing import Annotated, Literal, Self
 
 from pydantic import model_validator
 
-from ..core.coordination.graphs import orient
 from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure, LeftAgents
 from ..core.hierarchy.hierarchy import Communication, Hierarchy, Lookahead
 from ..core.numerics import nx
@@ -25,6 +24,7 @@ from ..core.plugins import sources
 from ..core.plugins.registry import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
 from ..core.plugins.words import closest, expect, expect_each
+from ..core.search.coordination_graphs import orient
 from .builders import Bodies, Names, check_names, from_networkx, quote
 from .files import read_file
 from .strings import ARGUMENTS, Keys

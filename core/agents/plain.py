@@ -11,12 +11,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..decision.exploration import Explorer, no_way_on
-from ..evaluators.evaluator import Deliberation, Evaluator
 from ..interface.agents import Counts
 from ..interface.plain import offered
 from ..learners.learner import Learner
 from ..numerics import FloatArray, IntArray
+from ..search.evaluator import DecisionContext, Evaluator
+from ..search.exploration import Explorer, no_way_on
 
 
 def as_learner(thing: Any) -> Learner:
@@ -103,16 +103,16 @@ class PlainEvaluator(Evaluator):
     Parameters
     ----------
     plain
-        Object with ``values(deliberation)`` and, optionally, ``counts``.
+        Object with ``values(context)`` and, optionally, ``counts``.
     """
 
     def __init__(self, plain: Any) -> None:
         self.plain = plain
         self.counts: Counts = offered(plain, "counts", Counts())
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        values: FloatArray = self.plain.values(deliberation)
+        values: FloatArray = self.plain.values(context)
         return values
 
 

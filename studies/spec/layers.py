@@ -19,15 +19,15 @@ from typing import NamedTuple, Protocol
 from pydantic import ValidationError
 
 from ...core.agents.joint import Granularity
-from ...core.decision.settings import DecisionSettings
-from ...core.evaluators.best_response import BestResponseSettings
-from ...core.evaluators.coordination import MaxPlusSettings, VariableEliminationSettings
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import MOST_RULES, BatchTDSettings
 from ...core.learners.fitted_q import FittedQSettings
 from ...core.plugins.problems import explain, misplaced, problems_of, several
 from ...core.plugins.settings import ScenarioSettings, Settings, tuples
 from ...core.plugins.words import closest, show
+from ...core.search.best_response import BestResponseSettings
+from ...core.search.coordination import MaxPlusSettings, VariableEliminationSettings
+from ...core.search.settings import DecisionSettings
 from ...scenarios import DEFAULT
 from ...topologies.config import parse
 from ..errors import SpecError, refused

@@ -16,7 +16,7 @@ from ..display import print_text, print_wrapped
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from ....core.adaptation.predictors import LearnedPredictorSettings
+    from ....core.models.predictors import LearnedPredictorSettings
     from ....core.plugins.settings import ScenarioSettings
     from ...trials.trial import Trial
 
@@ -136,8 +136,8 @@ def _learned_errors(
 
 def _learned_predictor(trial: Trial) -> LearnedPredictorSettings | None:
     """Return the settings of the learned predictor of a trial; None without one."""
-    from ....core.adaptation.predictors import LearnedPredictorSettings
     from ....core.learners import LearnerSettings
+    from ....core.models.predictors import LearnedPredictorSettings
 
     learner = trial.settings.learner
     if not isinstance(learner, LearnerSettings):

@@ -11,16 +11,16 @@ from acting import fuzzy, joint_of, look
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.exploration import EXPLORATIONS
-from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.plugins.sources import Sources
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.exploration import EXPLORATIONS
 
 MINE = """
 import numpy as np
-from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
+from nested_agents.core.search.evaluator import Counts, EvaluatorSettings
 from nested_agents.core.learners.learner import LearnerSettings
 
 class MonteCarlo:
@@ -187,8 +187,8 @@ def test_settings_are_read_without_numba_and_scipy() -> None:
     program = """
 import sys
 import nested_agents.core.learners.learner
-from nested_agents.core.evaluators import EVALUATORS
-from nested_agents.core.decision.exploration import EXPLORATIONS
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.exploration import EXPLORATIONS
 from nested_agents.core.learners import LEARNERS
 for registry in (LEARNERS, EVALUATORS, EXPLORATIONS):
     for name in registry.built_in:

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from nested_agents.core.decision.exploration import EXPLORATIONS
-from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.learners import LEARNERS, LearnerSettings
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.exploration import EXPLORATIONS
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.spec import Spec

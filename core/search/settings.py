@@ -4,12 +4,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..evaluators import EVALUATORS, EvaluatorSettings
-from ..evaluators.enumeration import AutoSettings
-from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
 from ..plugins.registry import Plugged
 from ..plugins.settings import Settings, unwritten
+from . import EVALUATORS, EvaluatorSettings
+from .enumeration import AutoSettings
 from .errors import ErrorSettings
+from .evaluator import Plan, Teammates, Unseen, ValueOf
 
 
 class DecisionSettings(Settings):
