@@ -75,25 +75,26 @@ def control_loop(
     Parameters
     ----------
     scenario, team
-        The world and those who act in it; both are modified.
+        Environment and team; both are modified.
     episodes, steps
-        How many episodes, and how many steps each may take.
+        Number of episodes, and maximum number of steps of an episode.
     seed
-        Seed of the worlds, see `world_seed`.
+        Seed of the environments, see `world_seed`.
     first_episode
-        Number of the first episode: a run can be continued with a restored team.
+        Number of the first episode, to continue a run with a saved team.
     first_world
-        Number of its world, see `world_seed`; None: the same.
+        Number of the environment of the first episode, see `world_seed`; by default
+        `first_episode`.
     learn
-        Whether the team learns, or is evaluated.
+        Whether the team learns.
     explore
-        Whether it explores; None: if it learns.
+        Whether the team explores; by default it does if it learns.
 
     Raises
     ------
     ValueError
-        If the scenario does not predict what the team decides by, see `Team.check`, or its states
-        or rewards cannot be learned from, see `checked_transition`.
+        If the scenario lacks a prediction that the team requires, see `Team.check`, or returns
+        invalid states or rewards, see `checked_transition`.
     """
     expect("a team", Team, team=team)
     expect("whole numbers", Integral, episodes=episodes, steps=steps, seed=seed)
