@@ -18,7 +18,8 @@ NAVIGATION = {
     "Guide": (
         "topologies", "communication", "learners", "dynamics_models", "joint_action_search",
         "coordination_graphs", "specs", "running", "statistics", "reading_results", "report",
-        "explain", "faults", "cost", "scalability", "python", "extending", "troubleshooting",
+        "explain", "faults", "cost", "scalability", "resilience", "python", "extending",
+        "troubleshooting",
     ),
     "Environments": (
         "environments/index", "environments/box_pushing", "environments/arms",

@@ -45,6 +45,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "compare": (".commands.reading", "Compare conditions of one or more studies by seed."),
         "fit": (".commands.fitting", "Fit scaling laws over team sizes, and predict."),
         "scalability": (".commands.scalability", "Show which hierarchy scales, and its cost."),
+        "resilience": (".commands.resilience", "Measure what losses of agents cost trained teams."),
         "results": (".commands.reading", "Print the measures of every episode."),
         "report": (".commands.reading", "Write the study as one self-contained HTML file."),
         "explain": (".commands.reading", "Explain a trained team in words and figures."),
