@@ -5,7 +5,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from world_oracles import InfraredSensors, infrared_readings_numpy
+from world_oracles import infrared_readings_numpy
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
