@@ -71,7 +71,7 @@ def test_rows_of_two_codes_are_mixed_only_if_asked_for(
                 save(store, trial, made_up.measure(trial), 0.0)
 
     kept("N = 3", 1)
-    kept("N = 3  # agents", 1)
+    kept("N = 3", 1)
     with pytest.raises(SpecError, match=r"core/team\.py has changed since .*--accept-code"):
         kept("N = 4", 1)
     kept("N = 4", 1, accept_code=True)
