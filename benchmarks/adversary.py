@@ -45,8 +45,9 @@ ATTEMPTS = (
     "runs", "studies", "specs", "topologies", "polygons", "functions", "scenarios",
 )  # fmt: skip
 FINE = (
-    "equal", "told", "run: equal", "studies: equal", "kills with trials kept, and others left",
-    "accepted", "refused in one line", ": told", "right", "done", "not reached",
+    "equal", "told", "run: equal", "run: refused", "studies: equal",
+    "kills with trials kept, and others left", "accepted", "refused in one line", ": told",
+    "right", "done", "not reached",
 )  # fmt: skip
 
 

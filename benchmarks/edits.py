@@ -63,7 +63,7 @@ def sql(number: int, rng: random.Random, folder: Path) -> Counter[str]:
             tally[became] += 1
         tally["runs"] += 1
         became = mended(adversary, path)
-        if became != "run: equal":
+        if became not in ("run: equal", "run: refused"):
             print(f"  {became}, by: {shown}", file=sys.stderr)
         tally[became] += 1
         tally["not trusted and run"] += PAYLOAD in sys.modules

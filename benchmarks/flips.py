@@ -52,7 +52,7 @@ def obstacles(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     adversary, tally = Adversary(folder, rng, LINES), Counter[str]()
     harms: list[tuple[Path, int | None]] = [
         (adversary.study / name, None)
-        for name in (LOCK, DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm")
+        for name in (LOCK, DATABASE, f"{DATABASE}-journal", f"{DATABASE}-wal")
     ]
     for source in adversary.files:
         path, size = adversary.study / source.relative_to(adversary.sound), source.stat().st_size

@@ -22,7 +22,9 @@ from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.report import page
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.store.writer import LOCK
 from nested_agents.studies.trials.arrangement import check_conditions
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
 from nested_agents.studies.trials.session import run_trial
@@ -223,12 +225,26 @@ def read(adversary: Adversary, line: str, path: Path) -> str:
 
 
 def mended(adversary: Adversary, path: Path) -> str:
-    """Return what a run makes of it."""
+    """Return what a run makes of a study of which a file is damaged.
+
+    A run repeats damaged trials. It refuses a database that is damaged as a whole and changes
+    nothing then.
+    """
+    study = adversary.study
+    before = _files(study)
     try:
-        adversary.finish(adversary.study)
-        is_equal = adversary.content(adversary.study) == adversary.expected
-        is_equal &= not adversary.finish(adversary.study)  # one run is enough
+        adversary.finish(study)
+        is_equal = adversary.content(study) == adversary.expected
+        is_equal &= not adversary.finish(study)  # one run is enough
+    except SpecError as refusal:
+        is_named = path.name == DATABASE and DATABASE in str(refusal)
+        return "run: refused" if is_named and _files(study) == before else "run: unequal"
     except BaseException:
         print(f"run, {path.name}:\n{traceback.format_exc()}", file=sys.stderr)
         return "run: traceback"
     return "run: equal" if is_equal else "run: unequal"
+
+
+def _files(directory: Path) -> dict[Path, bytes]:
+    """Return the content of each file of a study except its lock."""
+    return {p: p.read_bytes() for p in directory.rglob("*") if p.is_file() and p.name != LOCK}

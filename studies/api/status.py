@@ -10,7 +10,7 @@ from statistics import fmean
 from ..presentation.progress import count, duration
 from ..spec.outline import StudyOutline, other_spec, outdated
 from ..store.store import Store
-from ..store.writer import look
+from ..store.writer import read_running
 from ..workers.runner import cores
 
 
@@ -52,7 +52,7 @@ def progress(store: Store) -> Progress:
     trials = store.planned()
     refusal = outdated(store)
     states = store.states()
-    now = look(store.directory)  # perhaps the process is of that other code
+    now = read_running(store.directory)
     begun = {} if now is None else now[1]
     pending = [trial for trial in trials if trial.identity not in states]
     running = [(t.condition, t.seed, begun[t.identity]) for t in pending if t.identity in begun]
@@ -118,7 +118,7 @@ def describe(store: Store, now: Progress) -> Iterator[str]:
     yield f"left     {now.left}{begun}"
     if now.seconds:
         yield f"time     about {duration(now.seconds)} with {count(now.processes, 'process', 'es')}"
-    if (remark := other_spec(store)) is not None:
+    if not store.is_older and (remark := other_spec(store)) is not None:
         yield f"spec     {remark}"
     if (versions := store.versions_of_code()) > 1:
         yield f"code     finished trials are of {versions} versions of the installed code"

@@ -19,7 +19,7 @@ from ..presentation.growth import growth_figures
 from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.analysis import identity_lines
+from ..results.analysis import Analysis, identity_lines
 from ..results.comparison import compare_conditions, missing_reference
 from ..results.notation import whole
 from ..results.results import Results, read
@@ -27,9 +27,8 @@ from ..results.scaling_law import columns_of
 from ..scalability.report import ScalabilityReport, analyze
 from ..spec.conditions import ConditionSettings
 from ..spec.controls import control_lines
-from ..spec.outline import StudyOutline, sources_of
+from ..spec.outline import StudyOutline, older_results, sources_of
 from ..spec.tables import SpecTable, dumps
-from ..store.database import RESULTS_VERSION
 from ..store.store import Store
 from ..workers.runner import installed
 from .pictures import hierarchy_pictures, pictures
@@ -68,16 +67,16 @@ def page(directory: Path) -> str:
         sources = sources_of(store)
         settings = store.settings()
         drawn = hierarchy_pictures(store)
+        older = older_results(store)
+        results_version = store.version
     with sources.active():
         analysis = analyse_as(outline.study, results)
         figures = dict(draw_figures(load_study(outline.study), analysis))
         scalability = _scalability(results, settings)
-    if outline.study == "scaling":
-        figures |= growth_figures(results)
-    notes = notes_of(analysis)
-    if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
-        notes = compare_conditions(results, results.main.name).notes  # with the identity lines
-    notes = (*missing_reference(results), *notes)
+    figures |= growth_figures(results) if outline.study == "scaling" else {}
+    notes = _notes(results, analysis)
+    if older is not None:
+        notes = (older, *notes)
     there = {label: own for label, own in settings.items() if label in results.conditions}
     table = tabulate(analysis.table)
     rate = main_title(table)
@@ -96,8 +95,7 @@ def page(directory: Path) -> str:
         notes=unfolded((*notes, *control_lines(there), *below_random(results, there))),
         table=table,
         pictures=pictures(dict(sorted(figures.items(), key=is_secondary))),
-        scalability=scalability,
-        panels=pictures({"scalability": scalability.figure()}, "panels") if scalability else [],
+        **scalability,
         replays=packed,
         topologies=topologies(outline),
         hierarchies=drawn,
@@ -105,14 +103,31 @@ def page(directory: Path) -> str:
         seeds=runs(outline.seeds),
         spec=dumps(outline.table),
         versions=versions(),
-        results_version=RESULTS_VERSION,
+        results_version=results_version,
         css=_read_own("page.css"),
         js=_read_own("page.js"),
         replay_js=Markup(packed.script),
     )
 
 
-def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> ScalabilityReport | None:
+def _notes(results: Results, analysis: Analysis) -> tuple[str, ...]:
+    """Return the notes of a study, or those of a comparison if it has none of its own."""
+    notes = notes_of(analysis)
+    if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
+        notes = compare_conditions(results, results.main.name).notes  # with the identity lines
+    return (*missing_reference(results), *notes)
+
+
+def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> dict[str, object]:
+    """Return what the page's section on scalability shows; nothing for a study of one team size."""
+    report = _scalability_report(results, settings)
+    panels = pictures({"scalability": report.figure()}, "panels") if report else []
+    return {"scalability": report, "panels": panels}
+
+
+def _scalability_report(
+    results: Results, settings: Mapping[str, SpecTable]
+) -> ScalabilityReport | None:
     """Return the scalability of a study with two or more team sizes; None of another study."""
     keys = {key for columns in columns_of(results).values() for key in columns}
     size = next((key for key in sorted(keys) if key.rpartition(".")[2] in SIZES), None)

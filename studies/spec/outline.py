@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ...core.plugins.sources import Sources, meaning
 from ...core.plugins.words import show
 from ..errors import SpecError
-from ..store.database import DATABASE, SPEC_FILE
+from ..store.database import DATABASE, RESULTS_VERSION, SPEC_FILE
 from ..store.durable import read_text
 from ..store.store import Store
 from .foreign_code import foreign_code, python_files
@@ -242,8 +242,20 @@ def _is_ours(name: str) -> bool:
     return name.partition("/")[0] in {pattern.partition("/")[0] for pattern in COMPUTING}
 
 
+def older_results(store: Store) -> str | None:
+    """Return one line if an older version has computed the results of a study, else None."""
+    if not store.is_older:
+        return None
+    return (
+        f"{store.directory / DATABASE}: holds results of version {store.version}, this is version "
+        f"{RESULTS_VERSION}: they are read without their checksums, and run does not continue them"
+    )
+
+
 def outdated(store: Store) -> str | None:
-    """Return why this code would not go on with a study, in one line; None if it would."""
+    """Return one line if this code does not continue a study, else None."""
+    if store.is_older:
+        return older_results(store)
     known = store.code()
     modules = changed(known, present(known, store.spec(), store.sources()))
     if not modules:

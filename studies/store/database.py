@@ -1,9 +1,4 @@
-"""The tables of a study's database, and what is noted in them before anything is run.
-
-SQLite notices a torn page but not a flipped digit. Each trial that was run therefore has a checksum
-of its rows, and what concerns the study as a whole has another one, in `meta`. The table `ledger`
-says how many trials have been run, so that none can be gone unnoticed.
-"""
+"""Tables of a study's database, and the description of the study in them."""
 
 import hashlib
 import json
@@ -21,13 +16,11 @@ DATABASE = "results.sqlite"
 SPEC_FILE = "study.toml"
 """Name of a study's own copy of its spec, beside it."""
 CHECKPOINTS = "checkpoints"
-"""Folder of what trials under way have come to, beside it."""
+"""Folder of the checkpoints of running trials, beside it."""
 
 
 class NoStudyError(SpecError):
-    """A directory holds no study, or only what a run left that was killed before it noted one."""
-
-    reason = None
+    """A directory holds no study, or its run was killed before it described the study."""
 
 
 def insert(connection: sqlite3.Connection, table: str, rows: list[tuple[object, ...]]) -> None:
@@ -38,7 +31,7 @@ def insert(connection: sqlite3.Connection, table: str, rows: list[tuple[object, 
 
 
 def quote(name: str) -> str:
-    """Return a name as SQL takes any name."""
+    """Return a name as a quoted SQL identifier."""
     return '"' + name.replace('"', '""') + '"'
 
 
@@ -46,19 +39,20 @@ RESULTS_VERSION = 5
 """Raise it when the code changes so that the same trial gives other results."""
 
 STAGE = "training:"
-"""With what the phase of a stage of a curriculum begins; the stage's name follows."""
+"""Prefix of the phase of a curriculum's stage, before the name of the stage."""
 EVALUATION = "evaluation:"
-"""With what the phase of an evaluation beside a trial's own begins; its name follows."""
+"""Prefix of the phase of a further evaluation, before its name."""
 
 BEFORE = ("phase", "episode", "steps")
-"""The columns of an episode before its measures."""
+"""Columns of an episode before its measures."""
 AFTER = ("return",)
-"""Those after them."""
+"""Columns of an episode after its measures."""
 
 SECONDS = ("decision", "physics", "sensors", "learning", "total")
+"""Timed parts of a trial."""
 
-OF_A_TRIAL = ("episodes", "seconds", "numbers", "checksums")
-"""The tables that hold what a trial measured, by its identity."""
+TABLES_OF_TRIALS = ("trials", "episodes", "seconds", "numbers", "checksums")
+"""Tables whose rows belong to a trial, by its identity."""
 
 SCHEMA = (
     "CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL)",
@@ -78,14 +72,12 @@ SCHEMA = (
         WITHOUT ROWID""",
     """CREATE TABLE IF NOT EXISTS checksums (
         identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE, sha256 TEXT NOT NULL)""",
-    "CREATE TABLE IF NOT EXISTS ledger (trials INTEGER NOT NULL)",
 )
-"""Tables that studies have alike; beside them are `conditions` and `episodes`, whose columns
-differ."""
+"""Tables that are equal in all studies; the columns of `conditions` and `episodes` differ."""
 
 
 class Planned(NamedTuple):
-    """A trial as it is noted before it is run."""
+    """A trial of a study, before it is run."""
 
     identity: str
     condition: str
@@ -96,63 +88,58 @@ class Planned(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyNotes:
-    """What a study is, in plain tables, texts and rows, as it is noted before anything is run."""
+    """Description of a study in plain tables, texts and rows, written before anything is run."""
 
     spec: Mapping[str, Any]
     """The spec as a table."""
     conditions: Mapping[str, Any]
     """The settings of each condition, by label."""
     columns: Mapping[str, Mapping[str, Any]]
-    """What tells each condition from the others, by label; all have the same keys."""
+    """The swept keys of each condition, by label; all have the same keys."""
     sources: Mapping[str, str]
-    """The texts of the files of users that it names, by name."""
+    """Texts of the users' files that the spec names, by name."""
     measures: Sequence[Measure] = ()
-    """What it measures of its episodes."""
+    """Measures of an episode."""
     planned: Sequence[Planned] = ()
-    """All its trials."""
+    """All trials of the study."""
     code: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """By module, two digests of the code that computes what is added."""
+    """Two digests of the installed code, by module."""
 
     @property
     def code_digest(self) -> str:
-        """One short digest of what all modules mean."""
+        """One short digest of all modules."""
         text = "".join(f"{name} {tree} " for name, (_, tree) in sorted(self.code.items()))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def columns(measures: Iterable[Measure]) -> tuple[str, ...]:
-    """Return the columns of an episode: where it stands, its measures, its return."""
+    """Return the columns of an episode: phase and length, its measures, its return."""
     return (*BEFORE, *(measure.name for measure in measures), *AFTER)
 
 
 def tables(measures: Iterable[Measure]) -> list[dict[str, Any]]:
-    """Return measures as tables, fit for JSON."""
+    """Return measures as tables for JSON."""
     return [asdict(measure) for measure in measures]
 
 
 def measures_from(tables: Iterable[Mapping[str, Any]]) -> tuple[Measure, ...]:
-    """Return what `tables` was given.
+    """Return the measures that `tables` converted.
 
     Raises
     ------
     TypeError
-        If the tables are of something else.
+        If a table does not describe a measure.
     """
     return tuple(Measure(**table) for table in tables)
 
 
-def is_empty(db: sqlite3.Connection) -> bool:
-    """Tell whether a database has no tables."""
-    return db.execute("SELECT 1 FROM sqlite_master").fetchone() is None
-
-
 def prepare(db: sqlite3.Connection, notes: StudyNotes) -> None:
-    """Make the tables, and note what the study is and what computes it; within a transaction."""
+    """Create the tables and describe the study and its code, within a transaction."""
     swept = [quote(key) for key in next(iter(notes.columns.values()))]
     definitions = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
     for statement in SCHEMA:
         db.execute(statement)
-    # A measure is NULL where a scenario has it not.
+    # A measure is NULL where a scenario does not have it.
     kinds = ((quote(m.name), "INTEGER" if m.is_rate else "REAL") for m in notes.measures)
     measured = "".join(f"{name} {kind}, " for name, kind in kinds)
     db.execute(
@@ -186,5 +173,3 @@ def prepare(db: sqlite3.Connection, notes: StudyNotes) -> None:
     meta |= {"sources": notes.sources, "code": notes.code}
     insert(db, "meta", [(key, json.dumps(value)) for key, value in meta.items()])
     insert(db, "meta", [("sha256", study_checksum(db))])
-    if db.execute("SELECT 1 FROM ledger").fetchone() is None:
-        db.execute("INSERT INTO ledger VALUES (0)")

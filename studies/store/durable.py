@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, and recordings kept in them."""
+"""Atomic files, and files of recordings."""
 
 import errno
 import hashlib
@@ -19,40 +19,39 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Recording = dict[str, "NDArray[Any]"]
-"""Arrays of one episode of T steps by name: what the scenario's ``recorded`` names, each
-``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if agents are rewarded one by one; what its
-``constants_of_episode`` returns; and ``messages_fail`` ``(T + 1, n)``, whose messages fail, if any
-are to."""
+"""Arrays of one episode of T steps by name: those that the scenario's ``recorded`` names, each
+``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if each agent has its own reward; those that
+its ``constants_of_episode`` returns; and ``messages_fail`` ``(T + 1, n)`` if messages can fail."""
 
 TEAM = "team"
-"""The name of what is kept of a trained team, beside those of recorded episodes."""
+"""Name of a trained team's arrays, beside the names of recorded episodes."""
 
 
 Place = str | os.PathLike[str]
-"""Of a file."""
+"""Path of a file."""
 
 
 class NotRecordedError(SpecError):
-    """A file of recordings is sound, and holds none of this name."""
+    """An undamaged file of recordings holds none of this name."""
 
 
-MOST_BYTES = 2**30
-"""Of a file that is read whole."""
+MAX_FILE_BYTES = 2**30
+"""Maximum size of a file that is read as a whole."""
 
 
 def check_file(path: Place) -> None:
-    """Refuse what has no end or makes its reader wait: a pipe, a device, a file of a terabyte.
+    """Refuse a pipe, a socket, a device and a huge file, whose reader would wait or never end.
 
     Raises
     ------
     OSError
-        If it is such, or is not there.
+        If it is one of these, or does not exist.
     """
     status = os.stat(path)
     if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
         raise OSError(errno.EINVAL, "is a pipe, a socket or a device, not a file", str(path))
-    if status.st_size > MOST_BYTES:
-        raise OSError(errno.EFBIG, f"is larger than allowed, {MOST_BYTES} bytes", str(path))
+    if status.st_size > MAX_FILE_BYTES:
+        raise OSError(errno.EFBIG, f"is larger than allowed, {MAX_FILE_BYTES} bytes", str(path))
 
 
 def read_bytes(path: Place) -> bytes:
@@ -61,7 +60,7 @@ def read_bytes(path: Place) -> bytes:
     Raises
     ------
     OSError
-        If it is none, see `check_file`, or cannot be read.
+        If it is refused by `check_file`, or cannot be read.
     """
     check_file(path)
     with open(path, "rb", buffering=0) as file:
@@ -69,30 +68,30 @@ def read_bytes(path: Place) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a file in UTF-8; a mark of the order of bytes is left out.
+    """Return the text of a file in UTF-8 without a byte-order mark.
 
     Raises
     ------
     OSError
-        If it is none, see `check_file`, or cannot be read.
+        If it is refused by `check_file`, or cannot be read.
     UnicodeDecodeError
-        If it is no such text.
+        If it is not UTF-8.
     """
     check_file(path)
     return path.read_text(encoding="utf-8-sig")
 
 
 def write(path: Path, content: bytes) -> None:
-    """Replace a file so that, whenever power fails, it holds the old or the new content."""
+    """Replace a file. If power fails, it holds either the old or the new content."""
     with replacing(path) as file:
         file.write(content)
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Write a file that takes the place of `path` when the context ends without an error.
+    """Write a file that replaces `path` when the context ends without an error.
 
-    Several processes may do so at once: the last one's stays.
+    If several processes write at once, the last one wins.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
@@ -105,9 +104,9 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         with suppress(OSError):
             temporary.unlink()
         if isinstance(error, OSError) and error.filename in (None, str(temporary)):
-            error.filename = str(path)  # no other name means anything to the user
+            error.filename = str(path)  # the user does not know the temporary name
         raise
-    if sys.platform != "win32":  # which opens no folders
+    if sys.platform != "win32":  # which cannot open folders
         folder = os.open(path.parent, os.O_RDONLY)
         try:
             os.fsync(folder)
@@ -116,14 +115,14 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str | None:
-    """Write recordings by name to an ``.npz`` file; return the SHA-256 of its content.
+    """Write recordings by name to an ``.npz`` file and return the SHA-256 of its content.
 
-    Without any arrays nothing is written, and None returned.
+    Without any arrays, write nothing and return None.
     """
     arrays = {f"{name}/{key}": a for name, r in recordings.items() for key, a in r.items()}
     if not arrays:
         return None
-    import numpy as np  # takes its time, for which no command that only reads rows has to wait
+    import numpy as np  # slow to import, and commands that read rows do not need it
 
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
@@ -133,7 +132,7 @@ def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str | N
 
 
 def sha256(path: Place) -> str | None:
-    """Return the SHA-256 of a file; none if it cannot be read."""
+    """Return the SHA-256 of a file; None if it cannot be read."""
     try:
         return hashlib.sha256(read_bytes(path)).hexdigest()
     except OSError:
@@ -146,18 +145,18 @@ def read_recording(path: Path, name: str, digest: str | None = None) -> Recordin
     Parameters
     ----------
     path
-        Of the file.
+        Path of the file.
     name
-        Of the recording.
+        Name of the recording.
     digest
-        SHA-256 that the file must have, if that is known.
+        Expected SHA-256 of the file; None: unknown.
 
     Raises
     ------
     SpecError
-        If the file is not there or damaged.
+        If the file is missing or damaged.
     NotRecordedError
-        If it holds no such recording.
+        If it holds no recording of this name.
     """
     import numpy as np
 

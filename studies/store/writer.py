@@ -1,4 +1,4 @@
-"""Who writes to the directory of a study: one process at a time, and which trials it runs."""
+"""Lock of a study's directory, and the trials that its owner is running."""
 
 import json
 import os
@@ -14,19 +14,21 @@ from . import durable
 from .connection import NO_LOCKS, NoLocksError
 
 LOCK = ".lock"
-"""Name of the file whose lock is held by whoever writes."""
+"""Name of the file whose lock the writing process holds."""
 MARK = "running.json"
-"""Name of the file that tells what is running."""
+"""Name of the file that lists the running trials."""
+LOCK_WAITS_S = (0.05, 0.1, 0.0)
+"""Wait after each attempt to take the lock, which a reader holds for an instant [s]."""
 
 
 @contextmanager
 def lock_directory(directory: Path) -> Iterator[None]:
-    """Keep others from writing to a directory, which is made if it does not exist.
+    """Keep other processes from writing to a directory, which is created if necessary.
 
     Raises
     ------
     SpecError
-        If it cannot be made or written, or another process is writing to it.
+        If it cannot be created or written, or another process is writing to it.
     """
     try:
         for folder in (directory, directory / "recordings"):
@@ -42,8 +44,8 @@ def lock_directory(directory: Path) -> Iterator[None]:
 
 
 def _take(lock: TextIO, directory: Path) -> None:
-    """Take the lock of a directory; it is not waited for, but for a look at it."""
-    for wait in (0.05, 0.1, 0.0):
+    """Take the lock of a directory without waiting for another writer."""
+    for wait in LOCK_WAITS_S:
         try:
             locks.lock(lock)
             return
@@ -55,49 +57,51 @@ def _take(lock: TextIO, directory: Path) -> None:
 
 
 class Running(AbstractContextManager["Running"]):
-    """Marks a study as running for as long as its context lasts.
+    """Marks a study as running while its context lasts.
 
     Parameters
     ----------
     directory
-        Of the study, whose lock this process holds.
+        Directory of the study, whose lock this process holds.
     processes
-        How many trials run at a time.
+        Number of trials that run at a time.
     """
 
     def __init__(self, directory: Path, processes: int) -> None:
         self._path = directory / MARK
         self._processes = processes
-        self._begun: dict[str, float] = {}
+        self._started: dict[str, float] = {}
 
     def __exit__(self, *_: object) -> None:
-        self._begun.clear()
+        self._started.clear()
         self._write()
 
-    def begin(self, identity: str) -> None:
-        """Note that a trial has been handed to a worker."""
-        self._begun[identity] = time.time()
+    def start(self, identity: str) -> None:
+        """Record that a worker has received a trial."""
+        self._started[identity] = time.time()
         self._write()
 
     def end(self, identity: str) -> None:
-        """Forget a trial that has come back; who looks counts what is done as done."""
-        self._begun.pop(identity, None)
+        """Forget a trial that has ended."""
+        self._started.pop(identity, None)
 
     def _write(self) -> None:
         temporary = self._path.with_name(f".{MARK}.new")
-        # Not worth an fsync, nor an error if the disk is full.
+        # A full disk is no error here, and nothing needs an fsync.
         with suppress(OSError):
-            temporary.write_text(json.dumps({"processes": self._processes, "begun": self._begun}))
+            temporary.write_text(
+                json.dumps({"processes": self._processes, "started": self._started})
+            )
             os.replace(temporary, self._path)
 
 
-def look(directory: Path) -> tuple[int, dict[str, float]] | None:
-    """Return what is running in the directory of a study; None if nothing is.
+def read_running(directory: Path) -> tuple[int, dict[str, float]] | None:
+    """Return the running trials of a study; None if nobody runs it.
 
     Returns
     -------
     tuple
-        How many trials run at a time, and by identity how long each has been running so far [s].
+        Number of trials that run at a time, and how long each has been running by identity [s].
     """
     try:
         durable.check_file(directory / LOCK)
@@ -105,13 +109,15 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
             locks.lock(lock, shared=True)
         return None
     except BlockingIOError:
-        pass  # somebody writes there
+        pass  # another process writes there
     except OSError:
         return None
     try:
         mark = json.loads(durable.read_text(directory / MARK))
         now = time.time()
-        seconds = {identity: max(now - begun, 0.0) for identity, begun in mark["begun"].items()}
+        seconds = {
+            identity: max(now - started, 0.0) for identity, started in mark["started"].items()
+        }
         return mark["processes"], seconds
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return 1, {}  # begins or ends just now
+        return 1, {}  # is just starting or ending

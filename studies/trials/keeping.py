@@ -12,11 +12,10 @@ from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ...core.plugins.words import closest, show
 from ...core.shell import command_line
 from ..errors import SpecError
-from ..spec.outline import Code, outdated, present, sources_of
+from ..spec.outline import Code, older_results, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import SpecTable, aliases, dumps, flat, named
-from ..store.connection import DamageError
-from ..store.database import DATABASE, SPEC_FILE, NoStudyError, Planned, StudyNotes
+from ..store.database import DATABASE, RESULTS_VERSION, SPEC_FILE, NoStudyError, StudyNotes
 from ..store.durable import read_text
 from ..store.store import Store
 from ..store.writer import lock_directory
@@ -67,21 +66,22 @@ def open_to_run(
         If it cannot be written, holds a study that differs by more than additional seeds, or
         another process is writing to it. Nothing has been changed then.
     """
-    notes = notes_of(spec, measures, trials)
-    _examine(directory, spec, notes, accept_code=accept_code)  # what is refused leaves nothing
+    notes = notes_of(spec, measures)
+    _examine(directory, spec, notes, accept_code=accept_code)  # a refusal leaves nothing behind
     with lock_directory(directory):
-        # Again: nobody else writes from here on.
-        damage, code, before = _examine(directory, spec, notes, accept_code=accept_code)
+        # Again, because another process may have written meanwhile.
+        code, planned = _examine(directory, spec, notes, accept_code=accept_code)
+        chosen = planned | {trial.identity for trial in trials}
         computed = replace(
             notes,
             code=present(code, notes.spec, notes.sources),
-            planned=[*notes.planned, *_planned_before(spec, trials, before)],
+            planned=[trial.planned for trial in trials_of(spec) if trial.identity in chosen],
         )
         copies = spec.sources.texts.items()  # to be read and run again, as is the spec
         files = {f"{FOLDER}/{kept_name(name)}": text.encode() for name, text in copies}
         if not is_copy(directory / SPEC_FILE, spec, notes):
             files[SPEC_FILE] = dumps(spec.table()).encode()
-        with Store.create(directory, computed, files, damage) as store:
+        with Store.create(directory, computed, files) as store:
             yield store
 
 
@@ -105,9 +105,10 @@ def finished_trial(store: Store, condition: str | None, seed: int | None) -> Tri
     Raises
     ------
     SpecError
-        If there is no such condition or seed, the trial has not finished, or what is kept of it is
-        not as it was written.
+        If there is no such condition or seed, the trial has not finished, its results are damaged,
+        or an older results version has computed them.
     """
+    _check_version(store)
     spec = spec_of(store)
     known = {c.label: aliases(c.label, c.columns) for c in spec.conditions()}
     label = next(iter(known)) if condition is None else named(condition, known)
@@ -124,7 +125,8 @@ def finished_trial(store: Store, condition: str | None, seed: int | None) -> Tri
 
 
 def check_teams(store: Store, identities: Container[str] = ()) -> None:
-    """Refuse a study that keeps no teams, or not those of some trials as they were written."""
+    """Raise if a study keeps no teams, or the teams of some trials are damaged or older."""
+    _check_version(store)
     if not store.spec().get("keep_teams"):
         raise SpecError(f"{store.directory}: keeps no teams: its spec has no keep_teams = true")
     for identity, line in store.damage().items():
@@ -132,67 +134,69 @@ def check_teams(store: Store, identities: Container[str] = ()) -> None:
             raise SpecError(f"{line}; {command_line('run')} runs it again")
 
 
-def notes_of(
-    spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Trial] = ()
-) -> StudyNotes:
-    """Return what a store notes of a study."""
+def _check_version(store: Store) -> None:
+    """Raise if another version has trained the teams of a study, which might act differently."""
+    if store.is_older:
+        raise SpecError(
+            f"{store.directory / DATABASE}: holds results of version {store.version}, this is "
+            f"version {RESULTS_VERSION}: tables and reports can read them, but its teams and "
+            "recordings are not used"
+        )
+
+
+def notes_of(spec: Spec, measures: Sequence[Measure] = ()) -> StudyNotes:
+    """Return the description of a study without its trials and code."""
     return StudyNotes(
         spec=json.loads(json.dumps(spec.table())),
         conditions={c.label: c.settings.model_dump(mode="json") for c in spec.conditions()},
         columns={c.label: c.columns for c in spec.conditions()},
         sources=spec.sources.texts,
         measures=measures,
-        planned=[trial.planned for trial in trials],
-    )
-
-
-def _planned_before(
-    spec: Spec, trials: Sequence[Trial], before: Sequence[Planned]
-) -> list[Planned]:
-    """Return which other trials of a study it was planned with `before`."""
-    others = {planned.identity for planned in before} - {trial.identity for trial in trials}
-    return (
-        [trial.planned for trial in trials_of(spec) if trial.identity in others] if others else []
     )
 
 
 def _examine(
     directory: Path, spec: Spec, notes: StudyNotes, *, accept_code: bool
-) -> tuple[str | None, Code | None, Sequence[Planned]]:
-    """Return what is wrong with a directory's database as a whole, its code and its plan.
+) -> tuple[Code | None, set[str]]:
+    """Return the code and the planned trials of the study in a directory, if it is the same study.
 
     Parameters
     ----------
     directory
         The directory.
     spec, notes
-        The study that is to be run in it, and what would be noted of it.
+        The study that is to be run in it, and its description.
     accept_code
-        Whether to go on although the installed code has changed.
+        Whether to continue although the installed code has changed.
 
     Raises
     ------
     SpecError
-        If the directory holds another study, or something that is none.
+        If the directory holds another study, a damaged one, or other files.
     """
-    damage: str | None = None
-    code: Code | None = None
-    planned: Sequence[Planned] = ()
     try:
         with Store.open(directory) as store:
-            mismatch = _mismatch_of_study(store, spec, notes, accept_code)
+            refusal = older_results(store) if accept_code else outdated(store)
+            if refusal is not None:
+                raise SpecError(refusal)
+            _check_same(store, spec, notes)
+            planned = {trial.identity for trial in store.planned()}
             code = store.code()
-            planned = store.planned()
-    except (NoStudyError, DamageError) as error:
-        damage = error.reason
-        mismatch = _mismatch_of_file(directory / SPEC_FILE, spec, notes, damage)
-    if mismatch is not None:
-        raise SpecError(f"{directory}: holds another study: {mismatch}")
-    return damage, code, planned
+    except NoStudyError:
+        copy = directory / SPEC_FILE
+        if copy.exists() and not is_copy(copy, spec, notes):
+            raise SpecError(f"{copy}: is in the way of this study's own copy") from None
+        return None, set()
+    if planned - {trial.identity for trial in trials_of(spec)}:
+        raise SpecError(
+            f"{directory}: holds trials that are not of this spec, as after a change of Python's "
+            "version; use another directory"
+        )
+    return code, planned
 
 
 def is_copy(path: Path, spec: Spec, notes: StudyNotes) -> bool:
-    """Tell whether a file holds a spec; what the spec names of users' files is not read again."""
+    """Return whether a file holds a spec; the users' files that it names are not read again."""
     try:
         table = tomllib.loads(read_text(path))
         return table == notes.spec or Spec.of(table, spec.sources) == spec
@@ -200,35 +204,18 @@ def is_copy(path: Path, spec: Spec, notes: StudyNotes) -> bool:
         return False
 
 
-def _mismatch_of_file(path: Path, spec: Spec, notes: StudyNotes, damage: str | None) -> str | None:
-    """Return how a spec differs from that of a file, where there is no sound database."""
-    if not path.exists() or is_copy(path, spec, notes):
-        return None
-    if damage is None:
-        raise SpecError(f"{path}: is in the way of this study's own copy") from None
-    try:
-        return difference(notes_of(Spec.load(path)), notes)
-    except SpecError as error:
-        raise SpecError(
-            f"{path}: is no spec, and {DATABASE} beside it is damaged: which study this is cannot "
-            f"be told ({error})"
-        ) from None
-
-
-def _mismatch_of_study(
-    store: Store, spec: Spec, notes: StudyNotes, accept_code: bool
-) -> str | None:
-    """Return how a spec differs from that of an open study."""
-    if not accept_code and (refusal := outdated(store)) is not None:
-        raise SpecError(refusal)
+def _check_same(store: Store, spec: Spec, notes: StudyNotes) -> None:
+    """Raise if a spec differs from that of an open study by more than additional seeds."""
     mismatch = difference(store.study_notes(), notes)
+    if mismatch is None:
+        return
     copy = store.directory / SPEC_FILE
-    if mismatch is not None and is_copy(copy, spec, notes):
+    if is_copy(copy, spec, notes):
         raise SpecError(
             f"{copy}: is not the spec of the study beside it: {mismatch}; if you did not edit it, "
             f"it is damaged: {command_line('retry', store.directory)} continues from the database"
         )
-    return mismatch
+    raise SpecError(f"{store.directory}: holds another study: {mismatch}")
 
 
 def difference(old: StudyNotes, new: StudyNotes) -> str | None:

@@ -206,7 +206,7 @@ def run_trials(
     lost: list[Trial] = []
     with Running(store.directory, workers.processes) as running:
         again = (_alone(trial, run_trial, workers, running) for trial in lost)
-        arrivals = workers.arrivals(trials, run_trial, running.begin, running.end)
+        arrivals = workers.arrivals(trials, run_trial, running.start, running.end)
         with closing(arrivals) as arriving:
             for outcome in chain(arriving, again):
                 if outcome.lost:
@@ -218,7 +218,7 @@ def run_trials(
 
 def _alone(trial: Trial, run_trial: RunTrial, workers: Workers[F], running: Running) -> Outcome:
     for _ in range(ATTEMPTS):
-        arrivals = workers.arrivals([trial], run_trial, running.begin, running.end)
+        arrivals = workers.arrivals([trial], run_trial, running.start, running.end)
         with closing(arrivals) as arriving:
             (outcome,) = arriving
         if not outcome.lost:

@@ -6,9 +6,8 @@ import pytest
 from nested_agents.studies.api.status import _estimate, progress
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec import outline
-from nested_agents.studies.store import database
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.store.writer import LOCK, MARK, Running, look
+from nested_agents.studies.store.writer import LOCK, MARK, Running, read_running
 from nested_agents.studies.workers.runner import save
 
 
@@ -34,8 +33,8 @@ def test_between_two_runs_everything_unfinished_is_left(study):
 
 def test_what_a_run_has_handed_out_is_running(study):
     with made_up.opened(study) as store, Running(study, 3) as running:
-        assert look(study)[1] == {}
-        running.begin(made_up.TRIALS[5].identity)
+        assert read_running(study)[1] == {}
+        running.start(made_up.TRIALS[5].identity)
         now = read(study)
         assert (now.done, now.left, now.processes) == (4, 1, 3)
         ((condition, seed, seconds),) = now.running
@@ -44,9 +43,9 @@ def test_what_a_run_has_handed_out_is_running(study):
         save(store, made_up.TRIALS[5], made_up.measure(made_up.TRIALS[5]), 4.0)
         assert read(study).running == ()
         running.end(made_up.TRIALS[5].identity)
-        running.begin(made_up.TRIALS[4].identity)
-        assert [*look(study)[1]] == [made_up.TRIALS[4].identity]
-    assert look(study) is None
+        running.start(made_up.TRIALS[4].identity)
+        assert [*read_running(study)[1]] == [made_up.TRIALS[4].identity]
+    assert read_running(study) is None
 
 
 def test_a_mark_that_outlived_its_process_is_passed_over(study):
@@ -66,7 +65,7 @@ def test_a_mark_that_cannot_be_read_does_no_harm(study, content):
 
 def test_looking_does_not_keep_a_run_from_beginning(study):
     for _ in range(10):
-        look(study)
+        read_running(study)
         with made_up.opened(study):
             pass
 
@@ -94,20 +93,11 @@ def test_what_other_code_has_done_is_done(study, monkeypatch, capsys):
     assert "done     4 of 6 trials" in text
     assert "nothing can be added: " in text
     with made_up.opened(study, accept_code=True), Running(study, 3) as running:
-        running.begin(made_up.TRIALS[5].identity)
+        running.start(made_up.TRIALS[5].identity)
         assert main(["status", str(study)]) == 0
     text = capsys.readouterr().out
     assert "running  1\n         frozen, seed 2, for" in text
     assert "left     1\n" in text
-
-
-def test_a_study_of_another_version_is_refused(study, monkeypatch, capsys):
-    monkeypatch.setattr(database, "RESULTS_VERSION", 99)
-    for command in (["status"], ["status", "--watch"]):
-        assert main([*command, str(study)]) == 2
-        error = capsys.readouterr().err
-        assert "this is version 99; an older nested-agents reads it" in error
-        assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,6 @@ from nested_agents.studies.explain import team as explain
 from nested_agents.studies.explain import text as explain_text
 from nested_agents.studies.explain.team import labels, rules_table, take_apart
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store import database
 from nested_agents.studies.store.database import DATABASE, RESULTS_VERSION
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import finished_trial
@@ -153,11 +152,11 @@ def changed(study, tmp_path, statement):
     return copy
 
 
-def test_results_of_another_version_are_refused(study, monkeypatch, capsys):
-    monkeypatch.setattr(database, "RESULTS_VERSION", 99)
-    status, said = run(capsys, study)
+def test_results_of_an_older_version_are_refused(study, tmp_path, capsys):
+    statement = "UPDATE meta SET value = '1' WHERE key = 'results_version'"
+    status, said = run(capsys, changed(study, tmp_path, statement))
     assert status == 2
-    assert f"holds results of version {RESULTS_VERSION}, this is version 99" in said.err
+    assert f"holds results of version 1, this is version {RESULTS_VERSION}" in said.err
 
 
 def test_another_team_than_the_one_that_was_measured_is_not_explained(study, monkeypatch):

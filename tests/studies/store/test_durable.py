@@ -9,7 +9,9 @@ import sys
 import made_up
 import pytest
 
+from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.report import page
 from nested_agents.studies.store import durable
 from nested_agents.studies.store.database import DATABASE, SPEC_FILE
 from nested_agents.studies.store.writer import LOCK
@@ -97,7 +99,11 @@ def test_a_file_of_a_study_that_is_none_is_told_or_not_needed(make, name, study,
 
 
 @pytest.mark.parametrize("make", [pipe, huge])
-def test_a_recording_that_is_no_file_is_damaged_and_never_waited_for(make, study, capsys):
+def test_a_recording_that_is_no_file_is_damaged_and_never_waited_for(
+    make, study, capsys, monkeypatch
+):
+    monkeypatch.setattr(learning_curve, "draw", lambda analysis: {})
+    monkeypatch.setattr(page, "hierarchy_pictures", lambda store: [])
     for recording in (study / "recordings").glob("*.npz"):
         make(recording)
     assert main(["report", str(study)]) == 0
