@@ -11,9 +11,6 @@ from typing import Self
 
 import numpy as np
 
-from ..adaptation.foresight import Foresight
-from ..adaptation.predictors import GivenPredictor, Mirror
-from ..evaluators.evaluator import NOBODY, NOTHING_GIVEN, Aggregation, Deliberation, Evaluator
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox, is_fully_communicating
 from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
@@ -22,7 +19,10 @@ from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
 from ..learners.learner import LearnerSettings
+from ..models.predictors import GivenPredictor, Mirror
+from ..models.team_model import TeamModel
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
+from ..search.evaluator import NOBODY, NOTHING_GIVEN, Aggregation, DecisionContext, Evaluator
 from .plain import as_explorer, as_learner
 from .valuing import Present, evaluator_of, is_private
 from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
@@ -52,7 +52,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         Chooses actions by their values.
     evaluator
         Search that evaluates actions; None if actions are drawn at random.
-    foresight
+    model
         Predictor, with self-model and calibration.
     mirror
         Adds mirror images to experience; None if experience is not mirrored.
@@ -83,7 +83,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
                 f"learner.predictor.kind = {settings.predictor.kind!r}: learner.kind = "
                 f"{settings.kind!r} decides without a prediction"
             )
-        self.foresight = Foresight(
+        self.model = TeamModel(
             settings.predictor, settings.self_model, settings.calibration, scenario
         )
         if settings.is_mirrored and not context.is_whole:
@@ -111,9 +111,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.is_private:
             n_rules = self.learner.theta.shape[1]
             plans = isinstance(self.evaluator, Aggregation) and self.evaluator.plans
-            self.views = Views(
-                settings, context, self._row_of, n_rules, self.foresight, plans=plans
-            )
+            self.views = Views(settings, context, self._row_of, n_rules, self.model, plans=plans)
             self.costs = self.views.costs
         self.explorer = as_explorer(settings.exploration.build(n))
         self.rng = np.random.Generator(np.random.PCG64(context.seed))
@@ -173,7 +171,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         rule = self.settings.decision.rule
         if self.evaluator is None or rule == "value":
             return
-        prediction = self.foresight.predict(seen)
+        prediction = self.model.predict(seen)
         neutral = np.full(len(self.hierarchy), self.action_set.neutral)
         if prediction is None or prediction.rewards(neutral[None]) is None:
             raise ValueError(
@@ -196,7 +194,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self._n_told:  # columns for received actions, which `act` fills in
             missing = np.full((len(left), self._n_told), float(len(self.action_set)))
             left = np.hstack([left, missing])
-        prediction = None if self.settings.values_actions else self.foresight.predict(seen)
+        prediction = None if self.settings.values_actions else self.model.predict(seen)
         theta = self.learner.theta
         shared = UNPREDICTED if prediction is None else prediction
         return FuzzyInputs(
@@ -214,7 +212,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         exploring = self.explorer.exploring if inputs.explore else NOT_EXPLORING
         if self.evaluator is None or exploring is None:
             return None
-        first = Deliberation(
+        first = DecisionContext(
             agent=self.hierarchy.order[0],
             joint_action=self._neutral.copy(),
             prediction=inputs.prediction,
@@ -263,7 +261,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             given = self.given[agent] / self.given[agent].sum(axis=2, keepdims=True)
         view = inputs.views.get(agent) or OwnView(inputs.prediction, inputs.weights)
         values = self.evaluator.values(
-            Deliberation(
+            DecisionContext(
                 agent=agent,
                 joint_action=known,
                 prediction=view.prediction,
@@ -331,7 +329,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     def learn(self, experience: Experience, inputs: FuzzyInputs) -> None:
         """Update predictor and weights; after the last step, also learn from the episode."""
-        self.foresight.learn(experience, inputs.prediction)
+        self.model.learn(experience, inputs.prediction)
         transition = experience.transition
         states = transition.states
         reward = transition.reward
@@ -359,7 +357,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
     def end_episode(self) -> None:
         """Make the updates that follow an episode."""
         self.count(self.learner.end_episode())
-        self.foresight.end_episode()
+        self.model.end_episode()
 
     def count(self, updates: int) -> None:
         """Count changed weights."""
@@ -397,7 +395,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             self.seen[agent] = former.seen[alike].mean(axis=0)
         if self.given.shape == former.given.shape:
             self.given = former.given.copy()
-        self.foresight.continue_from(former.foresight)
+        self.model.continue_from(former.model)
 
     def state_dict(self) -> StateDict:
         """Return the saved state."""
@@ -409,7 +407,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.given.size:
             memory["given"] = self.given
         memory |= {f"learner.{key}": array for key, array in self.learner.arrays().items()}
-        for name, part in self.foresight.adaptive.items():
+        for name, part in self.model.adaptive.items():
             memory |= {f"{name}.{key}": array for key, array in part.arrays().items()}
         return memory
 
@@ -440,5 +438,5 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.given.size:
             self.given = state["given"].copy()
         self.learner.restore(select_prefix("learner.", state))
-        for name, part in self.foresight.adaptive.items():
+        for name, part in self.model.adaptive.items():
             part.restore(select_prefix(f"{name}.", state))

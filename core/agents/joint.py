@@ -22,7 +22,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..interface.plain import as_prediction, as_scenario
+from ..interface.plain import as_prediction
 from ..interface.prediction import (
     Blocks,
     EmbodiedPrediction,
@@ -30,7 +30,7 @@ from ..interface.prediction import (
     Tables,
     rewards_of,
 )
-from ..interface.scenario import Embodiment, Scenario, Transition
+from ..interface.scenario import Embodiment, Scenario, Transition, checked_scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 
@@ -48,7 +48,7 @@ def join_agents(scenario: object, agents: Granularity) -> Scenario:
     ValueError
         If `joint_blocks` refuses the granularity; one line.
     """
-    checked = as_scenario(scenario)
+    checked = checked_scenario(scenario)
     return checked if agents == "actuator" else JointAgents(checked, agents)
 
 

@@ -17,8 +17,7 @@ from time import perf_counter
 import numpy as np
 
 from ..interface.experience import Experience, Observation
-from ..interface.plain import as_scenario
-from ..interface.scenario import Transition, checked_transition
+from ..interface.scenario import Transition, checked_scenario, checked_transition
 from ..numerics import FloatArray, IntArray
 from ..plugins.words import expect
 from .team import Team
@@ -76,31 +75,32 @@ def control_loop(
     Parameters
     ----------
     scenario, team
-        The world and those who act in it; both are modified.
+        Environment and team; both are modified.
     episodes, steps
-        How many episodes, and how many steps each may take.
+        Number of episodes, and maximum number of steps of an episode.
     seed
-        Seed of the worlds, see `world_seed`.
+        Seed of the environments, see `world_seed`.
     first_episode
-        Number of the first episode: a run can be continued with a restored team.
+        Number of the first episode, to continue a run with a saved team.
     first_world
-        Number of its world, see `world_seed`; None: the same.
+        Number of the environment of the first episode, see `world_seed`; by default
+        `first_episode`.
     learn
-        Whether the team learns, or is evaluated.
+        Whether the team learns.
     explore
-        Whether it explores; None: if it learns.
+        Whether the team explores; by default it does if it learns.
 
     Raises
     ------
     ValueError
-        If the scenario does not predict what the team decides by, see `Team.check`, or its states
-        or rewards cannot be learned from, see `checked_transition`.
+        If the scenario lacks a prediction that the team requires, see `Team.check`, or returns
+        invalid states or rewards, see `checked_transition`.
     """
     expect("a team", Team, team=team)
     expect("whole numbers", Integral, episodes=episodes, steps=steps, seed=seed)
     first_world = first_episode if first_world is None else first_world
     explore = learn if explore is None else explore
-    world = as_scenario(scenario)
+    world = checked_scenario(scenario)
     space = world.state_space
     for k in range(episodes):
         episode = first_episode + k

@@ -21,7 +21,7 @@ from ..interface.scenario import Scenario
 from ..learners import LEARNERS
 from ..learners.learner import MembersOf, TeamSettings
 from ..plugins.registry import Plugged
-from ..plugins.settings import Names, Settings, unwritten
+from ..plugins.settings import Names, Settings
 from .joint import body_of
 
 
@@ -32,7 +32,7 @@ class PartOfTeam(Settings):
     """Agents by name, role, body or level (``level1``), or a pattern of these; one or a list."""
     learner: Annotated[TeamSettings, Plugged(LEARNERS)]
     """Settings of the agents, like those of a whole team."""
-    team: Annotated[str | None, unwritten(None)] = None
+    team: str | None = None
     """File ``.npz`` of `Team.save` with the initial weights of the agents; of a team with several
     parts, those of the part in the same position. By default the agents are untrained."""
 

@@ -13,13 +13,13 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field
 
-from ..decision.exploration import no_way_on
 from ..hierarchy.stages import Inbox
 from ..interface.agents import AgentContext, Agents, StateDict
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Transition
 from ..learners.learner import CORE, TeamSettings
 from ..numerics import AnyArray, FloatArray, IntArray
+from ..search.exploration import no_way_on
 
 
 class PeerSettings(TeamSettings):

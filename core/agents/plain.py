@@ -11,12 +11,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..decision.exploration import Explorer, no_way_on
-from ..evaluators.evaluator import Deliberation, Evaluator
 from ..interface.agents import Counts
-from ..interface.plain import offered
 from ..learners.learner import Learner
 from ..numerics import FloatArray, IntArray
+from ..search.evaluator import DecisionContext, Evaluator
+from ..search.exploration import Explorer, no_way_on
 
 
 def as_learner(thing: Any) -> Learner:
@@ -92,7 +91,7 @@ class PlainLearner(Learner):
 
     def continue_from(self, former: Self, rows: IntArray) -> None:
         """Start from the weights of another learner, if the user's class supports it."""
-        if offered(self.plain, "continue_from") is None:
+        if getattr(self.plain, "continue_from", None) is None:
             raise ValueError(no_way_on("learner.kind", self.plain))
         self.plain.continue_from(former.plain, rows)
 
@@ -103,16 +102,16 @@ class PlainEvaluator(Evaluator):
     Parameters
     ----------
     plain
-        Object with ``values(deliberation)`` and, optionally, ``counts``.
+        Object with ``values(context)`` and, optionally, ``counts``.
     """
 
     def __init__(self, plain: Any) -> None:
         self.plain = plain
-        self.counts: Counts = offered(plain, "counts", Counts())
+        self.counts: Counts = getattr(plain, "counts", Counts())
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        values: FloatArray = self.plain.values(deliberation)
+        values: FloatArray = self.plain.values(context)
         return values
 
 
@@ -148,6 +147,6 @@ class PlainExplorer(Explorer):
 
     def continue_from(self, former: Self) -> None:
         """Continue from an explorer of other agents, if the user's class supports it."""
-        if offered(self.plain, "continue_from") is None:
+        if getattr(self.plain, "continue_from", None) is None:
             raise ValueError(no_way_on("learner.exploration.kind", self.plain))
         self.plain.continue_from(former.plain)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..evaluators.budget import check_budget
-from ..evaluators.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
 from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import AgentContext
 from ..interface.scenario import Scenario
 from ..learners.learner import LearnerSettings
 from ..numerics import IntArray
+from ..search.budget import check_budget
+from ..search.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
 from ..values.rule_base import RuleBase
 from .plain import as_evaluator
 

@@ -13,16 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..adaptation.foresight import Foresight
-from ..decision.errors import Errors
-from ..evaluators.evaluator import concerned
 from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import AgentContext
 from ..interface.experience import Observation
 from ..interface.measures import Measure
 from ..interface.prediction import Prediction
 from ..learners.learner import LearnerSettings
+from ..models.team_model import TeamModel
 from ..numerics import FloatArray, IntArray
+from ..search.errors import Errors
+from ..search.evaluator import concerned
 
 UNKNOWN: FloatArray = np.zeros(0)
 """Weights of agents of another part, which are unknown."""
@@ -85,7 +85,7 @@ class Views:
         Row of weights of every agent of the team; None if its weights are unknown.
     n_rules
         Number of rules of the rule base.
-    foresight
+    model
         Predictor of the agents.
     plans
         Whether the agents plan, so that they expect actions of the others.
@@ -107,14 +107,14 @@ class Views:
         context: AgentContext,
         rows: list[int | None],
         n_rules: int,
-        foresight: Foresight,
+        model: TeamModel,
         *,
         plans: bool,
     ) -> None:
         self.costs = COSTS if plans else COSTS[1:]
         self._members = context.members.tolist()
         self._rows = rows
-        self._foresight = foresight
+        self._model = model
         hierarchy = context.hierarchy
         # Learners of action values do not predict and need only their own states.
         perceived = context.scenario.perceived[context.members]
@@ -140,7 +140,7 @@ class Views:
                 own = self._errors.weights(agent, theta)
                 constants = self._errors.constants(agent)
                 if constants is not None:
-                    prediction = self._foresight.predict(seen, constants) or shared
+                    prediction = self._model.predict(seen, constants) or shared
             views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
         return views
 

@@ -2,7 +2,7 @@
 
 Messages of named agents are lost, delayed or replaced by random actions; agents are absent, leave
 the team or get another superior. Random failures have a random stream of their own, so that
-environments and policies stay paired. The setting `unseen` of `core.decision.settings` says what
+environments and policies stay paired. The setting `unseen` of `core.search.settings` says what
 agents assume about actions that they did not receive.
 """
 

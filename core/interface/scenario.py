@@ -302,6 +302,27 @@ class Scenario(ABC):
         raise ValueError(f"the scenario {type(self).__name__} draws no recordings")
 
 
+def checked_scenario(thing: object) -> Scenario:
+    """Return what a user's class or function has built, if it is a complete scenario.
+
+    Raises
+    ------
+    ValueError
+        If it is no `Scenario`, or lacks a necessary attribute; one line.
+    """
+    name = type(thing).__name__
+    if not isinstance(thing, Scenario):
+        hint = ""
+        if hasattr(thing, "action_space"):
+            kind = "pettingzoo" if hasattr(thing, "possible_agents") else "gymnasium"
+            hint = f"; a spec names it by scenario.id, with scenario.kind = {kind!r}"
+        raise ValueError(f"scenario.kind: {name} must inherit nested_agents.Scenario{hint}")
+    missing = [key for key in ("agents", "state_space", "action_set") if not hasattr(thing, key)]
+    if missing:
+        raise ValueError(f"scenario.kind: {name} lacks {', '.join(missing)}")
+    return thing
+
+
 class Members(NamedTuple):
     """Some agents of a scenario."""
 

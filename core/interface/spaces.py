@@ -76,7 +76,7 @@ class Variable:
     """Words for the membership functions, in the order of `centres`; numbers if empty."""
     mirrored: Literal["same", "opposite"] | None = None
     """Sign in the mirror image of the environment: the ``same`` or ``opposite``; None if unknown.
-    See `core.adaptation.predictors`."""
+    See `core.models.predictors`."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):

@@ -22,7 +22,6 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ...core.coordination.graphs import Elimination, Shape, build_shape
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario, Transition
@@ -30,6 +29,7 @@ from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings
+from ...core.search.coordination_graphs import Elimination, Shape, build_shape
 from .scenario import OPTIMALITY
 
 SHARE_OF_BEST = Measure(

@@ -1,8 +1,7 @@
 """Trained teams of a study, evaluated with lost agents or actuators."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from ..errors import SpecError, refused
 from ..resilience.analysis import Resilience, TeamLosses
@@ -13,27 +12,24 @@ from ..results.results import Results
 from ..spec.conditions import ConditionSettings
 from ..store.database import EVALUATION
 from ..trials.trial import Trial
-from ..workers.runner import Observer
 from .kept_teams import KeptTeams
 
 
 def measure_resilience(
     results: Results,
-    directory: Path,
+    kept: KeptTeams,
+    evaluate: Callable[[Sequence[Trial]], Results],
     *,
     fault: str,
     measure: str | None,
     max_sets: int,
     tolerance: float,
-    jobs: int | None,
-    observer: Observer | None,
 ) -> ResilienceReport:
     """Evaluate the kept teams of a study with losses; see `StudyResults.resilience`."""
     if max_sets < 1:
         raise SpecError(f"sets = {max_sets}: must be 1 or more")
     if not 0.0 < tolerance < 1.0:
         raise SpecError(f"tolerance = {tolerance:g}: must be above 0 and below 1")
-    kept = KeptTeams.of(directory, results.trials, {"evaluations": {}})
     name = results.main.name if measure is None else measure
     shown_as, values, phase = values_by_seed(results, name, "evaluation")
     if not phase or shown_as.better == "lower":
@@ -60,7 +56,7 @@ def measure_resilience(
                 own.condition: [[own.team.units[i] for i in units] for units in sets[own.condition]]
                 for own in open_teams
             }
-            evaluated = kept.evaluate(_trials_with_losses(kept, fault, losses), jobs, observer)
+            evaluated = evaluate(_trials_with_losses(kept, fault, losses))
             for own in open_teams:
                 for k, units in enumerate(sets[own.condition]):
                     entry = f"{EVALUATION}{k}"

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from html import escape
 from itertools import chain
 from os import PathLike
@@ -405,17 +405,18 @@ class StudyResults:
             If the study keeps no teams, a team has one agent only, or the scenario has no such
             fault; one line.
         """
+        from .kept_teams import KeptTeams
         from .resilience import measure_resilience
 
+        kept = KeptTeams.of(self.directory, self.trials, {"evaluations": {}})
         return measure_resilience(
             self.results,
-            self.directory,
+            kept,
+            partial(kept.evaluate, jobs=jobs, observer=observer),
             fault=fault,
             measure=measure,
             max_sets=max_sets,
             tolerance=tolerance,
-            jobs=jobs,
-            observer=observer,
         )
 
     def replay(

@@ -1,4 +1,4 @@
-"""Pictures of hierarchies whose agents are colored by what their loss costs."""
+"""Pictures of hierarchies with agents colored by the cost of their loss."""
 
 from matplotlib import colormaps
 from matplotlib.colors import to_hex

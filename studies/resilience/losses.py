@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.agents.joint import joint_blocks
 from ...core.hierarchy.hierarchy import Hierarchy
-from ...core.interface.plain import as_scenario
+from ...core.interface.scenario import checked_scenario
 from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.words import closest
 from ..errors import SpecError
@@ -53,7 +53,7 @@ def losable_team(settings: ConditionSettings, fault: str) -> LosableTeam:
     SpecError
         If the scenario has no such fault, or there is only one unit; one line.
     """
-    world = as_scenario(settings.scenario.build())
+    world = checked_scenario(settings.scenario.build())
     _, hierarchy = settings.arrange(world)
     if fault in AGENT_FAULTS:
         units = hierarchy.agents

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ResilienceReport:
-    """What losses of agents cost trained teams; printed or shown by a notebook."""
+    """Costs of lost agents in trained teams; printed or shown by a notebook."""
 
     analysis: Resilience
 

@@ -13,10 +13,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.evaluators.best_response import RespondingPrediction, Responses, Search
 from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
+from ....core.search.best_response import RespondingPrediction, Responses, Search
 from ....core.values.rule_base import RuleBase
 from ..states.situations import SituationBatch
 from ..states.state_spaces import BoxStateSpace

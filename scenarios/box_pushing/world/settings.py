@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from ....core.numerics import BoolArray, FloatArray, njit
-from ....core.plugins.settings import Names, NonNegative, Positive, Settings, unwritten
+from ....core.plugins.settings import Names, NonNegative, Positive, Settings
 from ....core.plugins.sources import active
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
 
@@ -126,9 +126,7 @@ Vertices = Annotated[
 class Described(Settings):
     """User-defined object, described by a table that may give it a name."""
 
-    name: Annotated[
-        Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None, unwritten(None)
-    ] = None
+    name: Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = None
     """Name in labels; nothing else depends on it."""
 
 
@@ -140,7 +138,7 @@ class BoxSettings(Described):
     and y, relative to the spec. Concave outlines are allowed."""
     holes: tuple[Vertices, ...] = ()
     """Outlines of holes [m], as `vertices`."""
-    center_of_mass: Annotated[tuple[float, float] | None, unwritten(None)] = None
+    center_of_mass: tuple[float, float] | None = None
     """Center of mass in the coordinates of the vertices [m]; none: that of a uniform box. Mass and
     ground friction are spread around it as in a uniform box around its center."""
     mass: Quantity = 0.4

@@ -1,6 +1,7 @@
 """The command that measures what losses of agents cost trained teams."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -20,7 +21,14 @@ from ..loading import read_results, say_remarks
     "seized, which takes an actuator.",
 )
 @options.measure
-@options.number("--sets", "N", 20, "Maximum number of sets of two or more agents that are lost.")
+@click.option(
+    "--sets",
+    "max_sets",
+    type=int,
+    metavar="N",
+    default=20,
+    help="Maximum number of sets of two or more agents that are lost.",
+)
 @options.number(
     "--tolerance", "SHARE", 0.1, "Share of the intact performance that a tolerated loss may cost."
 )
@@ -31,15 +39,11 @@ from ..loading import read_results, say_remarks
 @options.trust
 def resilience(
     directory: Path,
-    fault: str,
-    measure: str | None,
-    sets: int,
-    tolerance: float,
     out: Path | None,
-    jobs: int | None,
     where: str | None,
     form: Form,
     trust: bool,
+    **choices: Any,
 ) -> int:
     """Measure what the loss of one, two or more agents costs trained teams.
 
@@ -48,7 +52,7 @@ def resilience(
     """
     loaded = read_results((directory,), where=where, trust=trust)
     say_remarks(loaded)
-    report = loaded.resilience(fault, measure, max_sets=sets, tolerance=tolerance, jobs=jobs)
+    report = loaded.resilience(**choices)
     if form == "json":
         print_data(report.json)
     elif form != "table":

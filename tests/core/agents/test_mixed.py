@@ -9,8 +9,6 @@ from acting import fuzzy, look
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import DecisionSettings
-from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
 from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.hierarchy.stages import communication_levels, decision_stages
@@ -19,6 +17,8 @@ from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.fitted_q import FittedQSettings
 from nested_agents.core.learners.td import TDLambdaSettings
+from nested_agents.core.search.enumeration import ExactEnumeration, Sampling
+from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
 TD = {"kind": "td-lambda", "step_size": 0.1}

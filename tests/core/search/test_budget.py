@@ -12,12 +12,12 @@ from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.mixed import MixedSettings, PartOfTeam
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import DecisionSettings
-from nested_agents.core.evaluators.budget import divide
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.fitted_q import FittedQSettings
 from nested_agents.core.learners.learner import LearnerSettings, TeamSettings
 from nested_agents.core.learners.td import TDLambdaSettings
+from nested_agents.core.search.budget import divide
+from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.topologies import build

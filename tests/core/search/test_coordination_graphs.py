@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.cost import Problem
-from nested_agents.core.coordination.graphs import (
+from nested_agents.core.search.coordination_graphs import (
     Elimination,
     MaxPlus,
     build_shape,

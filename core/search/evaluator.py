@@ -43,7 +43,7 @@ NOBODY: IntArray = np.zeros(0, dtype=np.int64)
 """An empty array of agents."""
 
 
-class Deliberation(NamedTuple):
+class DecisionContext(NamedTuple):
     """Knowledge of an agent that decides."""
 
     agent: int
@@ -87,10 +87,10 @@ class Evaluator(ABC):
     """``(n,)`` joint action that the last deciding agent expected; None without a plan."""
 
     @abstractmethod
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
 
-    def decide(self, first: Deliberation, exploring: Exploring) -> IntArray | None:
+    def decide(self, first: DecisionContext, exploring: Exploring) -> IntArray | None:
         """Return the joint action ``(n,)`` of agents that all hear each other.
 
         None if the evaluator has no joint search; then the agents decide one by one.
@@ -152,7 +152,7 @@ EVALUATORS = SettingsRegistry(
     "evaluator",
     {
         "auto": f"{__package__}.enumeration:AutoSettings",
-        "exact": f"{__package__}.enumeration:ExactEnumeration",
+        "exact": f"{__package__}.enumeration:ExactSettings",
         "sampling": f"{__package__}.enumeration:SamplingSettings",
         "variable-elimination": f"{__package__}.coordination:VariableEliminationSettings",
         "max-plus": f"{__package__}.coordination:MaxPlusSettings",
@@ -254,14 +254,14 @@ class Aggregation(Evaluator):
         if value != allowed:
             raise ValueError(f"learner.decision.{key} = {value!r}: {why}")
 
-    def begins(self, deliberation: Deliberation) -> bool:
+    def begins(self, context: DecisionContext) -> bool:
         """Return whether this agent is the first in a decision of the team.
 
         With views of their own, all agents are.
         """
-        before, self._prediction = self._prediction, deliberation.prediction
+        before, self._prediction = self._prediction, context.prediction
         first = self.problem.deciding[0]
-        is_first = deliberation.agent == first or before is not deliberation.prediction
+        is_first = context.agent == first or before is not context.prediction
         return is_first or self.problem.is_private
 
     def shares(self, needs: Sequence[int], least: int) -> list[int]:
@@ -300,39 +300,39 @@ class Aggregation(Evaluator):
         self.counts.joint_actions += joint_actions
         self.counts.rule_evaluations += joint_actions * valued * self.rules.n_rules
 
-    def all_values_zero(self, deliberation: Deliberation) -> bool:
+    def all_values_zero(self, context: DecisionContext) -> bool:
         """Return whether all weights are zero, as before learning."""
-        agent = deliberation.agent
+        agent = context.agent
         if self.problem.rule != "value" or agent in self._have_learned:
             return False
-        if self.learned(deliberation).is_zero:
+        if self.learned(context).is_zero:
             return True
         self._have_learned.add(agent)
         return False
 
-    def learned(self, deliberation: Deliberation) -> Learned:
+    def learned(self, context: DecisionContext) -> Learned:
         """Return the weights of the averaged agents, the same object within a decision."""
-        weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
+        weights, concerned = context.weights, self.concerned[context.agent]
         last = self._learned
         if last is None or last.weights is not weights or last.agents is not concerned:
             last = self._learned = Learned(weights, concerned, self._body_of)
         return last
 
-    def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
+    def worth(self, context: DecisionContext, joint_actions: IntArray) -> FloatArray:
         """Return the values ``(m,)`` of joint actions ``(m, n)`` to the agent, and count them."""
-        self.count(deliberation.agent, len(joint_actions))
-        return self.predicted_worth(deliberation, joint_actions)
+        self.count(context.agent, len(joint_actions))
+        return self.predicted_worth(context, joint_actions)
 
-    def predicted_worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
+    def predicted_worth(self, context: DecisionContext, joint_actions: IntArray) -> FloatArray:
         """Return the same values without counting."""
-        prediction = deliberation.prediction
-        concerned = self.concerned[deliberation.agent]
+        prediction = context.prediction
+        concerned = self.concerned[context.agent]
 
         def values() -> FloatArray:
             if len(concerned) > 1:
-                return self.mean(self.learned(deliberation).pooled, prediction, joint_actions)
-            states = prediction.states(deliberation.agent, joint_actions)
-            return self.rules.values(deliberation.own_weights, states)
+                return self.mean(self.learned(context).pooled, prediction, joint_actions)
+            states = prediction.states(context.agent, joint_actions)
+            return self.rules.values(context.own_weights, states)
 
         return self.combine(lambda: rewards_of(prediction, joint_actions), values)
 
@@ -343,19 +343,19 @@ class Aggregation(Evaluator):
             shared = shared[pooled.bodies]
         return self.rules.summed_values(pooled, own, shared) / len(pooled.agents)
 
-    def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
+    def worths(self, context: DecisionContext, tried: IntArray) -> FloatArray:
         """Return values ``(A, m)`` of own actions, each with joint actions `tried` ``(m, k)``."""
-        joint = self.joint_actions(deliberation, np.arange(self.n_actions), tried)
-        return self.worth(deliberation, joint).reshape(self.n_actions, -1)
+        joint = self.joint_actions(context, np.arange(self.n_actions), tried)
+        return self.worth(context, joint).reshape(self.n_actions, -1)
 
-    def joint_actions(self, deliberation: Deliberation, own: IntArray, tried: IntArray) -> IntArray:
+    def joint_actions(self, context: DecisionContext, own: IntArray, tried: IntArray) -> IntArray:
         """Return each own action ``(b,)`` with each of the actions `tried` ``(m, k)`` below.
 
         The joint actions are ``(b m, n)``.
         """
-        agent, n = deliberation.agent, len(deliberation.joint_action)
+        agent, n = context.agent, len(context.joint_action)
         joint = np.empty((len(own), len(tried), n), dtype=np.int64)
-        joint[:] = deliberation.joint_action
+        joint[:] = context.joint_action
         joint[:, :, agent] = own[:, None]
         joint[:, :, list(self.hierarchy.searched(agent))] = tried
         return joint.reshape(-1, n)
@@ -374,13 +374,13 @@ class Aggregation(Evaluator):
         return rewards() + self.problem.discount * values()
 
     def aggregate(
-        self, deliberation: Deliberation, tried: IntArray, probabilities: FloatArray | None
+        self, context: DecisionContext, tried: IntArray, probabilities: FloatArray | None
     ) -> FloatArray:
         """Return the maximum, mean or weighted mean ``(A,)`` of values, by the teammate model.
 
         Parameters
         ----------
-        deliberation
+        context
             Knowledge of the deciding agent.
         tried
             ``(m, k)`` joint actions of the agents below.
@@ -388,10 +388,10 @@ class Aggregation(Evaluator):
             ``(m,)`` probabilities of these joint actions, or ``(A, m)`` given each own action;
             None: all equal.
         """
-        if self.all_values_zero(deliberation):
-            self.count(deliberation.agent, self.n_actions * len(tried))
+        if self.all_values_zero(context):
+            self.count(context.agent, self.n_actions * len(tried))
             return np.zeros(self.n_actions)
-        values = self.worths(deliberation, tried)
+        values = self.worths(context, tried)
         if self.problem.teammates == "best-response":
             return values.max(axis=1)
         if probabilities is not None and probabilities.ndim == 2:

@@ -6,8 +6,8 @@ from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.learners.td import TDLambdaSettings
+from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.topologies import build, parse
 

@@ -23,7 +23,7 @@ from pydantic import Field
 from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray, IntArray, njit
-from ..plugins.settings import PartSettings, Positive, unwritten
+from ..plugins.settings import PartSettings, Positive
 from ..values.partitions import Partition
 from ..values.rule_base import RuleBase
 from ..values.triangular import Layout, active_rules
@@ -59,7 +59,7 @@ class LearnedPredictorSettings(PartSettings):
     memberships: Annotated[int, Field(ge=2, le=15)] | None = None
     """Number of evenly spread membership functions per variable; with none, the centres of the
     state space."""
-    midpoint: Annotated[bool, unwritten(False)] = False
+    midpoint: bool = False
     """Whether effects are evaluated at the midpoint of a decision instead of its beginning, for
     bodies whose motion changes them."""
     mirrored: bool | None = None

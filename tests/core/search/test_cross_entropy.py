@@ -7,11 +7,11 @@ import pytest
 from acting import fuzzy
 from pydantic import ValidationError
 
-from nested_agents.core.evaluators.coordination import CrossEntropySettings
-from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation, Evaluator
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.spaces import StateSpace, Variable
+from nested_agents.core.search.coordination import CrossEntropySettings
+from nested_agents.core.search.evaluator import DecisionContext, DecisionProblem, Evaluator
 from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
@@ -47,7 +47,7 @@ def planner(rule: str = "reward", edges: tuple[str, ...] = ("ab",), **settings: 
 def decided(evaluator: Evaluator, prediction: Corridor, seed: int = 0) -> list[int]:
     rng, joint = np.random.default_rng(seed), np.ones(2, dtype=np.int64)
     for agent in (0, 1):
-        asked = Deliberation(agent, joint, prediction, [], np.full((2, 3), 1 / 3), rng)
+        asked = DecisionContext(agent, joint, prediction, [], np.full((2, 3), 1 / 3), rng)
         joint[agent] = int(evaluator.values(asked).argmax())
     return joint.tolist()
 

@@ -16,7 +16,7 @@ from .predictors import GivenPredictor
 from .self_model import SelfModel, SelfModelSettings
 
 
-class Foresight:
+class TeamModel:
     """Predicts for a team, and adapts its models.
 
     Parameters
@@ -109,7 +109,7 @@ class Foresight:
         for part in self.adaptive.values():
             part.end_episode()
 
-    def continue_from(self, former: Foresight) -> None:
+    def continue_from(self, former: TeamModel) -> None:
         """Start from the models of another team."""
         for name in self.adaptive.keys() & former.adaptive.keys():
             self.adaptive[name].continue_from(former.adaptive[name])

@@ -5,11 +5,11 @@ import pytest
 from acting import fuzzy
 
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import DecisionSettings
-from nested_agents.core.evaluators.best_response import BestResponse
-from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.td import FrozenSettings
+from nested_agents.core.search.best_response import BestResponse
+from nested_agents.core.search.enumeration import ExactEnumeration, Sampling
+from nested_agents.core.search.settings import DecisionSettings
 
 
 @pytest.mark.parametrize("teammates", ["best-response", "uniform"])

@@ -14,8 +14,8 @@ from ..numerics import FloatArray, IntArray
 from .evaluator import (
     EVALUATORS,
     Aggregation,
+    DecisionContext,
     DecisionProblem,
-    Deliberation,
     Evaluator,
     EvaluatorSettings,
 )
@@ -93,44 +93,44 @@ class ExactEnumeration(Aggregation):
                 given[[agent, *below]] = 0
                 self._given_places.append(given)
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        agent = deliberation.agent
+        agent = context.agent
         below = self.hierarchy.searched(agent)
         probabilities = None
         if self.problem.teammates == "empirical":
-            probabilities = probabilities_of(deliberation.frequencies, below)
+            probabilities = probabilities_of(context.frequencies, below)
         elif self.problem.teammates == "conditional":
-            probabilities = np.stack([probabilities_of(rows, below) for rows in deliberation.given])
-        return self.aggregate(deliberation, self._below[agent], probabilities)
+            probabilities = np.stack([probabilities_of(rows, below) for rows in context.given])
+        return self.aggregate(context, self._below[agent], probabilities)
 
-    def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
+    def worths(self, context: DecisionContext, tried: IntArray) -> FloatArray:
         """Return values ``(A, m)``, from tables of all joint actions if the prediction has them."""
-        tables = deliberation.prediction.tables() if self._uses_tables else None
+        tables = context.prediction.tables() if self._uses_tables else None
         if tables is None or (self.problem.rule != "value" and not tables.rewarded):
-            return super().worths(deliberation, tried)
-        agent = deliberation.agent
-        given = int(deliberation.joint_action @ self._given_places[agent])
+            return super().worths(context, tried)
+        agent = context.agent
+        given = int(context.joint_action @ self._given_places[agent])
         indices = self._indices[agent] + given
         self.count(agent, len(indices))
         worth = self.combine(
             lambda: tables.reward_table()[indices],
-            lambda: self._table_values(deliberation, tables, indices),
+            lambda: self._table_values(context, tables, indices),
         )
         return worth.reshape(self.n_actions, -1)
 
     def _table_values(
-        self, deliberation: Deliberation, tables: Tables, indices: IntArray
+        self, context: DecisionContext, tables: Tables, indices: IntArray
     ) -> FloatArray:
         """Return the values ``(m,)`` of joint-action indices ``(m,)`` to the deciding agent.
 
         The mean over several agents is computed for all joint actions, once in a decision.
         """
-        weights = deliberation.weights
-        concerned = self.concerned[deliberation.agent]
+        weights = context.weights
+        concerned = self.concerned[context.agent]
         if len(concerned) == 1:
-            blocks = tables.blocks(deliberation.agent)
-            return self.rules.block_values(deliberation.own_weights, blocks, indices)
+            blocks = tables.blocks(context.agent)
+            return self.rules.block_values(context.own_weights, blocks, indices)
         key = tables, weights, concerned
         if self._means is None or any(a is not b for a, b in zip(self._means[0], key, strict=True)):
             every = np.arange(self.n_actions ** len(weights))
@@ -180,32 +180,42 @@ class Sampling(Aggregation):
         below = map(len, map(self.hierarchy.searched, range(len(self.hierarchy))))
         self._shares = self.shares([a * min(settings.samples, a**k) for k in below], least=1)
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent.
 
         Actions that the budget leaves out have the value -inf.
         """
-        below, a = self.hierarchy.searched(deliberation.agent), self.n_actions
-        share = self._shares[deliberation.agent]
+        below, a = self.hierarchy.searched(context.agent), self.n_actions
+        share = self._shares[context.agent]
         if share < a:
-            own = deliberation.rng.choice(a, share, replace=False)
-            tried = self._sample(deliberation, 1)
+            own = context.rng.choice(a, share, replace=False)
+            tried = self._sample(context, 1)
             values = np.full(a, -np.inf)
-            values[own] = self.worth(deliberation, self.joint_actions(deliberation, own, tried))
+            values[own] = self.worth(context, self.joint_actions(context, own, tried))
             return values
         if a ** len(below) > share // a:
-            return self.aggregate(deliberation, self._sample(deliberation, share // a), None)
+            return self.aggregate(context, self._sample(context, share // a), None)
         probabilities = None
         if self.problem.teammates == "empirical":
-            probabilities = probabilities_of(deliberation.frequencies, below)
-        return self.aggregate(deliberation, combinations(below, a), probabilities)
+            probabilities = probabilities_of(context.frequencies, below)
+        return self.aggregate(context, combinations(below, a), probabilities)
 
-    def _sample(self, deliberation: Deliberation, samples: int) -> IntArray:
+    def _sample(self, context: DecisionContext, samples: int) -> IntArray:
         """Return sampled joint actions ``(samples, k)`` of the agents below."""
-        below = self.hierarchy.searched(deliberation.agent)
+        below = self.hierarchy.searched(context.agent)
         if self.problem.teammates == "empirical":
-            return self.sample(deliberation.frequencies[list(below)], samples, deliberation.rng)
-        return deliberation.rng.integers(self.n_actions, size=(samples, len(below)))
+            return self.sample(context.frequencies[list(below)], samples, context.rng)
+        return context.rng.integers(self.n_actions, size=(samples, len(below)))
+
+
+class ExactSettings(EvaluatorSettings):
+    """Exact enumeration of the joint actions of the agents below."""
+
+    kind: Literal["exact"] = "exact"
+
+    def build(self, problem: DecisionProblem) -> Evaluator:
+        """Return the evaluator of a team."""
+        return ExactEnumeration(problem)
 
 
 class AutoSettings(EvaluatorSettings):

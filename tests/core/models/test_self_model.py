@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.adaptation.self_model import SelfModel, SelfModelSettings
+from nested_agents.core.models.self_model import SelfModel, SelfModelSettings
 
 # A differential drive: axle 0.05 m.
 NOMINAL = np.array([[0.5, 0.5, 0.0], [0.0, 0.0, 0.0], [-20.0, 20.0, 0.0]])

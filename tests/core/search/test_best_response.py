@@ -5,25 +5,25 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
-from nested_agents.core.evaluators.enumeration import (
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.prediction import Prediction
+from nested_agents.core.interface.spaces import StateSpace, Variable
+from nested_agents.core.numerics import FloatArray
+from nested_agents.core.search.best_response import BestResponse, BestResponseSettings
+from nested_agents.core.search.enumeration import (
     AutoSettings,
     ExactEnumeration,
     Sampling,
     SamplingSettings,
 )
-from nested_agents.core.evaluators.evaluator import (
+from nested_agents.core.search.evaluator import (
+    DecisionContext,
     DecisionProblem,
-    Deliberation,
     Learned,
     Rule,
     ValueOf,
     concerned,
 )
-from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.prediction import Prediction
-from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.numerics import FloatArray
 from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
@@ -58,17 +58,17 @@ def rules(world) -> RuleBase:
     return RuleBase.build(world.state_space, RuleBaseSettings(products=(("speed", "gap"),)))
 
 
-def asked(agent, world, theta, hierarchy, rng) -> Deliberation:
+def asked(agent, world, theta, hierarchy, rng) -> DecisionContext:
     joint = np.full(4, NEUTRAL)
     above = list(hierarchy.senders(agent))
     joint[above] = rng.integers(A, size=len(above))
-    return Deliberation(agent, joint, world.predict(), theta, np.full((4, A), 1 / A), rng)
+    return DecisionContext(agent, joint, world.predict(), theta, np.full((4, A), 1 / A), rng)
 
 
-def worth_of(problem, deliberation, joint, theta) -> float:
+def worth_of(problem, context, joint, theta) -> float:
     """The mean f of those concerned, read aloud."""
-    who = concerned(problem.hierarchy, problem.value_of)[deliberation.agent]
-    prediction = deliberation.prediction
+    who = concerned(problem.hierarchy, problem.value_of)[context.agent]
+    prediction = context.prediction
     values = [problem.rules.features(prediction.states(i, joint[None]))[0] @ theta[i] for i in who]
     mean, reward = float(np.mean(values)), float(prediction.rewards(joint[None])[0])
     return {"value": mean, "reward": reward, "reward-and-value": reward + 0.9 * mean}[problem.rule]
@@ -81,16 +81,16 @@ def test_whose_value_decides(name, value_of, rule, world, rules) -> None:
     problem, rng = problem_of(world, rules, name, value_of, rule), np.random.default_rng(1)
     theta = rng.normal(size=(4, rules.n_rules))
     for agent in range(4):
-        deliberation = asked(agent, world, theta, problem.hierarchy, rng)
+        context = asked(agent, world, theta, problem.hierarchy, rng)
         below = problem.hierarchy.searched(agent)
         expected = np.full(A, -np.inf)
         for own, *actions in product(range(A), repeat=1 + len(below)):
-            joint = deliberation.joint_action.copy()
+            joint = context.joint_action.copy()
             joint[[agent, *below]] = own, *actions
-            expected[own] = max(expected[own], worth_of(problem, deliberation, joint, theta))
+            expected[own] = max(expected[own], worth_of(problem, context, joint, theta))
         sampling = Sampling(SamplingSettings(samples=A**3), problem)
         for evaluator in (ExactEnumeration(problem), sampling):
-            assert evaluator.values(deliberation) == pytest.approx(expected, rel=0, abs=1e-12)
+            assert evaluator.values(context) == pytest.approx(expected, rel=0, abs=1e-12)
 
 
 @pytest.mark.parametrize("value_of", VALUES_OF)
@@ -102,14 +102,14 @@ def test_values_are_those_of_joint_actions_that_keep_what_is_decided(
     theta = rng.normal(size=(4, rules.n_rules))
     exact, search = ExactEnumeration(problem), BestResponse(problem)
     for agent in problem.hierarchy.order:
-        deliberation = asked(agent, world, theta, problem.hierarchy, rng)
-        before = deliberation.joint_action.copy()
-        found, best = search.values(deliberation), exact.values(deliberation)
+        context = asked(agent, world, theta, problem.hierarchy, rng)
+        before = context.joint_action.copy()
+        found, best = search.values(context), exact.values(context)
         assert (found <= best + 1e-12).all()
         assert found.max() >= np.median(best)
         if not set(problem.hierarchy.searched(agent)) - set(world.groups[agent // 2]):
             assert found == pytest.approx(best, rel=0, abs=1e-12)
-        assert (deliberation.joint_action == before).all()
+        assert (context.joint_action == before).all()
 
 
 def test_what_half_a_team_must_do_together_is_found(line_world) -> None:
@@ -131,8 +131,8 @@ def test_what_half_a_team_must_do_together_is_found(line_world) -> None:
     rng, prediction = np.random.default_rng(0), Apart()
     search, joint = BestResponse(problem), np.full(12, NEUTRAL)
     for agent in hierarchy.order:
-        deliberation = Deliberation(agent, joint, prediction, [], np.zeros((12, A)), rng)
-        joint[agent] = search.values(deliberation).argmax()
+        context = DecisionContext(agent, joint, prediction, [], np.zeros((12, A)), rng)
+        joint[agent] = search.values(context).argmax()
     assert joint.tolist() == [1] * 6 + [0] * 6
 
 
@@ -148,7 +148,7 @@ def test_agents_below_answer_to_what_is_decided_above(world, rules) -> None:
     for first in range(A):
         joint = np.full(4, NEUTRAL)
         for agent in range(4):
-            asking = Deliberation(agent, joint, prediction, [], np.zeros((4, A)), rng)
+            asking = DecisionContext(agent, joint, prediction, [], np.zeros((4, A)), rng)
             values = search.values(asking)
             joint[agent] = first if agent == 0 else values.argmax()
         assert joint[3] == first
@@ -237,10 +237,10 @@ def decided(
         told = np.array(hierarchy.senders(agent), dtype=np.int64)
         known = np.full(n, NEUTRAL)
         known[told] = joint[told]
-        deliberation = Deliberation(
+        context = DecisionContext(
             agent, known, prediction, [], np.zeros((n, A)), rng, told=told
         )  # fmt: skip
-        values.append(search.values(deliberation))
+        values.append(search.values(context))
         joint[agent] = first if agent == hierarchy.order[0] else values[-1].argmax()
     return values
 

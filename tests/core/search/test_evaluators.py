@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_agents.core.evaluators import EVALUATORS
-from nested_agents.core.evaluators.enumeration import (
+from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.prediction import Blocks, Prediction, Tables
+from nested_agents.core.interface.spaces import StateSpace, Variable
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.enumeration import (
     MAX_JOINT_ACTIONS,
     ExactEnumeration,
     Sampling,
@@ -17,10 +20,7 @@ from nested_agents.core.evaluators.enumeration import (
     combinations,
     probabilities_of,
 )
-from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation, Rule, Teammates
-from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.prediction import Blocks, Prediction, Tables
-from nested_agents.core.interface.spaces import StateSpace, Variable
+from nested_agents.core.search.evaluator import DecisionContext, DecisionProblem, Rule, Teammates
 from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
@@ -158,7 +158,7 @@ def test_enumeration_is_brute_force(
         joint = np.full(4, NEUTRAL)
         joint[list(hierarchy.senders(agent))] = rng.integers(A, size=len(hierarchy.senders(agent)))
         before = joint.copy()
-        asked = Deliberation(agent, joint, prediction, theta, frequencies, rng)
+        asked = DecisionContext(agent, joint, prediction, theta, frequencies, rng)
         expected = brute_force(
             agent, joint, hierarchy, theta[agent], rules, prediction, frequencies, rule, teammates
         )
@@ -181,7 +181,7 @@ def test_without_structure_too(teammates: str, rng: np.random.Generator, rules: 
     for agent in range(4):
         joint = np.full(4, NEUTRAL)
         found = evaluator.values(
-            Deliberation(agent, joint, prediction, [theta] * 4, frequencies, rng)
+            DecisionContext(agent, joint, prediction, [theta] * 4, frequencies, rng)
         )
         expected = brute_force(
             agent,
@@ -211,9 +211,9 @@ def test_permuting_agents_permutes_values(
     here = ExactEnumeration(problem_of(flat, hierarchy, "reward-and-value", teammates))
     there = ExactEnumeration(problem_of(flat, other, "reward-and-value", teammates))
     for k, agent in enumerate(permutation):
-        expected = here.values(Deliberation(agent, joint, prediction, theta, frequencies, rng))
+        expected = here.values(DecisionContext(agent, joint, prediction, theta, frequencies, rng))
         found = there.values(
-            Deliberation(
+            DecisionContext(
                 k, joint[permutation], prediction.permuted(permutation), theta[permutation],
                 frequencies[permutation], rng,
             )
@@ -234,7 +234,7 @@ def test_frequent_actions_weigh_more_by_hand() -> None:
         evaluator = ExactEnumeration(problem_of(rules, hierarchy, "reward", teammates))
         theta = np.zeros(rules.n_rules)
         found = evaluator.values(
-            Deliberation(0, np.full(2, NEUTRAL), prediction, [theta] * 4, frequencies, rng)
+            DecisionContext(0, np.full(2, NEUTRAL), prediction, [theta] * 4, frequencies, rng)
         )
         assert found == pytest.approx([expected, 0.0, 0.0, 0.0], abs=1e-15)
 
@@ -246,12 +246,12 @@ def test_sampling_converges(world, rules: RuleBase, rng: np.random.Generator) ->
     for teammates in TEAMMATES:
         common = problem_of(rules, hierarchy, "value", teammates)
         exact = ExactEnumeration(common).values(
-            Deliberation(0, joint, prediction, [theta] * 4, frequencies, rng)
+            DecisionContext(0, joint, prediction, [theta] * 4, frequencies, rng)
         )
         # 63 of the 64 joint actions below would be drawn: with repetition, hence at random.
         sampling = Sampling(SamplingSettings(samples=63), common)
         draws = [
-            sampling.values(Deliberation(0, joint, prediction, [theta] * 4, frequencies, rng))
+            sampling.values(DecisionContext(0, joint, prediction, [theta] * 4, frequencies, rng))
             for _ in range(300)
         ]
         if teammates == "best-response":  # from below, and found sooner or later
@@ -273,7 +273,7 @@ def test_a_sample_is_shared_by_all_own_actions(rng: np.random.Generator) -> None
         )
         theta, joint = np.zeros(rules.n_rules), np.full(4, NEUTRAL)
         found = sampling.values(
-            Deliberation(0, joint, prediction, [theta] * 4, frequencies_of(rng), rng)
+            DecisionContext(0, joint, prediction, [theta] * 4, frequencies_of(rng), rng)
         )
         assert np.ptp(found) == pytest.approx(0.0, abs=1e-15)
         assert sampling.counts.joint_actions == A * 5
@@ -290,7 +290,7 @@ def test_nothing_is_tabulated_if_fewer_are_tried(
     theta, joint = rng.normal(size=rules.n_rules), np.full(4, NEUTRAL)
     for agent in range(4):
         evaluator.values(
-            Deliberation(agent, joint, prediction, [theta] * 4, frequencies_of(rng), rng)
+            DecisionContext(agent, joint, prediction, [theta] * 4, frequencies_of(rng), rng)
         )
 
 

@@ -4,12 +4,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..evaluators import EVALUATORS, EvaluatorSettings
-from ..evaluators.enumeration import AutoSettings
-from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
 from ..plugins.registry import Plugged
-from ..plugins.settings import Settings, unwritten
+from ..plugins.settings import Settings
+from . import EVALUATORS, EvaluatorSettings
+from .enumeration import AutoSettings
 from .errors import ErrorSettings
+from .evaluator import Plan, Teammates, Unseen, ValueOf
 
 
 class DecisionSettings(Settings):
@@ -27,17 +27,17 @@ class DecisionSettings(Settings):
     """Averaged values: the agent's own, its own and those of the agents below it (``below``), or
     those of all agents (``team``). Use ``own`` if an agent's state shows the effect of its action,
     ``team`` if an action that helps one agent may hinder others."""
-    unseen: Annotated[Unseen, unwritten("maintain")] = "maintain"
+    unseen: Unseen = "maintain"
     """Assumed actions of agents that this agent neither hears nor searches over, silent agents
     included: maintain, repeat the last action, or follow the plan of ``best-response``."""
-    plan: Annotated[Plan, unwritten("private")] = "private"
+    plan: Plan = "private"
     """Plans of ``best-response``: each agent makes its own unless an agent above hands one down
     with its messages (``private``), or all agents compute the same plan from common knowledge."""
     evaluator: Annotated[EvaluatorSettings, Plugged(EVALUATORS, EVALUATORS.parsed)] = AutoSettings()
     """Search over joint actions of the agents below: the name of an evaluator, or its table."""
-    budget: Annotated[int | None, Field(ge=1), unwritten(None)] = None
+    budget: Annotated[int | None, Field(ge=1)] = None
     """Maximum number of joint actions that the team tries in a decision, to compare hierarchies at
     equal computing. The budget is divided equally over the agents; what an agent does not need goes
     to the others. Without this key the search alone decides."""
-    errors: Annotated[ErrorSettings | None, unwritten(None)] = None
+    errors: ErrorSettings | None = None
     """Individual errors of agents. With this table every agent also makes plans of its own."""

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from acting import fuzzy
 
-from nested_agents.core.adaptation.predictors import Mirror
 from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.models.predictors import Mirror
 from nested_agents.core.values.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.world.settings import RobotSettings, WheelSettings

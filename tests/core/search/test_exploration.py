@@ -5,7 +5,8 @@ from math import e, exp
 import numpy as np
 import pytest
 
-from nested_agents.core.decision.exploration import (
+from nested_agents.core.plugins.settings import SettingsError
+from nested_agents.core.search.exploration import (
     BurstExploration,
     Bursts,
     EpsilonDecreasingBoltzmann,
@@ -13,7 +14,6 @@ from nested_agents.core.decision.exploration import (
     boltzmann,
     greatest,
 )
-from nested_agents.core.plugins.settings import SettingsError
 
 VALUES = np.array([0.0, 3.0, 1.0, 2.0])
 

@@ -7,12 +7,6 @@ import numpy as np
 import pytest
 from acting import fuzzy, look
 
-from nested_agents.core.adaptation.learned_predictor import LearnedPredictor
-from nested_agents.core.adaptation.predictors import (
-    LearnedPredictorSettings,
-    Persistence,
-    StaticPredictor,
-)
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
@@ -20,6 +14,12 @@ from nested_agents.core.interface.prediction import states_by_group
 from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.models.learned_predictor import LearnedPredictor
+from nested_agents.core.models.predictors import (
+    LearnedPredictorSettings,
+    Persistence,
+    StaticPredictor,
+)
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.checking.predictions import faults_of_prediction
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
@@ -162,7 +162,7 @@ WORLDS: dict[str, Callable[[], Scenario]] = {
 }
 
 
-class Predicting:
+class Predicting(Scenario):
     """A scenario whose prediction is the learned one, for the checks of predictions."""
 
     def __init__(self, scenario: Any, predictor: LearnedPredictor, states: np.ndarray) -> None:
@@ -171,6 +171,12 @@ class Predicting:
             if hasattr(scenario, name):
                 setattr(self, name, getattr(scenario, name))
         self.prediction = predictor.predict(states)
+
+    def reset(self, seed: Any, episode: int = 0) -> Any:
+        raise NotImplementedError
+
+    def step(self, joint_action: Any) -> Transition:
+        raise NotImplementedError
 
     def predict(self) -> Any:
         # Tables are compared where there are tables of rewards, too.
@@ -231,8 +237,8 @@ def test_a_restored_team_goes_on_to_the_same_bits() -> None:
     second.load_state_dict(state)
     assert begun + episodes(Rails(), second, 2, first_episode=2) == every
     assert np.array_equal(
-        fuzzy(whole).foresight.predictor.memory["weights"],
-        fuzzy(second).foresight.predictor.memory["weights"],
+        fuzzy(whole).model.predictor.memory["weights"],
+        fuzzy(second).model.predictor.memory["weights"],
     )  # type: ignore[union-attr]
 
 

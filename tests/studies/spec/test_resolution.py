@@ -1,12 +1,14 @@
-"""Layers of a condition's settings: what a preset says gives way to a kind that has it not."""
+"""Resolution of presets, tables, overrides and sweeps into the settings of conditions."""
 
 from dataclasses import replace
 
 import pytest
 
-from nested_agents.core.decision.exploration import EXPLORATIONS
-from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.learners import LEARNERS, LearnerSettings
+from nested_agents.core.learners.fitted_q import FittedQSettings
+from nested_agents.core.learners.td import FrozenSettings
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.exploration import EXPLORATIONS, BurstExploration
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.spec import Spec
@@ -36,15 +38,14 @@ def test_every_learner_is_chosen_by_its_kind_alone(kind: str) -> None:
     spec = build(table) if kind in BUILT else Spec.of(table)
     (condition,) = spec.conditions()
     assert condition.settings.learner.kind == kind
-    remarks = [line for line in spec.warnings() if "set by default, left out" in line]
-    assert len(remarks) == (kind != "batch-td")
-    assert all(line.endswith(f"left out for learner.kind = {kind!r}") for line in remarks)
+    usual = LEARNERS.model(kind)(kind=kind)
+    if kind != "batch-td":
+        assert condition.settings.learner == usual
 
 
 def test_a_mixed_team_is_chosen_with_its_parts() -> None:
     parts = [{"agents": "*", "learner": {"kind": "frozen"}}]
-    (remark,) = Spec.of({"learner": {"kind": "mixed", "parts": parts}}).warnings()
-    assert remark.endswith("left out for learner.kind = 'mixed'")
+    Spec.of({"learner": {"kind": "mixed", "parts": parts}})
     parts[0]["learner"] = {"kind": "frozen", "rigde": 3.0}
     with pytest.raises(SpecError, match=r"^learner\.parts\[0\]\.learner\.rigde = 3\.0: unknown"):
         Spec.of({"learner": {"kind": "mixed", "parts": parts}})
@@ -75,23 +76,26 @@ def test_the_product_of_the_paper_is_that_of_all_variables_there_are() -> None:
     assert spec.conditions()[0].settings.learner.rule_base.order == 1
 
 
-def test_what_the_user_did_not_write_gives_way_with_one_remark() -> None:
-    spec = build({"learner": {"kind": "fitted-q"}})
-    (condition,) = spec.conditions()
+def test_a_table_without_a_kind_changes_the_default_of_its_key() -> None:
+    (condition,) = Spec.of(
+        {"preset": "own-value", "learner": {"exploration": {"rate": 0.1}}}
+    ).conditions()
     assert isinstance(condition.settings.learner, LearnerSettings)
-    assert condition.settings.learner.decision.value_of == "own"
-    assert condition.settings.learner.weights == "own"  # the scenario's, for two robots
-    assert spec.warnings() == (
-        "learner.decision.value_of, learner.regression_iterations: set by default, left out for "
-        "learner.kind = 'fitted-q'",
-    )
-    swept = Spec.of({"sweep": {"learner.kind": ["batch-td", "fitted-q", "td-lambda"]}})
-    (remark,) = swept.warnings()
-    assert remark.endswith("for learner.kind = 'fitted-q', learner.kind = 'td-lambda'")
-    assert not Spec.of({"preset": "fitted-q"}).warnings()
-    slow = {"kind": "gymnasium", "id": "CartPole-v1", "predictor": "copy", "success": "terminated"}
-    assert not Spec.of({"preset": "own-value", "scenario": slow}).warnings()
-    assert not Spec.of({}).warnings()
+    assert condition.settings.learner.exploration == BurstExploration(rate=0.1)
+    learner = FittedQSettings.model_validate({"exploration": {"length": 2.0}})
+    assert learner.exploration == BurstExploration(rate=1.0, decay=0.85, floor=0.05, length=2.0)
+
+
+def test_a_control_is_without_the_keys_that_tune_learning() -> None:
+    for control in ({"preset": "frozen"}, {"learner": {"kind": "frozen"}}):
+        overrides = [{"name": "trained"}, {"name": "control", **control}]
+        spec = Spec.of({"learner": {"ridge": 3.0, "discount": 0.5}, "overrides": overrides})
+        settings = spec.conditions()[1].settings.learner
+        assert isinstance(settings, FrozenSettings)
+        assert settings.discount == 0.5
+        assert any(
+            line.startswith("learner.ridge: left out for control") for line in spec.warnings()
+        )
 
 
 def test_what_the_user_wrote_is_refused() -> None:
@@ -103,6 +107,8 @@ def test_what_the_user_wrote_is_refused() -> None:
         build(swept)
     with pytest.raises(SpecError, match=r"learner\.trace_decay = 0.4: unknown key for kind"):
         build({"learner": {"kind": "fitted-q", "trace_decay": 0.4}})
+    with pytest.raises(SpecError, match=r"learner\.ridge = 3.0: unknown key for kind 'td-lambda'"):
+        Spec.of({"learner": {"ridge": 3.0}, "sweep": {"learner.kind": ["batch-td", "td-lambda"]}})
 
 
 @pytest.mark.parametrize("kind", EVALUATORS.built_in)
@@ -111,23 +117,20 @@ def test_an_evaluator_is_chosen_by_its_kind_alone(kind: str) -> None:
     table: dict[str, object] = {"learner": {"decision": decision}}
     if kind in ON_GRAPHS:
         table["topology"] = "coordination-graph:line"
+        with pytest.raises(ValueError, match=r"learner\.decision\.value_of = 'team'"):
+            build(table)
+        decision["value_of"] = "own"
     if kind == "cross-entropy":
         decision["rule"] = "reward"
-    spec = build(table)
-    gives_way = kind in ON_GRAPHS
-    assert any("learner.decision.value_of" in line for line in spec.warnings()) == gives_way
+    build(table)
 
 
-def test_the_kind_of_a_part_drops_what_is_another_ones() -> None:
-    for kind in EXPLORATIONS.built_in:
-        spec = build({"learner": {"exploration": {"kind": kind}}})
-        assert bool(spec.warnings()) == (kind != "burst")
-    paper = build({"preset": "paper", "learner": {"decision": {"evaluator": "best-response"}}})
-    assert paper.warnings() == (
-        "learner.decision.teammates: set by default, left out for "
-        "learner.decision.evaluator.kind = 'best-response'",
-    )
-    assert not build({"scenario": {"kind": "line-up"}}).warnings()
+@pytest.mark.parametrize("kind", EXPLORATIONS.built_in)
+def test_an_exploration_is_chosen_by_its_kind_alone(kind: str) -> None:
+    build({"learner": {"exploration": {"kind": kind}}})
+
+
+def test_a_key_of_another_scenario_is_refused() -> None:
     walled = {"kind": "line-up", "reward": {"of": "robot"}}
     with pytest.raises(SpecError, match=r"scenario\.reward"):
         build({"scenario": walled})
@@ -140,15 +143,17 @@ def test_a_control_stays_one_whatever_evaluates() -> None:
     assert learner.decision.rule == "random"
 
 
-def test_a_rule_base_too_large_for_a_batch_gives_way() -> None:
-    spec = build({"preset": "paper", "learner": {"kind": "batch-td"}})
-    assert "learner.rule_base.order" in spec.warnings()[0]
-    written = {"kind": "batch-td", "rule_base": {"order": 7}}
+def test_a_rule_base_too_large_for_a_batch_is_refused() -> None:
+    build({"preset": "paper", "learner": {"kind": "batch-td"}})
+    written = {
+        "kind": "batch-td",
+        "rule_base": {"membership": "sigmoid", "memberships": 5, "order": 7},
+    }
     with pytest.raises(ValueError, match="78125 rules, allowed up to 4096"):
         build({"preset": "paper", "learner": written})
 
 
-def test_a_kind_of_the_users_that_allows_less_is_given_less(tmp_path, monkeypatch) -> None:
+def test_a_kind_of_the_users_that_allows_less(tmp_path, monkeypatch) -> None:
     (tmp_path / "mine.py").write_text(
         "from typing import Literal\n"
         "from nested_agents.core.learners.batch import BatchTD, BatchTDSettings\n"
@@ -158,8 +163,7 @@ def test_a_kind_of_the_users_that_allows_less_is_given_less(tmp_path, monkeypatc
     )
     monkeypatch.chdir(tmp_path)
     table = {"scenario": {"robots": 3}, "learner": {"kind": "mine.py:Mine"}}
-    spec = build(table)
-    assert "learner.weights" in spec.warnings()[0]
+    build(table)
     with pytest.raises(SpecError, match=r"learner\.weights = 'role': must be 'own'"):
         Spec.of({**table, "learner": {"kind": "mine.py:Mine", "weights": "role"}})
 

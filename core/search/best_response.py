@@ -36,11 +36,10 @@ from pydantic import Field
 
 from ..interface.prediction import Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
-from ..plugins.settings import unwritten
 from ..values.rule_base import PooledWeights, RuleBase
 from .drawing import drawn_equal
 from .enumeration import combinations
-from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
+from .evaluator import Aggregation, DecisionContext, DecisionProblem, EvaluatorSettings
 
 CUTS = (0.25, 0.5, 0.75)
 """Shares of the bodies, in the order of decision, at which a team is cut in two."""
@@ -87,7 +86,7 @@ class BestResponseSettings(EvaluatorSettings):
     """Best responses around a plan for all agents that are searched over."""
 
     kind: Literal["best-response"] = "best-response"
-    sweeps: Annotated[int, Field(ge=0, le=100), unwritten(1)] = 1
+    sweeps: Annotated[int, Field(ge=0, le=100)] = 1
     """Rounds in which every body improves the plan before the first decision. Where all agents hear
     all decisions, the decisions themselves are a round: with 0, decisions take three quarters of
     the time."""
@@ -197,20 +196,20 @@ class BestResponse(Aggregation):
         decisions = sum(self.n_actions ** len(group) for group in self.problem.groups)
         return self._need(self.problem.hierarchy.order[0]) + decisions
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        agent = deliberation.agent
-        if self.all_values_zero(deliberation):
-            self.expected = deliberation.joint_action
+        agent = context.agent
+        if self.all_values_zero(context):
+            self.expected = context.joint_action
             return np.zeros(self.n_actions)
-        if self.begins(deliberation):
+        if self.begins(context):
             self._plans = {}
             self._last = None
-            self._equivalent = self._equivalent_actions(deliberation.prediction)
+            self._equivalent = self._equivalent_actions(context.prediction)
         free = self._own[agent]
         if self.n_actions ** len(free) > self._shares[agent]:
             free = (agent,)
-        plan = self._plan(deliberation, self._shares[agent] - self.n_actions ** len(free))
+        plan = self._plan(context, self._shares[agent] - self.n_actions ** len(free))
         last, concerned = self._last, self.concerned[agent]
         if last is not None and not last.is_valid(concerned, plan):
             last = None
@@ -219,15 +218,15 @@ class BestResponse(Aggregation):
         else:
             value = None if last is None else last.values.item(self._index(plan, last.free))
             self.count(agent, self.n_actions ** len(free))
-            values = self._body_values(deliberation, plan, free, value)
+            values = self._body_values(context, plan, free, value)
         self._last = _BodyValues(concerned, plan.copy(), free, values)
         # The plan keeps the best actions of the body; a message may then report other ones.
-        best = greatest(values.ravel(), deliberation.rng)
+        best = greatest(values.ravel(), context.rng)
         plan[list(free)] = self._actions[len(free)][best]
         self.expected = plan
         return values.max(axis=tuple(k for k, i in enumerate(free) if i != agent))
 
-    def decide(self, first: Deliberation, exploring: Exploring) -> IntArray | None:
+    def decide(self, first: DecisionContext, exploring: Exploring) -> IntArray | None:
         """Return the joint action ``(n,)`` of agents that all hear each other.
 
         None if the prediction has no search of its own: then the agents decide one by one.
@@ -252,21 +251,21 @@ class BestResponse(Aggregation):
         pooled = self.learned(first).pooled
         return respond(Search(pooled, starts, value, self._order, exploring, first.rng))
 
-    def _plan(self, deliberation: Deliberation, budget: int) -> IntArray:
+    def _plan(self, context: DecisionContext, budget: int) -> IntArray:
         """Return the plan ``(n,)`` as the deciding agent knows it, within a budget if it is new."""
-        agent = deliberation.agent
+        agent = context.agent
         planner = self._planner[agent]
         if planner not in self._plans:
-            self._plans[planner] = self._new_plan(deliberation, budget)
+            self._plans[planner] = self._new_plan(context, budget)
         plan = self._plans[planner]
         if not self._shares_plan[agent]:
             plan = plan.copy()
-        known = deliberation.told if self.problem.unseen == "plan" else self._others[agent]
-        plan[known] = deliberation.joint_action[known]
+        known = context.told if self.problem.unseen == "plan" else self._others[agent]
+        plan[known] = context.joint_action[known]
         return plan
 
     def _body_values(
-        self, deliberation: Deliberation, plan: IntArray, free: tuple[int, ...], value: float | None
+        self, context: DecisionContext, plan: IntArray, free: tuple[int, ...], value: float | None
     ) -> FloatArray:
         """Return the values ``(A,) * k`` of all actions of the k free agents of a body.
 
@@ -276,7 +275,7 @@ class BestResponse(Aggregation):
         actions = self._actions[len(free)]
         if value is None:
             joint = _with_actions(plan, free, actions)
-            return self.predicted_worth(deliberation, joint).reshape(shape)
+            return self.predicted_worth(context, joint).reshape(shape)
         equivalent, distinct = self._distinct(free)
         planned = equivalent[self._index(plan, free)]
         predicted = distinct[distinct != planned]
@@ -284,7 +283,7 @@ class BestResponse(Aggregation):
         values[planned] = value
         if len(predicted):
             joint = _with_actions(plan, free, actions[predicted])
-            values[predicted] = self.predicted_worth(deliberation, joint)
+            values[predicted] = self.predicted_worth(context, joint)
         return values[equivalent].reshape(shape)
 
     def _distinct(self, agents: tuple[int, ...]) -> tuple[IntArray, IntArray]:
@@ -298,24 +297,24 @@ class BestResponse(Aggregation):
         every = self._numbers[: len(self._actions[len(agents)])]
         return every, every
 
-    def _new_plan(self, deliberation: Deliberation, budget: int) -> IntArray:
+    def _new_plan(self, context: DecisionContext, budget: int) -> IntArray:
         """Return a plan ``(n,)`` for the agent and those that it plans for."""
-        agent, rng = deliberation.agent, deliberation.rng
+        agent, rng = context.agent, context.rng
         free = self._free[agent]
         if self.problem.unseen == "plan":
-            told = set(deliberation.told.tolist())
+            told = set(context.told.tolist())
             free = tuple(i for i in self.hierarchy.order if i not in told)
         bodies: dict[int, list[int]] = {}
         for i in free:
             bodies.setdefault(int(self._body_of[i]), []).append(i)
-        plan = self._start(deliberation, free, budget)
+        plan = self._start(context, free, budget)
         budget -= min(budget, len(self._starts[free]))
         value = None
         for members in self._sweeps * list(bodies.values()):
             budget -= self.n_actions ** len(members)
             if self.problem.budget is not None and budget < 0:
                 break
-            values = self._body_values(deliberation, plan, tuple(members), value).ravel()
+            values = self._body_values(context, plan, tuple(members), value).ravel()
             distinct = self._distinct(tuple(sorted(members)))[1]
             self.count(agent, len(distinct))
             best = distinct[greatest(values[distinct], rng)]
@@ -323,20 +322,20 @@ class BestResponse(Aggregation):
             value = values[best]
         return plan
 
-    def _start(self, deliberation: Deliberation, free: tuple[int, ...], budget: int) -> IntArray:
+    def _start(self, context: DecisionContext, free: tuple[int, ...], budget: int) -> IntArray:
         """Return the best ``(n,)`` of the joint actions to start from that the budget covers."""
-        starts, rng = self._with_starts(deliberation, free), deliberation.rng
+        starts, rng = self._with_starts(context, free), context.rng
         if self.problem.budget is not None and budget < len(starts):
             if budget == 0:
-                return deliberation.joint_action.copy()
+                return context.joint_action.copy()
             starts = starts[rng.choice(len(starts), budget, replace=False)]
-        return starts[greatest(self.worth(deliberation, starts), rng)]
+        return starts[greatest(self.worth(context, starts), rng)]
 
-    def _with_starts(self, deliberation: Deliberation, free: tuple[int, ...]) -> IntArray:
+    def _with_starts(self, context: DecisionContext, free: tuple[int, ...]) -> IntArray:
         """Return the joint actions ``(m, n)`` that a plan may start from."""
         if free not in self._starts:
             self._starts[free] = self._starting_actions(free)
-        return _with_actions(deliberation.joint_action, free, self._starts[free])
+        return _with_actions(context.joint_action, free, self._starts[free])
 
     def _starting_actions(self, free: tuple[int, ...]) -> IntArray:
         """Return actions ``(m, k)`` of the k free agents, in the order of decision."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.adaptation.calibration import Calibration, CalibrationSettings
+from nested_agents.core.models.calibration import Calibration, CalibrationSettings
 
 SETTINGS = CalibrationSettings(enabled=True)
 LEVERS = np.array([0.1, 0.05])

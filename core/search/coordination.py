@@ -25,11 +25,11 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..coordination.graphs import Elimination, MaxPlus
 from ..interface.prediction import Prediction, rewards_of
 from ..numerics import FloatArray, IntArray
+from .coordination_graphs import Elimination, MaxPlus
 from .enumeration import combinations
-from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
+from .evaluator import Aggregation, DecisionContext, DecisionProblem, EvaluatorSettings
 
 FIRST = 1e-9
 """Relative margin by which an agent prefers its own part of the joint action among ties."""
@@ -113,11 +113,11 @@ class Coordination(Aggregation):
         self._tables: list[FloatArray] = []
         self._best: IntArray = np.zeros(n, dtype=np.int64)
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        agent = deliberation.agent
-        if self.begins(deliberation):
-            self._tables = [self._table(deliberation, i) for i in range(len(self.scopes))]
+        agent = context.agent
+        if self.begins(context):
+            self._tables = [self._table(context, i) for i in range(len(self.scopes))]
             self._best = self._maximiser.best(self._tables)
         values = np.zeros(self.n_actions)
         for k in self._concerning[agent]:
@@ -130,18 +130,18 @@ class Coordination(Aggregation):
         values[is_equal] -= 2.0 * margin
         return values
 
-    def _table(self, deliberation: Deliberation, agent: int) -> FloatArray:
+    def _table(self, context: DecisionContext, agent: int) -> FloatArray:
         """Return an agent's values of the joint actions of its scope."""
         scope = self.scopes[agent]
         tried = self._tried[len(scope)]
         self.count(agent, len(tried))
         shape = (self.n_actions,) * len(scope)
-        weights = deliberation.weights[agent]
+        weights = context.weights[agent]
         if not weights.any():
             return np.zeros(shape)
-        joint = deliberation.joint_action[None].repeat(len(tried), axis=0)
+        joint = context.joint_action[None].repeat(len(tried), axis=0)
         joint[:, list(scope)] = tried
-        states = deliberation.prediction.states(agent, joint)
+        states = context.prediction.states(agent, joint)
         return self.rules.values(weights, states).reshape(shape)
 
 
@@ -194,18 +194,18 @@ class CrossEntropy(Aggregation):
             self._iterations = min(settings.iterations, problem.budget // iteration)
         self._plan: IntArray = np.zeros(len(hierarchy), dtype=np.int64)
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        if self.begins(deliberation):
-            self._plan = self._planned(deliberation)
+        if self.begins(context):
+            self._plan = self._planned(context)
         values = np.zeros(self.n_actions)
-        values[self._plan[deliberation.agent]] = 1.0
+        values[self._plan[context.agent]] = 1.0
         return values
 
-    def _planned(self, deliberation: Deliberation) -> IntArray:
+    def _planned(self, context: DecisionContext) -> IntArray:
         """Return the joint action ``(n,)`` that the best plan begins with."""
-        s, rng = self.settings, deliberation.rng
-        prediction = deliberation.prediction
+        s, rng = self.settings, context.rng
+        prediction = context.prediction
         shape = s.horizon, len(self.hierarchy), self.n_actions
         probabilities = np.full(shape, 1.0 / self.n_actions)
         n_elite = max(1, round(s.elite * s.samples))
@@ -213,7 +213,7 @@ class CrossEntropy(Aggregation):
         for _ in range(self._iterations):
             plans = self.sample(probabilities, s.samples, rng)
             plans[: len(elite[:1])] = elite[:1]  # the best so far
-            worths = self._worths(deliberation.agent, prediction, plans)
+            worths = self._worths(context.agent, prediction, plans)
             elite = plans[np.argsort(-worths, kind="stable")[:n_elite]]
             seen = (elite[..., None] == np.arange(self.n_actions)).mean(axis=0)
             probabilities = s.smoothing / self.n_actions + (1.0 - s.smoothing) * seen
