@@ -1,4 +1,4 @@
-"""Who is above whom: builders, specs, checks and pictures of hierarchies."""
+"""Topologies: builders, settings, checks and pictures of hierarchies."""
 
 from ..core.hierarchy.hierarchy import Hierarchy
 from .builders import from_networkx

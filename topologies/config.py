@@ -48,7 +48,7 @@ DecisionOrder = Literal["listed", "reversed"] | tuple[str, ...]
 
 
 class TopologySettings(PartSettings):
-    """What the settings of all topologies share."""
+    """Settings that all topologies share."""
 
     communication: Communication = "ancestors"
     """Agents whose decided actions an agent receives: all its ancestors, its parents only, or none.
@@ -86,7 +86,7 @@ class TopologySettings(PartSettings):
 
     @property
     def title(self) -> str:
-        """What it is called in messages: its file, its kind, or its class."""
+        """Name in messages: the file, the kind, or the class."""
         return str(dict(self).get("path") or self.kind or type(self).__name__)
 
 

@@ -1,4 +1,4 @@
-"""What follows a colon in a topology that is written as a string, as ``"tree:3"``."""
+"""Arguments after the colon of a topology that is written as a string, as ``"tree:3"``."""
 
 from __future__ import annotations
 

@@ -33,13 +33,13 @@ class HierarchyView:
     text: str
     """The topology as the user wrote it."""
     hierarchy: Hierarchy
-    """What it makes."""
+    """The hierarchy that the topology makes."""
     bodies: tuple[tuple[int, ...], ...]
-    """Its agents by body."""
+    """Agents by body."""
     actions: int
     """Actions of an agent."""
     failures: tuple[MessageFailure, ...] = ()
-    """What fails of the messages."""
+    """Failures of messages."""
 
     @property
     def tries(self) -> tuple[int, ...]:
@@ -64,7 +64,7 @@ class HierarchyView:
 
     @property
     def title(self) -> str:
-        """What it is, in one line."""
+        """Title in one line."""
         n = len(self.hierarchy)
         depth = self.hierarchy.depth
         agents = f"{n} agent{'s' if n > 1 else ''}"

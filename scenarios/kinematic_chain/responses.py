@@ -30,8 +30,12 @@ class PiecewiseLinear(NamedTuple):
 
 
 class Options(NamedTuple):
-    """Actions of n joints, A each, and the value functions of the team."""
+    """Actions of n joints, A each, the value functions of the team, and its goal."""
 
+    goal: FloatArray
+    """``(2,)`` goal of the tip [m]."""
+    previous_distance: float
+    """Distance of the tip from the goal before the decision [m]."""
     turns: FloatArray
     """``(n, A)`` angle by which each action turns the joint [rad]."""
     alike: IntArray
@@ -92,13 +96,7 @@ def _rotated(
 
 @njit(cache=True)
 def _value_after(
-    places: FloatArray,
-    goal: FloatArray,
-    before: float,
-    joint: int,
-    turn: float,
-    options: Options,
-    xs: FloatArray,
+    places: FloatArray, joint: int, turn: float, options: Options, xs: FloatArray
 ) -> float:
     """Return the summed value of all joints, except for speeds, after a joint turns [rad].
 
@@ -106,7 +104,7 @@ def _value_after(
     """
     n = len(xs)
     pivot, tip = (places[0, joint], places[1, joint]), (places[0, n], places[1, n])
-    target = (goal[0], goal[1])
+    target = (options.goal[0], options.goal[1])
     moved = _rotated(tip, pivot, turn)
     _write_bearings(places, moved, target, (0, joint + 1), xs)
     _write_bearings(places, tip, _rotated(target, pivot, -turn), (joint + 1, n), xs)
@@ -114,15 +112,13 @@ def _value_after(
     distance = np.hypot(target[0] - moved[0], target[1] - moved[1])
     xs[0] = distance
     value += _sum(options.distance, xs[:1])
-    xs[0] = before - distance
+    xs[0] = options.previous_distance - distance
     return value + _sum(options.approach, xs[:1])
 
 
 @njit(cache=True)
 def respond(
     places: FloatArray,
-    goal: FloatArray,
-    before: float,
     plan: IntArray,
     order: IntArray,
     options: Options,
@@ -135,14 +131,12 @@ def respond(
     ----------
     places
         ``(2, n + 1)`` positions of joints and tip under the plan [m]; modified.
-    goal, before
-        ``(2,)`` goal of the tip, and its distance from there before the decision [m].
     plan
         ``(n,)`` joint action; modified.
     order
         ``(n,)`` the order of decision.
     options
-        Actions and value functions.
+        Actions, value functions and goal.
     exploring
         How joints explore.
     rng
@@ -156,7 +150,7 @@ def respond(
             for a in range(n_actions):
                 same = options.alike[joint, a]
                 if same == a:
-                    value = _value_after(places, goal, before, joint, turns[a], options, xs)
+                    value = _value_after(places, joint, turns[a], options, xs)
                     values[a] = (value + options.speed_values[joint, a]) / n
                 else:
                     values[a] = values[same] if decides else -np.inf

@@ -375,6 +375,8 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         bearing_values = np.tile(weights[1], 3)[:, period]
         team_values = [values.sum(axis=0, keepdims=True) for values in weights[2:]]
         options = Options(
+            self.goal,
+            self.before,
             self.turns,
             self.alike,
             np.einsum("iam,im->ia", speed.strengths(self._fractions), weights[0]),
@@ -385,7 +387,7 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         angles = self.angles + self.turns[self._joints, plan]
         places = np.ascontiguousarray(forward_kinematics(angles, self.arm.length).T)
         order, exploring, rng = search.order, search.exploring, search.rng
-        return respond(places, self.goal, self.before, plan, order, options, exploring, rng)
+        return respond(places, plan, order, options, exploring, rng)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the joint speeds ``(n,)`` that a joint action ``(n,)`` would command [rad/s]."""

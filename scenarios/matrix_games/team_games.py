@@ -246,7 +246,7 @@ class TeamGame(Scenario):
         return Transition(self._states(), payoff, False, False, info)
 
     def draw(self, path: Path) -> None:
-        """Draw the agents and the pairs whose actions the payoff joins to a picture file."""
+        """Draw the agents and the edges of the payoff to a picture file."""
         from matplotlib.figure import Figure
 
         from ..movies import save_picture

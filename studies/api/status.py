@@ -21,11 +21,11 @@ class Progress:
     total: int
     """Number of trials."""
     done: int
-    """Of these, how many have ended well."""
+    """Number of trials that have finished."""
     failed: int
-    """How many have failed."""
+    """Number of trials that have failed."""
     left: int
-    """How many neither ended nor run."""
+    """Number of trials that have neither ended nor started."""
     running: tuple[tuple[str, int, float], ...]
     """Condition, seed, and seconds so far of the trials that are running."""
     processes: int
@@ -34,7 +34,7 @@ class Progress:
     seconds: float | None
     """Estimate of the time left [s]; None if nothing has finished to go by."""
     checkpoints: int
-    """How many trials that do not run would go on from a checkpoint."""
+    """Number of waiting trials that would resume from a checkpoint."""
     damaged: tuple[str, ...]
     """What has finished but is not as it was written, one line each; counted as left."""
     refusal: str | None
@@ -130,7 +130,7 @@ def describe(store: Store, now: Progress) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Status:
-    """How far a study is; printed, as the command ``status`` says it."""
+    """Progress of a study; printed like the command ``status``."""
 
     progress: Progress
     """Its trials, each counted once."""

@@ -99,14 +99,14 @@ def print_study(
 def show_results(
     study: StudyResults, formats: Sequence[str] = (), report: Path | None = None
 ) -> int:
-    """Print the table of a study that has been run, write its figures, print where everything is.
+    """Print the table of a study that has been run, draw figures, and say where everything is.
 
     Parameters
     ----------
     study
         What has been run.
     formats
-        Of the figures; none: PNG and SVG.
+        Formats of the figures; without any, none are drawn.
     report
         Path of its report, if it has been written; without it the command is printed that does.
 
@@ -116,16 +116,18 @@ def show_results(
         1 if any trial failed, else 0.
     """
     from ...topologies.builders import join_names
-    from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
     from ..presentation.progress import count, say
     from ..spec.controls import TROUBLESHOOTING
 
     directory = study.directory
     print_study(study)
-    folder = directory / "figures"
-    folder.mkdir(exist_ok=True)
-    drawings = figures.save(study.figures, folder, formats or figures.USUAL)
-    print_text("", *(f"figure  {path}" for path in drawings))
+    print_text("")
+    if formats:
+        from ..presentation.figures import save  # Matplotlib is slow to import
+
+        folder = directory / "figures"
+        folder.mkdir(exist_ok=True)
+        print_text(*(f"figure  {path}" for path in save(study.figures, folder, formats)))
     if study.unlearned:
         names = join_names(study.unlearned, 3)
         print_wrapped(

@@ -159,8 +159,7 @@ figures = click.option(
     multiple=True,
     type=click.Choice(["png", "svg", "pdf"]),
     metavar="png|svg|pdf...",
-    default=("png", "svg"),
-    help="Formats of the figures.",
+    help="Also draw the figures of the study, in these formats. The report draws them in any case.",
 )
 """Formats of the figures of a study."""
 

@@ -24,8 +24,6 @@ from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")
 """Formats that figures are written in."""
-USUAL = ("png", "svg")
-"""Default formats of the figures of a study."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colors distinct to color-blind readers (Okabe and Ito 2008), without the palest."""
 STYLES = (
@@ -176,7 +174,7 @@ def name_points(figure: Figure, labels: Sequence[str], title: str = "") -> None:
     add_legend(figure, [handle(n, **own) for n, own in zip(labels, looks, strict=True)], title)
 
 
-def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = USUAL) -> list[Path]:
+def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str]) -> list[Path]:
     """Write figures into an existing folder, by their names; return the paths.
 
     `formats` are suffixes without a dot.

@@ -32,7 +32,7 @@ Point = dict[str, object]
 
 
 class UserTables(NamedTuple):
-    """What a spec says about its conditions."""
+    """Tables of a spec that define its conditions."""
 
     preset: str
     """Preset of conditions that name no other."""

@@ -21,7 +21,6 @@ from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.commands import reading, running  # noqa: F401
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import text  # noqa: F401
-from nested_agents.studies.presentation import figures
 from nested_agents.studies.report import page  # noqa: F401
 
 
@@ -67,6 +66,5 @@ if __name__ == "__main__":
     if task["measure"]:
         learning_curve.measure = getattr(made_up, task["measure"])
         studies_run.check_conditions = lambda spec, **_: made_up.MEASURES
-        figures.USUAL = ("svg",)  # nobody looks at them
     sys.argv = ["nested-agents", *task["arguments"]]
     sys.exit(main())

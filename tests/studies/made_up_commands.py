@@ -21,19 +21,14 @@ import pytest
 from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.presentation import figures
 
 PROGRAM = Path(made_up.__file__).with_name("made_up_cli.py")
 
 
-def run_here(measure, *arguments, usual=("svg",)):
-    """Run a command in this process with made-up results; return status, output and errors.
-
-    Figures of a study are written as `usual`: as nobody looks at them, in one form.
-    """
+def run_here(measure, *arguments):
+    """Run a command in this process with made-up results; return status, output and errors."""
     out, err = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.setattr(figures, "USUAL", usual)
         patch.setattr(learning_curve, "measure", measure)
         patch.setattr(studies_run, "check_conditions", lambda spec, **_: made_up.MEASURES)
         patch.setenv("COLUMNS", "80")

@@ -38,7 +38,7 @@ from matplotlib.transforms import Affine2D
 from ....core.numerics import BoolArray, FloatArray
 from ...movies import Pixels, Scene, film, save_picture
 from ..world.boxes import BoxSpec, box_for
-from ..world.geometry import infrared_readings
+from ..world.geometry import InfraredSensors, infrared_readings
 from ..world.robots import robot_for, sensor_directions
 from ..world.settings import InfraredSettings, RobotSettings
 
@@ -182,20 +182,14 @@ class _BoxScene(Scene):
         box = self.recording["box_pose"][step]
         outline = self.box.outline
         radius = self.robot.radius
-        sensors = sensor_directions([self.robot] * len(poses))
-        linear = infrared_readings(
-            poses,
-            np.full(len(poses), radius),
-            sensors,
-            box,
-            outline.edges,
-            outline.rounding,
-            infrared.reach,
-            infrared.decay,
-            1,
-        ).max(axis=0)
+        directions = sensor_directions([self.robot] * len(poses))
+        radii = np.full(len(poses), radius)
+        # Linear readings tell distances.
+        sensors = InfraredSensors(radii, directions, infrared.reach, infrared.decay, 1)
+        readings = infrared_readings(poses, box, outline.edges, outline.rounding, sensors)
+        linear = readings.max(axis=0)
         distances = infrared.reach * (1.0 - linear)
-        angles = poses[:, 2:] + sensors
+        angles = poses[:, 2:] + directions
         along = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         eyes = poses[:, None, :2] + radius * along
         segments = np.stack([eyes, eyes + distances[..., None] * along], axis=2)

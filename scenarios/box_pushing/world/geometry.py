@@ -215,26 +215,20 @@ def disc_hit(cx: float, cy: float, radius: float, dx: float, dy: float, reach: f
 
 @njit(cache=True)
 def _ray_edge(
-    x0: float,
-    y0: float,
-    x1: float,
-    y1: float,
-    x: float,
-    y: float,
-    dx: float,
-    dy: float,
+    edge: tuple[float, float, float, float],
+    origin: tuple[float, float],
+    direction: tuple[float, float],
     reach: float,
 ) -> float:
-    """Return the distance at which a ray crosses a segment, or `reach`.
-
-    The segment is from (x0, y0) to (x1, y1), the ray from (x, y) on along (dx, dy).
-    """
+    """Return the distance at which a ray crosses a segment (x0, y0, x1, y1), or `reach`."""
+    x0, y0, x1, y1 = edge
+    dx, dy = direction
     ex, ey = x1 - x0, y1 - y0
     cross = dx * ey - dy * ex
     if cross == 0.0:
         return reach
-    t = ((x0 - x) * ey - (y0 - y) * ex) / cross
-    s = ((x0 - x) * dy - (y0 - y) * dx) / cross
+    t = ((x0 - origin[0]) * ey - (y0 - origin[1]) * ex) / cross
+    s = ((x0 - origin[0]) * dy - (y0 - origin[1]) * dx) / cross
     return t if 0.0 <= t < reach and 0.0 <= s <= 1.0 else reach
 
 
@@ -270,9 +264,10 @@ def ray(
             length = hypot(x1 - x0, y1 - y0)
             if length > 0.0:  # the ring closes, so the other end is some edge's start
                 ox, oy = rounding * (y1 - y0) / length, -rounding * (x1 - x0) / length
-                best = _ray_edge(x0 + ox, y0 + oy, x1 + ox, y1 + oy, x, y, dx, dy, best)
+                moved = x0 + ox, y0 + oy, x1 + ox, y1 + oy
+                best = _ray_edge(moved, (x, y), (dx, dy), best)
         else:
-            best = _ray_edge(x0, y0, x1, y1, x, y, dx, dy, best)
+            best = _ray_edge((x0, y0, x1, y1), (x, y), (dx, dy), best)
     return best
 
 
@@ -284,39 +279,45 @@ def response(distance: float, reach: float, decay: float, kind: int) -> float:
     return 1.0 - distance / reach if kind == 1 else 1.0
 
 
+class InfraredSensors(NamedTuple):
+    """Infrared sensors of M round robots, S on each, for kernels."""
+
+    radii: FloatArray
+    """``(M,)`` radii of the robots [m]."""
+    directions: FloatArray
+    """``(M, S)`` directions of the sensors in the body frame [rad]."""
+    reach: float
+    """See `InfraredSettings`, as what follows."""
+    decay: float
+    kind: int
+
+
 @njit(cache=True)
 def infrared_readings(
     robots: FloatArray,
-    radii: FloatArray,
-    sensors: FloatArray,
     box: FloatArray,
     edges: FloatArray,
     rounding: float,
-    reach: float,
-    decay: float,
-    kind: int,
+    sensors: InfraredSensors,
 ) -> FloatArray:
-    """Return what the sensors of all robots read.
+    """Return the readings of the sensors of all robots.
 
     Parameters
     ----------
-    robots, radii
-        ``(M, 3)`` poses and ``(M,)`` radii of the round bodies.
-    sensors
-        ``(M, S)`` directions in the body frame [rad].
-    box
-        ``(3,)`` pose.
+    robots, box
+        ``(M, 3)`` and ``(3,)`` poses.
     edges, rounding
         Outline of the box.
-    reach, decay, kind
-        See `InfraredSettings`.
+    sensors
+        The sensors.
 
     Returns
     -------
     FloatArray
         ``(2, M, S)`` readings in [0, 1]: of the box alone, and of the other robots alone.
     """
-    n, s = sensors.shape
+    radii, directions, reach, decay, kind = sensors
+    n, s = directions.shape
     out = np.zeros((2, n, s))
     cos, sin = np.cos(box[2]), np.sin(box[2])
     for r in range(n):
@@ -324,7 +325,7 @@ def infrared_readings(
         bx, by = cos * dx + sin * dy, cos * dy - sin * dx
         sees_box = surface(edges, rounding, bx, by)[0] < radii[r] + reach
         for k in range(s):
-            angle = robots[r, 2] + sensors[r, k]
+            angle = robots[r, 2] + directions[r, k]
             ux, uy = np.cos(angle), np.sin(angle)
             if sees_box:
                 lx, ly = cos * ux + sin * uy, cos * uy - sin * ux

@@ -310,43 +310,48 @@ def reward(
     """
     settings = task.reward
     penalties = settings.c2 * np.exp(-settings.r2 * readings)
+    if settings.of == "team":
+        penalties = np.add.reduce(penalties, axis=1, keepdims=True)
+    nearness = settings.c1 * np.exp(-settings.r1 * distance)[:, None]
+    attraction = nearness if settings.attraction_without_contact else 0.0
     return _gained(
-        settings.c1 * np.exp(-settings.r1 * distance),
-        np.add.reduce(penalties, axis=1, keepdims=True) if settings.of == "team" else penalties,
-        settings.c4 * np.abs(orientation),
+        nearness - penalties - settings.c4 * np.abs(orientation)[:, None],
+        attraction - penalties,
         approach < -settings.least_approach,
         task.reached(distance, orientation) & settings.pays_at_goal,
         np.ascontiguousarray(contact),
         np.ascontiguousarray(readings > 0.0),
-        settings.attraction_without_contact,
-        settings.receding,
-        settings.some_out_of_range,
-        settings.all_out_of_range,
-        settings.c1,
+        _Constants(
+            settings.c1, settings.receding, settings.some_out_of_range, settings.all_out_of_range
+        ),
     )
+
+
+class _Constants(NamedTuple):
+    """Constant rewards at the goal and under Conditions 2, 4 and 5."""
+
+    at_goal: float
+    receding: float
+    some_out: float
+    all_out: float
 
 
 @njit(cache=True)
 def _gained(
-    r1: FloatArray,
-    r2_r3: FloatArray,
-    r4: FloatArray,
+    pushing: FloatArray,
+    within_range: FloatArray,
     nearer: BoolArray,
     there: BoolArray,
     contact: BoolArray,
     within: BoolArray,
-    attracts: bool,
-    receding: float,
-    some_out: float,
-    all_out: float,
-    at_goal: float,
+    constants: _Constants,
 ) -> FloatArray:
     """Return the reward ``(m, parties)`` by the conditions; see `reward`.
 
-    A party is the team, or each robot; `r2_r3` is ``(m, parties)``, `contact` and `within` are
-    ``(m, M)``, the others ``(m,)``.
+    A party is the team, or each robot. `pushing` and `within_range` are the rewards ``(m,
+    parties)`` under Conditions 1 and 3, `contact` and `within` are ``(m, M)``, the others ``(m,)``.
     """
-    n_situations, n_parties = r2_r3.shape
+    n_situations, n_parties = pushing.shape
     members = contact.shape[1] // n_parties
     out = np.empty((n_situations, n_parties))
     for s in range(n_situations):
@@ -354,11 +359,11 @@ def _gained(
             touch = contact[s, party * members : (party + 1) * members].all()
             near = within[s, party * members : (party + 1) * members]
             if there[s]:
-                out[s, party] = at_goal
+                out[s, party] = constants.at_goal
             elif touch:
-                out[s, party] = r1[s] - r2_r3[s, party] - r4[s] if nearer[s] else receding
+                out[s, party] = pushing[s, party] if nearer[s] else constants.receding
             elif near.all():
-                out[s, party] = -r2_r3[s, party] + (r1[s] if attracts else 0.0)
+                out[s, party] = within_range[s, party]
             else:
-                out[s, party] = some_out if near.any() else all_out
+                out[s, party] = constants.some_out if near.any() else constants.all_out
     return out

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import ctypes
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import Box2D
 import numpy as np
 from Box2D import _Box2D
 
 from ....core.numerics import FloatArray, IntArray, njit
-from .geometry import gaps, infrared_readings
+from .geometry import InfraredSensors, gaps, infrared_readings
 from .robots import WheelModel, wheel_wrenches
 
 if TYPE_CHECKING:
@@ -43,99 +43,102 @@ AT_REST = 60
 """Force and torque, step [s] and number of steps of the check in `step_address`."""
 
 
+class Physics(NamedTuple):
+    """Constants of the simulation of M robots and a box."""
+
+    step: int
+    """Address of ``b2World::Step``; 0 if bodies are not to be written to."""
+    substeps: int
+    """Steps of Box2D in a control period."""
+    dt: float
+    """Duration of a step [s]."""
+    unit: float
+    """Units of Box2D per metre."""
+    wheels: WheelModel
+    """Wheels, in units of Box2D."""
+    edges: FloatArray
+    """Outline of the box, as what follows."""
+    rounding: float
+    radii: FloatArray
+    """``(M,)`` radii of the robots [m]."""
+    touching: float
+    """Gap below which a robot is in contact [m]."""
+
+
 @njit(cache=True, names_of="memory")
 def advance(
-    function: int,
-    world: int,
-    bodies: IntArray,
+    physics: Physics,
+    addresses: IntArray,
     speeds: FloatArray,
-    substeps: int,
-    dt: float,
-    unit: float,
-    model: WheelModel,
     last: FloatArray,
     wrenches: FloatArray,
-    edges: FloatArray,
-    rounding: float,
-    radii: FloatArray,
-    touching: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Let control periods pass; return poses ``(M + 1, 3)``, gaps and contact time ``(M,)``.
+    """Simulate control periods; return poses ``(M + 1, 3)``, gaps and contact time ``(M,)``.
 
     Parameters
     ----------
-    function, world, bodies
-        Addresses of ``b2World::Step``, a world, and its box and robots ``(M + 1,)``.
+    physics
+        Constants of the simulation.
+    addresses
+        ``(M + 2,)`` addresses of a world, its box and its robots.
     speeds
-        ``(periods, n)`` of the wheels, in units of Box2D.
-    substeps, dt
-        Steps of Box2D in a period, and how long one is [s].
-    unit
-        Units of Box2D per metre.
-    model, last, wrenches
-        Of the wheels, see `wheel_wrenches`; the latter two are modified.
-    edges, rounding, radii
-        Outline of the box, and radii ``(M,)`` of the robots.
-    touching
-        Gap below which a robot is in contact [m].
+        ``(periods, n)`` wheel speeds in units of Box2D.
+    last, wrenches
+        ``(M, 3)`` state of the wheels, see `wheel_wrenches`; modified.
     """
+    dt, unit, bodies = physics.dt, physics.unit, addresses[1:]
     n_robots = len(bodies) - 1
     motion = np.empty((n_robots, 4))
     poses = np.empty((n_robots + 1, 3))
     apart: FloatArray = np.empty(n_robots)
     touched = np.zeros(n_robots)
     for period in range(len(speeds)):
-        for _ in range(substeps):
+        for _ in range(physics.substeps):
             for r in range(n_robots):
                 body = bodies[r + 1]
                 motion[r, 0] = load(body + ANGLE)
                 motion[r, 1] = load(body + VELOCITY)
                 motion[r, 2] = load(body + VELOCITY + 4)
                 motion[r, 3] = load(body + TURNING)
-            wheel_wrenches(motion, speeds[period], dt, model, last, wrenches)
+            wheel_wrenches(motion, speeds[period], dt, physics.wheels, last, wrenches)
             for r in range(n_robots):
                 body = bodies[r + 1]
                 set_bits(body + FLAGS, np.int16(AWAKE))
                 for k in range(3):  # force and torque lie side by side, and are added to
                     at = body + FORCE + 4 * k
                     store(at, load(at) + np.float32(wrenches[r, k]))
-            call(function, world, np.float32(dt), VELOCITY_ITERATIONS, POSITION_ITERATIONS)
+            call(
+                physics.step,
+                addresses[0],
+                np.float32(dt),
+                VELOCITY_ITERATIONS,
+                POSITION_ITERATIONS,
+            )
         for r in range(n_robots + 1):
             poses[r, 0] = load(bodies[r] + POSITION) / unit
             poses[r, 1] = load(bodies[r] + POSITION + 4) / unit
             poses[r, 2] = load(bodies[r] + ANGLE)
-        apart = gaps(poses[1:], poses[:1], edges, rounding, radii)
+        apart = gaps(poses[1:], poses[:1], physics.edges, physics.rounding, physics.radii)
         for r in range(n_robots):
-            touched[r] += apart[r] < touching
+            touched[r] += apart[r] < physics.touching
     return poses, apart, touched / len(speeds)
 
 
 @njit(cache=True, names_of="memory")
 def advance_many(
-    function: int,
+    physics: Physics,
+    sensors: InfraredSensors,
     addresses: IntArray,
     speeds: FloatArray,
     periods: int,
-    substeps: int,
-    dt: float,
-    unit: float,
-    model: WheelModel,
     last: FloatArray,
     wrenches: FloatArray,
-    edges: FloatArray,
-    rounding: float,
-    radii: FloatArray,
-    touching: float,
-    sensors: FloatArray,
-    reach: float,
-    decay: float,
-    kind: int,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Let control periods pass in many worlds alike, see `advance` and `infrared_readings`.
+    """Simulate control periods in W equal worlds, see `advance`.
 
-    Axes of worlds stand first: addresses ``(W, M + 2)`` of worlds, boxes and robots, speeds
-    ``(W, n)``, held for all periods. Returned are poses ``(W, M + 1, 3)``, gaps ``(W, M)``, and
-    what the infrared sensors of each robot read most of the box ``(W, M)``.
+    The first axis of arrays is that of worlds; speeds ``(W, n)`` are held for all periods. Returned
+    are poses ``(W, M + 1, 3)``, gaps ``(W, M)``, and the strongest infrared reading of the box by
+    each robot ``(W, M)``.
     """
     count = len(addresses)
     n_bodies = addresses.shape[1] - 1
@@ -145,12 +148,9 @@ def advance_many(
     held = np.empty((periods, speeds.shape[1]))
     for w in range(count):
         held[:] = speeds[w]
-        poses[w], apart[w], _ = advance(
-            function, addresses[w, 0], addresses[w, 1:], held, substeps, dt, unit, model,
-            last[w], wrenches[w], edges, rounding, radii, touching,
-        )  # fmt: skip
+        poses[w], apart[w], _ = advance(physics, addresses[w], held, last[w], wrenches[w])
         readings = infrared_readings(
-            poses[w, 1:], radii, sensors, poses[w, 0], edges, rounding, reach, decay, kind
+            poses[w, 1:], poses[w, 0], physics.edges, physics.rounding, sensors
         )
         for r in range(n_bodies - 1):
             strongest[w, r] = readings[0, r].max()

@@ -26,13 +26,14 @@ import numpy as np
 from ....core.numerics import BoolArray, FloatArray, IntArray
 from ...faults.settings import Failures, FailureSettings, Free
 from .boxes import BoxSpec
-from .geometry import gaps, infrared_readings
+from .geometry import InfraredSensors, gaps, infrared_readings
 from .polygons import UNIT
 from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
 from .stepping import (
     POSITION_ITERATIONS,
     VELOCITY_ITERATIONS,
+    Physics,
     advance,
     advance_many,
     step_address,
@@ -86,6 +87,8 @@ class World:
         ``(M,)`` distance between the surfaces of robot and box [m].
     contact
         ``(M,)`` whether each robot touches the box.
+    addresses
+        ``(M + 2,)`` memory addresses of the world, the box and the robots; valid until `restore`.
     contact_time
         ``(M,)`` fraction of the control periods of the last `advance` that ended in contact.
 
@@ -113,7 +116,13 @@ class World:
         self.n_wheels = sum(len(robot.wheels) for robot in robots)
         self.dt = CONTROL_PERIOD / SUBSTEPS
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
-        self._sensors = sensor_directions(robots)
+        self._sensors = InfraredSensors(
+            self._radii,
+            sensor_directions(robots),
+            self.sensor.reach,
+            self.sensor.decay,
+            self.sensor.index,
+        )
         self.set_grip(np.ones(self.n_wheels))
         around = 2.0 * box.reach * np.arange(1, len(robots) + 1)
         self.place(np.stack([-around, 0 * around, 0 * around], axis=1), np.zeros(3))
@@ -126,7 +135,18 @@ class World:
         self._grip: FloatArray = np.array(grip, dtype=float)
         if self._grip.shape != (self.n_wheels,) or not (self._grip >= 0).all():
             raise ValueError(f"grip: {grip}, must be {self.n_wheels} numbers >= 0")
-        self._wheels = wheel_model(self.robots, self.dt, self._grip, UNIT)
+        outline = self.box.outline
+        self._physics = Physics(
+            step_address() or 0,
+            SUBSTEPS,
+            self.dt,
+            UNIT,
+            wheel_model(self.robots, self.dt, self._grip, UNIT),
+            outline.edges,
+            outline.rounding,
+            self._radii,
+            TOUCHING,
+        )
 
     def place(self, robot_poses: FloatArray, box_pose: FloatArray) -> None:
         """Reset the world to the poses of robots ``(M, 3)`` and box ``(3,)``, all at rest."""
@@ -181,7 +201,9 @@ class World:
             # Therefore each body keeps its world alive.
             body.world_kept = self._world
         everything = (self._box, *self._bodies)
-        self._addresses: IntArray = np.array([int(body.this) for body in everything])
+        self.addresses: IntArray = np.array(
+            [int(thing.this) for thing in (self._world, *everything)]
+        )
         self._last = state.last.copy()
         self._wrenches = state.wrenches.copy()
         self._observe()
@@ -193,26 +215,11 @@ class World:
         They are held, ``(n_wheels,)``, or those of each period, ``(periods, n_wheels)``.
         """
         speeds = np.full((periods, self.n_wheels), wheel_speeds) * UNIT
-        function = step_address()
-        if function is None:
+        if not self._physics.step:
             self._advance_by_steps(speeds)
             return
-        outline = self.box.outline
         poses, self.gaps, self.contact_time = advance(
-            function,
-            int(self._world.this),
-            self._addresses,
-            speeds,
-            SUBSTEPS,
-            self.dt,
-            UNIT,
-            self._wheels,
-            self._last,
-            self._wrenches,
-            outline.edges,
-            outline.rounding,
-            self._radii,
-            TOUCHING,
+            self._physics, self.addresses, speeds, self._last, self._wrenches
         )
         self._know(poses)
 
@@ -225,14 +232,6 @@ class World:
             self._observe()
             touched += self.contact
         self.contact_time = touched / len(speeds)
-
-    @property
-    def addresses(self) -> IntArray:
-        """Addresses of the world, the box and the robots ``(M + 2,)``, valid until `restore`.
-
-        The world does not notice changes there, see `advance_many`.
-        """
-        return np.array([int(self._world.this), *self._addresses])
 
     def advance_many(
         self, addresses: IntArray, wheel_speeds: FloatArray, periods: int,
@@ -257,26 +256,9 @@ class World:
             ``(W, M + 1, 3)`` of boxes and robots [m, m, rad], ``(W, M)`` [m], and what the infrared
             sensor of a robot reads most of the box ``(W, M)``.
         """
-        outline = self.box.outline
+        speeds = wheel_speeds * UNIT
         return advance_many(
-            step_address() or 0,
-            addresses,
-            wheel_speeds * UNIT,
-            periods,
-            SUBSTEPS,
-            self.dt,
-            UNIT,
-            self._wheels,
-            last,
-            wrenches,
-            outline.edges,
-            outline.rounding,
-            self._radii,
-            TOUCHING,
-            self._sensors,
-            self.sensor.reach,
-            self.sensor.decay,
-            self.sensor.index,
+            self._physics, self._sensors, addresses, speeds, periods, last, wrenches
         )
 
     @property
@@ -294,15 +276,7 @@ class World:
         """
         outline = self.box.outline
         return infrared_readings(
-            self.robot_poses,
-            self._radii,
-            self._sensors,
-            self.box_pose,
-            outline.edges,
-            outline.rounding,
-            self.sensor.reach,
-            self.sensor.decay,
-            self.sensor.index,
+            self.robot_poses, self.box_pose, outline.edges, outline.rounding, self._sensors
         )
 
     def _step(self, speeds: FloatArray) -> None:
@@ -310,7 +284,7 @@ class World:
         motion = np.array(
             [(body.angle, *body.linearVelocity, body.angularVelocity) for body in self._bodies]
         )
-        wheel_wrenches(motion, speeds, self.dt, self._wheels, self._last, self._wrenches)
+        wheel_wrenches(motion, speeds, self.dt, self._physics.wheels, self._last, self._wrenches)
         for body, (fx, fy, torque) in zip(self._bodies, self._wrenches.tolist(), strict=True):
             body.ApplyForceToCenter((fx, fy), True)
             body.ApplyTorque(torque, True)

@@ -20,7 +20,6 @@ from nested_agents.studies.api.study import StudyResults
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import commands
 from nested_agents.studies.cli.main import COMMANDS, main
-from nested_agents.studies.presentation import figures
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE
 
@@ -29,8 +28,8 @@ from nested_agents.studies.store.database import DATABASE
 def study(tmp_path_factory, spec_file):
     """A finished study, and what the run said."""
     directory = tmp_path_factory.mktemp("study") / "out"
-    line = ["run", spec_file, "--out", directory]
-    return directory, run_here(made_up.measure, *line, usual=figures.USUAL)
+    line = ["run", spec_file, "--out", directory, "--figures", "png", "--figures", "svg"]
+    return directory, run_here(made_up.measure, *line)
 
 
 def results(directory, form="csv", *arguments, capsys=None):

@@ -13,7 +13,7 @@ from nested_agents.studies.spec import outline
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers.runner import save
 
-MODULES = {"core/team.py": "N = 3  # agents", "core/loop.py": "def loop(): pass"}
+MODULES = {"arms/team.py": "N = 3  # agents", "core/loop.py": "def loop(): pass"}
 
 
 def test_all_that_computes_is_known_and_pictures_are_not() -> None:
@@ -32,11 +32,19 @@ def test_what_means_the_same_has_not_changed(
 ) -> None:
     monkeypatch.setattr(outline, "modules", lambda: MODULES)
     known = outline.present(None, {}, {})
-    later = {**MODULES, "core/team.py": text} if text is not None else {"core/loop.py": "pass"}
+    later = {**MODULES, "arms/team.py": text} if text is not None else {"core/loop.py": "pass"}
     later["core/loop.py"] = MODULES["core/loop.py"]
     monkeypatch.setattr(outline, "modules", lambda: later)
     here = outline.present(known, {}, {})
-    assert outline.changed(known, here) == ["core/team.py"] * changed
+    assert outline.changed(known, here) == ["arms/team.py"] * changed
+
+
+def test_any_edit_of_this_package_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outline, "modules", lambda: MODULES)
+    known = outline.present(None, {}, {})
+    later = {**MODULES, "core/loop.py": "def loop(): pass  # runs"}
+    monkeypatch.setattr(outline, "modules", lambda: later)
+    assert outline.changed(known, outline.present(known, {}, {})) == ["core/loop.py"]
 
 
 def test_packages_that_offer_things_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,7 +71,7 @@ def test_rows_of_two_codes_are_mixed_only_if_asked_for(
                 save(store, trial, made_up.measure(trial), 0.0)
 
     kept("N = 3", 1)
-    kept("N = 3  # agents", 1)
+    kept("N = 3", 1)
     with pytest.raises(SpecError, match=r"core/team\.py has changed since .*--accept-code"):
         kept("N = 4", 1)
     kept("N = 4", 1, accept_code=True)

@@ -10,7 +10,7 @@ from world_oracles import infrared_readings_numpy
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.box_pushing.world.geometry import infrared_readings
+from nested_agents.scenarios.box_pushing.world.geometry import InfraredSensors, infrared_readings
 from nested_agents.scenarios.box_pushing.world.robots import (
     E_PUCK_SENSORS,
     ROBOTS,
@@ -37,10 +37,8 @@ def test_kernel_equals_its_reference(box: str, normalisation: str) -> None:
     for _ in range(60):
         robots = rng.uniform([-0.2, -0.2, -3], [0.2, 0.2, 3], (3, 3))
         pose = rng.uniform([-0.1, -0.1, -3], [0.1, 0.1, 3])
-        got = infrared_readings(
-            robots, radii, sensors, pose, outline.edges, outline.rounding,
-            spec.reach, spec.decay, spec.index,
-        )  # fmt: skip
+        kernel = InfraredSensors(radii, sensors, spec.reach, spec.decay, spec.index)
+        got = infrared_readings(robots, pose, outline.edges, outline.rounding, kernel)
         reference = infrared_readings_numpy(robots, radii, sensors, pose, outline, spec)
         np.testing.assert_allclose(got, reference, atol=1e-6)
         assert ((got >= 0) & (got <= 1)).all()
