@@ -174,7 +174,9 @@ def name_points(figure: Figure, labels: Sequence[str], title: str = "") -> None:
     add_legend(figure, [handle(n, **own) for n, own in zip(labels, looks, strict=True)], title)
 
 
-def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str]) -> list[Path]:
+def save(
+    figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = ("png", "svg")
+) -> list[Path]:
     """Write figures into an existing folder, by their names; return the paths.
 
     `formats` are suffixes without a dot.

@@ -347,7 +347,7 @@ def explain(
     explained.folder.mkdir(parents=True, exist_ok=True)
     written = explained.folder / "explanation.txt"
     durable.write(written, explained.text.encode())
-    figures = save(explained.figures, explained.folder, ("png", "svg"))
+    figures = save(explained.figures, explained.folder)
     print_text(explained.text if full else str(explained))
     print_text(written, *figures)
     return 0
