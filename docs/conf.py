@@ -9,16 +9,14 @@ from types import BuiltinFunctionType, GenericAlias
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
-import archive  # noqa: E402
-import diagrams  # noqa: E402
 import reference  # noqa: E402
+import site_pages  # noqa: E402
 from docutils import nodes  # noqa: E402
 
 from nested_agents.studies.results.notation import whole  # noqa: E402
 
 reference.write(HERE / "reference")
-archive.write(HERE / "reference" / "archive.md")
-diagrams.draw(HERE / "diagrams")
+site_pages.copy_notebooks()
 
 project = "nested-agents"
 author = "nested-agents contributors"
@@ -36,20 +34,20 @@ extensions = [
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build", "gallery/**/*.py", "gallery/*.ipynb"]
-templates_path = ["_templates"]
 nitpicky = False
 
 autodoc_typehints = "none"  # numpydoc's Parameters sections already say them
 autodoc_member_order = "bysource"
-autosummary_generate = True
+autodoc_default_options = {"exclude-members": "model_config, model_post_init"}
+autosummary_generate = False
 numpydoc_show_class_members = False
-myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
+myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
-    "default_thumb_file": str(HERE / "diagrams" / "program.svg"),
+    "default_thumb_file": str(HERE / "figures" / "idea.png"),
     "filename_pattern": r"/plot_",
     "ignore_pattern": r"(^|/)__init__\.py$",
     "download_all_examples": False,
@@ -92,8 +90,14 @@ def keep_numbers_whole(app, doctree):
                 text.parent.replace(text, nodes.Text(kept))
 
 
+def extend_page(app, docname, source):
+    """Add what GitHub does not show: the navigation, docstrings, and links within the site."""
+    source[0] = site_pages.extended(docname, source[0])
+
+
 def setup(app):
-    """Connect what is above."""
+    """Connect the functions above to the events of Sphinx."""
+    app.connect("source-read", extend_page)
     app.connect("doctree-read", keep_numbers_whole)
     app.connect("autodoc-process-docstring", escape_bars)
     app.connect("autodoc-skip-member", skip_signatures_of_c)

@@ -1,15 +1,15 @@
 """Writes the generated pages of the reference, from the code that they are about.
 
-``conf.py`` calls `write` before the pages are read: keys of a spec, presets, columns of results,
-commands and modules. Little on these pages is written by hand: what columns of times mean.
+``conf.py`` calls `write` before the pages are read: keys of a spec, presets, columns of results and
+commands. Only the meanings of columns with times are written by hand.
 """
 
+import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import click
 
-import nested_agents
 from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.adapters.scenario import EnvironmentScenario
@@ -51,61 +51,13 @@ TRIALS = tuple(
 )  # fmt: skip
 VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
-MODULES = {
-    "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "interface.spaces", "interface.scenario", "interface.prediction", "interface.measures",
-        "interface.experience", "interface.agents", "interface.environments", "interface.stacked",
-        "interface.plain", "hierarchy.hierarchy",
-        "hierarchy.stages", "hierarchy.failures", "hierarchy.messages", "hierarchy.repair",
-        "functions.settings", "functions.agents", "agents.mixed",
-        "agents.team", "agents.inspection", "agents.fuzzy", "agents.peer",
-        "agents.loop", "agents.joint", "decision.settings", "decision.exploration",
-        "values.partitions", "values.rule_base", "learners.learner", "learners.td",
-        "learners.batch", "learners.fitted_q", "evaluators.evaluator", "evaluators.enumeration",
-        "evaluators.best_response", "evaluators.coordination", "coordination.graphs",
-        "adaptation.predictors", "adaptation.self_model", "adaptation.foresight",
-        "networks.settings", "agents.cost", "plugins.registry", "plugins.settings",
-        "numerics.arrays", "numerics.random", "numerics.compiler", "numerics.libraries",
-    )),
-    "topologies": ("Who is above whom.", ("builders", "config", "drawing", )),
-    "scenarios": ("Where agents act.", (
-        "box_pushing.config", "box_pushing.world.settings",
-        "box_pushing.prediction.settings", "box_pushing.scenario",
-        "environments", "box_pushing.environments", "adapters.turns", "adapters.scenario",
-        "adapters.settings", "box_pushing.states.variables",
-        "box_pushing.states.situations",
-        "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
-        "box_pushing.world.boxes", "box_pushing.world.robots", "box_pushing.world.starts",
-        "box_pushing.world.world",
-        "box_pushing.pictures.rendering",
-        "box_pushing.driving", "kinematic_chain.config",
-        "kinematic_chain.scenario", "kinematic_chain.variables", "matrix_games.scenario",
-        "matrix_games.team_games", "line_up", "faults.settings", "faults.wrappers",
-        "state_variables", "checking.checker",
-    )),
-    "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.loading", "api.growth", "api.comparison", "api.replay", "api.running",
-        "api.planning", "api.tuning", "api.reevaluation", "api.recovery",
-        "errors", "spec.spec", "spec.keys", "spec.presets", "spec.schema", "trials.trial",
-        "trials.session",
-        "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.power", "results.differences", "results.comparison",
-        "results.permutation_tests", "results.aggregates", "results.published",
-        "catalogue.study", "cost.cost", "cost.profile", "cost.table",
-    )),
-}  # fmt: skip
-"""The public modules of each package, by what the package is for."""
 
 
 def write(folder: Path) -> None:
-    """Write the pages into a folder, those that have changed; drop those of modules that went."""
+    """Write the pages that have changed into a folder."""
     folder.mkdir(exist_ok=True)
-    named = {f"nested_agents.{room}.{m}" for room, (_, names) in MODULES.items() for m in names}
-    for path in (folder / "api").glob("nested_agents.*.rst"):
-        if path.stem not in named:
-            path.unlink()
-    pages = {"keys": keys(), "columns": columns(), "commands": commands(), "api": api()}
-    pages |= {name: modules(name) for name in MODULES}
+    pages = {"keys": keys(), "columns": columns(), "commands": commands()}
+    pages["changelog"] = iter([changelog()])
     for name, lines in pages.items():
         text = "\n".join(lines) + "\n"
         path = folder / f"{name}.md"
@@ -200,8 +152,8 @@ def columns() -> Iterator[str]:
         yield f"## {title}\n"
         yield from table(headings, ((code(n) if "*" not in n else n, u, m) for n, u, m in rows))
     yield "## Measures of the scenarios\n"
-    yield "A scenario declares its own measures ([](../extending.md#a-scenario)). These are those"
-    yield "of the built-in scenarios.\n"
+    yield "A scenario declares its own [measures](../extending.md#a-scenario). These are"
+    yield "the measures of the built-in scenarios.\n"
     # Built only of an environment, or a task.
     adapted = {"gymnasium": EnvironmentScenario, "pettingzoo": EnvironmentScenario}
     for kind in SCENARIOS.built_in:
@@ -252,30 +204,7 @@ def _usage(command: click.Command, name: str) -> Iterator[str]:
     yield f"```text\n{command.get_help(context).strip()}\n```\n"
 
 
-def api() -> Iterator[str]:
-    """Yield the page on the names of the package itself."""
-    yield "# Python\n"
-    yield "`import nested_agents as na` offers these names, each imported when it is first used."
-    yield "The pages below hold the modules that they live in.\n"
-    places = nested_agents._PLACES
-    rows = []
-    for name, (module, attribute) in places.items():
-        thing = getattr(nested_agents, name)
-        text = "" if isinstance(thing, Measure) else (thing.__doc__ or "")
-        first = prose(" ".join(text.strip().partition("\n\n")[0].split()))
-        home = getattr(thing, "__module__", f"nested_agents.{module}")
-        role = f"{{py:obj}}`{name} <{home}.{attribute}>`"
-        rows.append((role, first.replace("*", "\\*"), code(home.removeprefix("nested_agents."))))
-    yield from table(("name", "meaning", "module"), rows)
-    yield "```{toctree}\n:maxdepth: 1\n"
-    yield from MODULES
-    yield "```"
-
-
-def modules(package: str) -> Iterator[str]:
-    """Yield the page on a package: its public modules."""
-    purpose, names = MODULES[package]
-    yield f"# nested_agents.{package}\n\n{purpose}\n"
-    yield "```{eval-rst}\n.. autosummary::\n   :toctree: api\n   :template: module.rst\n"
-    yield from (f"   nested_agents.{package}.{name}" for name in names)
-    yield "```"
+def changelog() -> str:
+    """Return the changelog without links to files of the repository."""
+    text = (Path(__file__).parents[1] / "CHANGELOG.md").read_text(encoding="utf-8")
+    return re.sub(r"\[([^]]*)\]\((?!http)[^)]*\)", r"\1", text)

@@ -9,7 +9,7 @@ learning goes on for as long without a fault. Needs ``pip install stable-baselin
 before and after the fault, and the seeds to train.
 """
 
-# sphinx_gallery_thumbnail_path = "wheel-failure.png"
+# sphinx_gallery_thumbnail_path = "figures/wheel_failure.png"
 import json
 import sys
 from pathlib import Path

@@ -7,7 +7,7 @@ A topology is a function from the names of the agents, and the same names by rob
 not see each other, but every wheel of the robots below.
 """
 
-# sphinx_gallery_thumbnail_path = "topology-cohorts.svg"
+# sphinx_gallery_thumbnail_path = "figures/topology-cohorts.svg"
 from itertools import pairwise, product
 
 

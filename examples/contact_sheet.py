@@ -6,7 +6,7 @@ Writes the picture ``boxes.png``, or the one named as argument, and prints the b
 properties.
 """
 
-# sphinx_gallery_thumbnail_path = "boxes.png"
+# sphinx_gallery_thumbnail_path = "figures/boxes.png"
 import sys
 from pathlib import Path
 

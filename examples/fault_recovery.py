@@ -8,7 +8,7 @@ policy beside it. Needs ``pip install stable-baselines3``. Then
 ``python fault_recovery.py``, or with a number of steps: ``python fault_recovery.py 50000``.
 """
 
-# sphinx_gallery_thumbnail_path = "wheel-failure.png"
+# sphinx_gallery_thumbnail_path = "figures/wheel_failure.png"
 import sys
 
 import gymnasium

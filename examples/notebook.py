@@ -6,7 +6,7 @@ One's own hierarchy, a study of it by the number of robots, and what hierarchies
 Python, as in a notebook. A cell that ends with ``study``, ``comparison`` or ``table`` shows it.
 """
 
-# sphinx_gallery_thumbnail_path = "scaling.png"
+# sphinx_gallery_thumbnail_path = "figures/scaling.png"
 import sys
 
 import nested_agents as na

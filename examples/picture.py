@@ -6,7 +6,7 @@ Two robots push a box with holes to its goal; a wheel of the first has seized. W
 or the picture named as argument.
 """
 
-# sphinx_gallery_thumbnail_path = "push.png"
+# sphinx_gallery_thumbnail_path = "figures/push.png"
 import sys
 
 import imageio.v3 as imageio

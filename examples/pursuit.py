@@ -22,7 +22,7 @@ REACH = 0.5
 """Distance within which all robots must be [m]."""
 
 
-class Pursuit:
+class Pursuit(na.Scenario, na.Prediction):
     """Robots catch a target: all are near it, and it sees no gap of half a turn between them."""
 
     class Settings(na.ScenarioSettings):
@@ -58,7 +58,7 @@ class Pursuit:
 
     def step(self, joint_action):
         """Let robots and target move at the same time."""
-        self.places, self.target = self.after(np.asarray(joint_action))
+        self.places, self.target = self.moved(np.asarray(joint_action))
         states = self.seen(self.places, self.target)
         reward, caught = self.paid(states)
         info = {"gap": float(states[:, 2].max())}
@@ -74,13 +74,13 @@ class Pursuit:
 
     def states(self, agent, joint_actions):
         """Return the next states ``(m, 4)`` of an agent."""
-        return self.seen(*self.after(joint_actions))[:, agent]
+        return self.seen(*self.moved(joint_actions))[:, agent]
 
     def rewards(self, joint_actions):
         """Return the rewards ``(m,)``, for planners."""
-        return self.paid(self.seen(*self.after(joint_actions)))[0]
+        return self.paid(self.seen(*self.moved(joint_actions)))[0]
 
-    def after(self, actions):
+    def moved(self, actions):
         """Return places and target after joint actions ``(..., n)``."""
         off = self.target - self.places
         away = (off / np.maximum((off**2).sum(-1, keepdims=True), 0.01)).sum(0)

@@ -6,7 +6,7 @@ Box pushing is a PettingZoo environment: every wheel is an agent that increases,
 maintains or zeroes its speed. Here the wheels act at random, and one of them seizes half-way.
 """
 
-# sphinx_gallery_thumbnail_path = "diagrams/perception.svg"
+# sphinx_gallery_thumbnail_path = "figures/perception.png"
 from nested_agents.scenarios.box_pushing.environments import WheelsEnv
 
 env = WheelsEnv(

@@ -12,7 +12,7 @@ import numpy as np
 import nested_agents as na
 
 
-class Tank:
+class Tank(na.Scenario):
     """Pumps fill or empty one tank until it holds what is wanted; each agent drives a pump."""
 
     class Settings(na.ScenarioSettings):
@@ -65,7 +65,7 @@ class Tank:
         return np.stack([flows, np.broadcast_to(np.asarray(missing)[..., None], flows.shape)], -1)
 
 
-class Forecast:
+class Forecast(na.Prediction):
     """What joint actions would lead to. No more is needed; the reward is for planners."""
 
     def __init__(self, tank):

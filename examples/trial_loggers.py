@@ -12,7 +12,7 @@ Biases in its method ``write`` to log there::
     na.run("spec.toml", "out", observer=Lines("out/trials.jsonl"))
 """
 
-# sphinx_gallery_thumbnail_path = "learning-curves.png"
+# sphinx_gallery_thumbnail_path = "figures/learning_curves.png"
 
 import json
 from pathlib import Path

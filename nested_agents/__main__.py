@@ -7,7 +7,6 @@ import sys
 if __name__ == "__main__" and not sys.flags.safe_path:
     sys.path.pop(0)  # the current folder, which -m puts there
 
-import atexit
 import os
 import signal
 from functools import partial
@@ -22,21 +21,25 @@ def main() -> int:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     pressed: list[int] = []
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, partial(_interrupt, pressed))
-        # What is done cannot be interrupted; other handlers Python puts away before it has ended.
-        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
-    open_standard_streams()
-    drop_empty_entries()
-    restore_child_signal()
-    from .studies.cli.main import main as run
-
+    is_ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     try:
+        if is_ours:
+            signal.signal(signal.SIGINT, partial(_interrupt, pressed))
+        open_standard_streams()
+        drop_empty_entries()
+        restore_child_signal()
+        from .studies.cli.main import main as run
+
         return run()
+    except KeyboardInterrupt:
+        return 130
     except Exception:
         if pressed:  # compiled code, as pydantic's, raises an exception of its own in its place
             return 130
         raise
+    finally:
+        if is_ours:  # what is done cannot be interrupted
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _interrupt(pressed: list[int], number: int, frame: FrameType | None) -> None:

@@ -110,11 +110,11 @@ def parallel(kind: str, steps: int, **options: Any) -> AgentsEnv:
 
 def _world(kind: str, table: Mapping[str, Any]) -> Scenario:
     """Return the world of a ``[scenario]`` table."""
-    from .core.interface.plain import as_scenario
+    from .core.interface.scenario import checked_scenario
     from .core.plugins.settings import tuples
     from .scenarios import SCENARIOS
 
-    return as_scenario(SCENARIOS.parsed(kind, **tuples(table)).build())
+    return checked_scenario(SCENARIOS.parsed(kind, **tuples(table)).build())
 
 
 def turns(

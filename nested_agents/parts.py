@@ -1,12 +1,12 @@
 """Parts of agents: learned models, coordination graphs and costs."""
 
-from .core.adaptation.calibration import CalibrationSettings
-from .core.adaptation.self_model import SelfModelSettings
 from .core.agents.cost import PAPER_ACTIONS, Problem, below_counts
-from .core.coordination.graphs import Elimination, MaxPlus, Scope
 from .core.interface.experience import Experience
 from .core.interface.prediction import EmbodiedPrediction
 from .core.learners import LEARNERS
+from .core.models.calibration import CalibrationSettings
+from .core.models.self_model import SelfModelSettings
+from .core.search.coordination_graphs import Elimination, MaxPlus, Scope
 
 __all__ = [
     "LEARNERS",

@@ -2,7 +2,7 @@
 
 ``python -m research.atlas`` prints them from the committed results: laws are fitted to teams of at
 most 16 agents, and of at most 8, and predict the larger ones. ``--out DIR`` runs the tasks first,
-``--figures DIR`` draws the figures of docs/atlas.md.
+``--figures DIR`` draws the figures of research/notebooks/atlas.md.
 """
 
 import argparse

@@ -52,8 +52,8 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
     )
     hierarchy = build(parse("chain"), scenario.agents, scenario.groups)
     team = Team(settings, scenario, hierarchy, policy_seed(SEED))
-    foresight = team.only(FuzzyAgents).foresight
-    assert foresight.calibration is not None
+    model = team.only(FuzzyAgents).model
+    assert model.calibration is not None
     load_per_stiffness = belief["load"] / belief["stiffness"]
     right = -np.log([load_per_stiffness, load_per_stiffness, belief["contact_friction"]])
     beliefs, errors = [], []
@@ -62,10 +62,10 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
         team.begin_episode()
         for step in range(STEPS):
             seen = Observation(states, scenario)
-            prediction = foresight.predict(seen)
+            prediction = model.predict(seen)
             assert isinstance(prediction, EmbodiedPrediction)
             decision = team.act(seen)
-            tried = np.array([np.zeros(3), foresight.calibration.constants, right])
+            tried = np.array([np.zeros(3), model.calibration.constants, right])
             predicted = prediction.outcomes(decision.joint_action, tried)
             transition = scenario.step(decision.joint_action)
             last = transition.terminated or transition.truncated or step == STEPS - 1
@@ -74,7 +74,7 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
             if len(bodies) == len(scenario.groups) and np.hypot(*box[:2]) > 0.002:
                 off = np.hypot(*(predicted[:, 0] - box)[:, :2].T)
                 errors.append(1000 * off * scenario.settings.action_repeat * 0.064)
-                beliefs.append(np.exp(foresight.calibration.constants - right))
+                beliefs.append(np.exp(model.calibration.constants - right))
             states = transition.states
             if last:
                 break

@@ -290,7 +290,7 @@ def _record(finding: Finding) -> dict[str, object]:
 CATALOG = FOLDER.parent / "studies" / "catalogue"
 """Specs of the installed studies, one folder for each."""
 NETWORKS = "networks"
-"""Name of the claims that the tables of docs/peers.md decide."""
+"""Name of the claims that the tables of research/notebooks/ppo.md decide."""
 
 
 def spec_of_study(study: str) -> Path:

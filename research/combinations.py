@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from nested_agents import LearnerSettings, Spec, SpecError
@@ -274,7 +275,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print or write the exceptions, and return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m research.combinations", description=__doc__)
     parser.add_argument("learners", nargs="*", metavar="LEARNER", help="by default all")
-    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
+    parser.add_argument(
+        "--write",
+        nargs="?",
+        type=Path,
+        const=PAGE,
+        metavar="PAGE.md",
+        help=f"by default {PAGE.name}",
+    )
     options = parser.parse_args(arguments)
     lines = exceptions(cells(options.learners))
     if not options.write:
@@ -284,7 +292,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise SpecError(f"--write: the page has all learners, not {options.learners}")
     before, mark, _ = PAGE.read_text(encoding="utf-8").partition(MARK)
     generated = "".join(f"{line}\n" for line in lines)
-    PAGE.write_text(before + mark + generated, encoding="utf-8")
+    options.write.write_text(before + mark + generated, encoding="utf-8")
     return 0
 
 

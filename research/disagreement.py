@@ -1,6 +1,6 @@
 """How much agents must disagree before a message is worth sending.
 
-``python -m research.disagreement [FIGURE]`` prints the table of docs/edges.md
+``python -m research.disagreement [FIGURE]`` prints the table of research/notebooks/edges.md
 from the committed rows, and draws it. Teams were trained once and judged under errors of each
 agent's own, told what those above them decided, or silent. The threshold was named before the runs:
 where the line through the differences of success, told less silent, crosses zero; its interval is

@@ -1,6 +1,6 @@
 """Edges with equal treatment: plans for the unseen, whichever relations agents have.
 
-``python -m research.equal_treatment`` prints the tables of docs/edges.md from rows
+``python -m research.equal_treatment`` prints the tables of research/notebooks/edges.md from rows
 of `BOXES` and `OTHERS` that are there: success with plans, and how success and decisions compare
 with the chain, in each setting and over all boxes. Measures and margins were named in
 ``edges-again.toml``.

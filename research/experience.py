@@ -1,6 +1,6 @@
 """Networks at the field's budgets: tables by decisions, what an edge and foresight are worth.
 
-``python -m research.experience`` prints the tables of docs/peers.md from the rows
+``python -m research.experience`` prints the tables of research/notebooks/ppo.md from the rows
 of `TASKS` that are there; with directories of kept studies ``experience`` it prints their rows, as
 they are committed (returns if the last word is ``return``). A comparison is of the condition with
 edges, less that without, and is judged as ``python -m research.claims --of networks`` does, see

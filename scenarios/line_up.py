@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property, reduce
+from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -124,6 +125,24 @@ class LineUp(Scenario):
     def constants_of_episode(self) -> Mapping[str, object]:
         """Return the period of recorded steps."""
         return {"dt": PERIOD}
+
+    def draw(self, path: Path) -> None:
+        """Draw rails, carts and the goal line to a picture file."""
+        from matplotlib.figure import Figure
+
+        from .movies import save_picture
+
+        rails = np.arange(len(self.agents))
+        figure = Figure(figsize=(6.0, 1.5 + 0.3 * min(len(rails), 40)), layout="constrained")
+        axes = figure.subplots()
+        axes.hlines(rails, -1.1, 1.1, color="#cccccc")
+        axes.axvspan(-TOLERANCE, TOLERANCE, color="#009E73", alpha=0.2, label="goal line")
+        axes.plot(self._places, rails, "s", color="#0072B2", ms=9, label="cart")
+        axes.set(xlabel="place [m]", ylabel="cart", xlim=(-1.1, 1.1))
+        axes.set_yticks(rails[:: 1 + len(rails) // 20], self.agents[:: 1 + len(rails) // 20])
+        axes.invert_yaxis()
+        axes.legend(loc="best")
+        save_picture(figure, path)
 
     def with_exact_prediction(self) -> LineUp:
         """Return this scenario, because its predictions are exact."""

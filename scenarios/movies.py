@@ -1,7 +1,8 @@
-"""Animations of recorded episodes as GIF or MP4."""
+"""Pictures of scenarios as PNG, SVG or PDF; animations of episodes as GIF or MP4."""
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 import imageio.v2 as imageio
 import numpy as np
@@ -16,6 +17,32 @@ Pixels = NDArray[np.uint8]
 MAX_FRAMES = 120
 """Maximum number of frames of an animation."""
 DPI = 100
+PICTURES = (".png", ".svg", ".pdf")
+"""Suffixes of pictures."""
+
+
+@runtime_checkable
+class Drawable(Protocol):
+    """Optional part of a scenario: a picture of the present state."""
+
+    def draw(self, path: Path) -> None:
+        """Draw the present state, after `reset` the start of an episode, to a picture file."""
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure in the format of the suffix.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is unknown or the file cannot be written.
+    """
+    if path.suffix not in PICTURES:
+        raise ValueError(f"picture: suffix {path.suffix!r} of {path.name}, allowed {PICTURES}")
+    try:
+        figure.savefig(path, dpi=DPI)
+    except OSError as error:
+        raise ValueError(f"picture: {path}: {error.strerror}") from None
 
 
 class Scene:

@@ -7,8 +7,8 @@ import numpy as np
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.experience import Decision, Experience, Observation
-from nested_agents.core.interface.plain import as_prediction, as_scenario
-from nested_agents.core.interface.scenario import Transition
+from nested_agents.core.interface.plain import as_prediction
+from nested_agents.core.interface.scenario import Transition, checked_scenario
 
 
 def fuzzy(team: Team) -> FuzzyAgents:
@@ -18,7 +18,7 @@ def fuzzy(team: Team) -> FuzzyAgents:
 
 def look(world: Any, states: Any = None, **more: Any) -> Observation:
     """What is seen in a world; without states, those of nobody."""
-    scenario = as_scenario(world)
+    scenario = checked_scenario(world)
     if states is None:
         states = np.zeros((len(scenario.agents), scenario.state_space.n_variables))
     if "imagined" in more:

@@ -48,7 +48,7 @@ VALID: dict[str, dict[str, object]] = {
     "run": {"spec": SPEC, "out": "out"},
     "run_trial": {"trial": None},
     "scaling_law": {"study": None},
-    "schema": {"kind": "scenario.line-up"},
+    "schema": {},
     "seeds_for": {"effect": 0.2, "deviation": 0.25, "comparisons": 1},
     "state_variable": {"unit": "m", "low": 0.0, "high": 1.0},
     "tune": {"spec": SPEC, "out": "out"},

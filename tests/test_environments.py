@@ -10,7 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test, seed_test
 
-from nested_agents.core.interface.plain import as_scenario
+from nested_agents.core.interface.scenario import checked_scenario
 from nested_agents.environments import WORLDS, env_id, register
 from nested_agents.scenarios import SCENARIOS
 
@@ -66,7 +66,7 @@ def test_several_worlds_at_once_are_those_of_their_seeds() -> None:
 def test_an_environment_is_its_scenario() -> None:
     env = pettingzoo.make("parallel", env_id("LineUp"))
     seen, _ = env.reset(seed=0, options={"world": 7})
-    world = as_scenario(SCENARIOS.parsed("line-up").build())
+    world = checked_scenario(SCENARIOS.parsed("line-up").build())
     states = world.reset(7)
     np.testing.assert_array_equal([seen[a] for a in env.agents], states.astype(np.float32))
     _, rewards, *_ = env.step(dict.fromkeys(env.agents, 2))

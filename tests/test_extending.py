@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation
+from nested_agents.core.search.evaluator import DecisionContext, DecisionProblem
 from nested_agents.studies.api.running import run
 from nested_agents.studies.cli.main import main
 
@@ -50,7 +50,7 @@ def test_an_example_is_short_and_runs(
 
 def test_what_decides_is_documented_field_by_field() -> None:
     page = PAGE.read_text()
-    for fields in (Deliberation._fields, (field.name for field in fields_of(DecisionProblem))):
+    for fields in (DecisionContext._fields, (field.name for field in fields_of(DecisionProblem))):
         assert all(f"| `{name}`" in page for name in fields)
 
 

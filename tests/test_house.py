@@ -22,7 +22,7 @@ ALLOWED = {
 }
 STUDIES = (
     "errors", "store", "spec", "trials", "workers", "results", "presentation", "catalogue",
-    "cost", "scalability", "explain", "report", "api", "cli",
+    "cost", "scalability", "resilience", "explain", "report", "api", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000

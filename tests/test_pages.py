@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 import shlex
 import tomllib
 from collections.abc import Iterator
@@ -19,15 +20,16 @@ from pathlib import Path
 import click
 import pytest
 
+import nested_agents as na
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.studies.cli.main import main, nested_agents
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parent.parent
-GENERATED = {"reference", "gallery", "_build"}
+GENERATED = ("docs/reference/", "docs/gallery/", "docs/_build/", "docs/notebooks/")
 PAGES = sorted(
-    path.relative_to(ROOT).as_posix()
+    page
     for path in (
         *(ROOT / "README.md", ROOT / "CONTRIBUTING.md"),
         *(
@@ -36,7 +38,7 @@ PAGES = sorted(
             for page in (ROOT / folder).rglob("*.md")
         ),
     )
-    if not GENERATED & set(path.parts)
+    if not (page := path.relative_to(ROOT).as_posix()).startswith(GENERATED)
 )
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 NAME = re.compile(r"# (\w+\.\w+)\b")
@@ -161,13 +163,51 @@ def test_the_commands_in_sentences_of_a_page(page: str) -> None:
     prose = BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8"))
     for text in re.findall(r"`((?:\./dev |nested-agents |python )[^`]*)`", prose):
         words = shlex.split(text)
-        if words[0] != "nested-agents" or len(words) > 2:  # two words name a command
+        is_help = words[-1] == "--help"
+        if not is_help and (words[0] != "nested-agents" or len(words) > 2):  # two name a command
             check_command(words)
 
 
-def test_the_list_of_tutorials_is_complete() -> None:
-    tutorials = ROOT / "docs" / "tutorials"
-    (listed,) = re.findall(
-        r"```{toctree}\n:maxdepth: 1\n\n(.*?)\n```", (tutorials / "index.md").read_text(), re.DOTALL
-    )
-    assert sorted(listed.split()) == sorted({p.stem for p in tutorials.glob("*.md")} - {"index"})
+LINK = re.compile(r"(?:\[([^]]*)\]\(|(?:src|href)=\")([^)#\s\"]*)(?:#([^)\s\"]*))?[)\"]")
+
+
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of the headings of a page, as GitHub and the site make them."""
+    headings = re.findall(r"^#{1,6} (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    words = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in headings)
+    return {text.strip().replace(" ", "-") for text in words}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_links_of_a_page_lead_somewhere(page: str) -> None:
+    path = ROOT / page
+    for text, target, anchor in LINK.findall(BLOCK.sub("", path.read_text(encoding="utf-8"))):
+        if target.startswith("https://"):
+            continue
+        file = path.parent / target if target else path
+        assert file.exists(), f"{page}: {target}"
+        assert not file.resolve().relative_to(ROOT).as_posix().startswith(GENERATED), target
+        assert not anchor or anchor in anchors(file), f"{page}: {target}#{anchor}"
+        assert text or not target.endswith(".md"), f"{page}: {target} has no text, see GitHub"
+
+
+def test_every_page_is_in_the_navigation() -> None:
+    pages = runpy.run_path(str(ROOT / "docs" / "site_pages.py"))
+    below = [
+        f"{str(Path(page).parent) + '/' if '/' in page else ''}{name}"
+        for page, names in pages["CONTENTS"].items()
+        for name in names
+    ]
+    listed = {*below, *(name for names in pages["NAVIGATION"].values() for name in names)}
+    written = {page.removeprefix("docs/").removesuffix(".md") for page in PAGES if "docs/" in page}
+    assert written - listed == {"index"}
+    assert {page for page in PAGES if "notebooks/" in page} == {
+        f"research/{name}.md" for name in listed if name.startswith("notebooks/")
+    }
+
+
+def test_every_public_name_is_on_one_page_of_the_api() -> None:
+    documented_names = runpy.run_path(str(ROOT / "docs" / "site_pages.py"))["documented_names"]
+    texts = [page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "api").glob("*.md")]
+    names = [name for text in texts for name in documented_names(text)]
+    assert sorted(names) == sorted(set(na.__all__) - {"__version__"})

@@ -33,13 +33,13 @@ def test_the_rates_of_the_readme_are_published() -> None:
     assert f"eight robots succeed in {without} of the episodes instead of {chain}" in TEXT
     sixteen = format_number(load("scaling").results.success("16", "evaluation").mean())
     assert f"which are 32 agents, with a success of {sixteen};" in TEXT
-    results = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    results = (ROOT / "research" / "notebooks" / "box_pushing.md").read_text(encoding="utf-8")
     assert "or 0.62 [" in results
     assert "dynamics model from zero reach 0.97" in results
 
 
 def test_the_replay_is_small_and_the_version_is_one() -> None:
-    assert (ROOT / "docs" / "push.gif").stat().st_size < 1_000_000
+    assert (ROOT / "docs" / "figures" / "push.gif").stat().st_size < 1_000_000
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
 

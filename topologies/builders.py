@@ -18,11 +18,11 @@ import numpy as np
 from pydantic import Field, NonNegativeInt
 from typing_extensions import TypeAliasType
 
-from ..core.coordination import graphs
-from ..core.coordination.graphs import Shape
 from ..core.hierarchy.hierarchy import Hierarchy
 from ..core.numerics import nx
-from ..core.plugins.settings import Fraction, unwritten
+from ..core.plugins.settings import Fraction
+from ..core.search import coordination_graphs as graphs
+from ..core.search.coordination_graphs import Shape
 
 
 def check_names(
@@ -167,7 +167,7 @@ def star(
     bodies: Bodies = (),
     *,
     leader: str | None = None,
-    leader_decides: Annotated[Literal["first", "last"], unwritten("first")] = "first",
+    leader_decides: Literal["first", "last"] = "first",
 ) -> nx.DiGraph:
     """Put one leader right above everyone else, or right below.
 
@@ -259,7 +259,7 @@ def coordination_graph(
     *,
     shape: Shape | Literal["scenario"] = "line",
     edges: Pairs | None = None,
-    others: Annotated[NonNegativeInt | None, unwritten(None)] = None,
+    others: NonNegativeInt | None = None,
 ) -> nx.Graph:
     """Join neighbors in a shape, or as listed, who decide at once.
 

@@ -17,14 +17,14 @@ from typing import Annotated, Literal, Self
 
 from pydantic import model_validator
 
-from ..core.coordination.graphs import orient
 from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure, LeftAgents
 from ..core.hierarchy.hierarchy import Communication, Hierarchy, Lookahead
 from ..core.numerics import nx
 from ..core.plugins import sources
 from ..core.plugins.registry import Plugged, SettingsRegistry
-from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
+from ..core.plugins.settings import PartSettings, SettingsError, changed_values, tuples
 from ..core.plugins.words import closest, expect, expect_each
+from ..core.search.coordination_graphs import orient
 from .builders import Bodies, Names, check_names, from_networkx, quote
 from .files import read_file
 from .strings import ARGUMENTS, Keys
@@ -47,25 +47,24 @@ DecisionOrder = Literal["listed", "reversed"] | tuple[str, ...]
 """Order of decision: agent order, its reverse, or all names in order."""
 
 
-class TopologySettings(Settings):
+class TopologySettings(PartSettings):
     """What the settings of all topologies share."""
 
-    kind: str = ""
-    communication: Annotated[Communication, unwritten("ancestors")] = "ancestors"
+    communication: Communication = "ancestors"
     """Agents whose decided actions an agent receives: all its ancestors, its parents only, or none.
     A list restricts the ancestors to those in the agent's own ``body``, in the ``next`` bodies in
     the order of bodies, or in bodies ``farther`` away."""
-    lookahead: Annotated[Lookahead, unwritten("descendants")] = "descendants"
+    lookahead: Lookahead = "descendants"
     """Agents whose actions an agent searches over beside its own: all its descendants, its children
     only, or none. A list restricts the descendants by body, as in `communication`."""
-    decision_order: Annotated[DecisionOrder | None, unwritten(None)] = None
+    decision_order: DecisionOrder | None = None
     """Order of decision of agents that are joined by undirected edges: agent order (``listed``),
     the reverse, or all names in order. Each edge then leads from the earlier agent to the later
     one. By default neighbors decide at the same time."""
-    fill_in: Annotated[bool, unwritten(False)] = False
+    fill_in: bool = False
     """Whether the superiors of one agent are joined, too, from the last one in the decision order
     to the first. The best action of an agent then depends on no other agent that has decided."""
-    failures: Annotated[tuple[AnyMessageFailure, ...], unwritten(())] = ()
+    failures: tuple[AnyMessageFailure, ...] = ()
     """Failures of messages and absences of agents, with their times."""
 
     @model_validator(mode="after")
@@ -82,17 +81,13 @@ class TopologySettings(Settings):
         return self
 
     def __repr_args__(self) -> Iterable[tuple[str | None, object]]:
-        written = self.model_dump()
-        return [(name, value) for name, value in super().__repr_args__() if name in written]
+        changed = changed_values(self)
+        return [(name, value) for name, value in super().__repr_args__() if name in changed]
 
     @property
     def title(self) -> str:
         """What it is called in messages: its file, its kind, or its class."""
         return str(dict(self).get("path") or self.kind or type(self).__name__)
-
-    def build(self, agents: Names, bodies: Bodies) -> nx.Graph:
-        """Return the graph over named agents, given by body too."""
-        raise ValueError("has no kind, and makes no hierarchy")
 
 
 IMPLIED = {"members": "teams", "edges": "edges"}
@@ -127,7 +122,7 @@ def parse(text: str | Mapping[str, object]) -> TopologySettings:
     Examples
     --------
     >>> parse("tree:3"), parse("chain")
-    (TopologySettings(kind='tree', branching=3), TopologySettings(kind='chain', order='listed'))
+    (TopologySettings(kind='tree', branching=3), TopologySettings(kind='chain'))
     >>> parse({"members": [["a", "b"], ["c"]]}).members
     (('a', 'b'), ('c',))
     """

@@ -75,8 +75,18 @@ def picture(
     bodies: Sequence[Sequence[int]] | None = None,
     title: str = "",
     failing: Sequence[int] = (),
+    fills: Sequence[str] = (),
+    note: str = "",
 ) -> Figure:
-    """Return a picture of a hierarchy as matplotlib has it; for the arguments see `draw`."""
+    """Return a picture of a hierarchy as matplotlib has it; for other arguments see `draw`.
+
+    Parameters
+    ----------
+    fills
+        Color of each agent; by default those of the bodies.
+    note
+        Meaning of these colors.
+    """
     places = positions(hierarchy)
     low = places.min(axis=0)
     high = places.max(axis=0)
@@ -93,13 +103,14 @@ def picture(
     implied = set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
     _arrows(axes, hierarchy, places, implied)
     body_of = {i: number for number, members in enumerate(bodies or []) for i in members}
-    fills = [COLOURS[body_of.get(i, 0) % len(COLOURS)] for i in range(len(hierarchy))]
-    _agents(axes, hierarchy, places, fills, failing)
+    body_fills = [COLOURS[body_of.get(i, 0) % len(COLOURS)] for i in range(len(hierarchy))]
+    _agents(axes, hierarchy, places, fills or body_fills, failing)
     notes = ["numbers: order of decision"]
     if hierarchy.neighbors:
         notes = ["lines: neighbours, who decide at the same time"]
     elif bodies and max(map(len, bodies)) > 1:
         notes.append("colours: bodies")
+    notes += [note] * bool(note)
     notes += ["grey arrows: implied by the others"] * bool(implied)
     styles = {_style(hierarchy, edge)[1] for edge in hierarchy.edges} - {""}
     notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
@@ -188,7 +199,11 @@ def _route(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]
 
 
 def _agents(
-    axes: Axes, hierarchy: Hierarchy, places: FloatArray, fills: list[str], failing: Sequence[int]
+    axes: Axes,
+    hierarchy: Hierarchy,
+    places: FloatArray,
+    fills: Sequence[str],
+    failing: Sequence[int],
 ) -> None:
     for rank, i in enumerate(hierarchy.order, 1):
         x, y = places[i]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias, get_args
 
-from ..core.coordination.graphs import Shape
+from ..core.search.coordination_graphs import Shape
 
 Keys: TypeAlias = dict[str, object]
 """Settings by name."""

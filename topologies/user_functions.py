@@ -9,7 +9,7 @@ from itertools import islice
 from typing import TypeAlias
 
 from ..core.numerics import nx
-from ..core.plugins import registry, sources
+from ..core.plugins import registry, settings, sources
 from .builders import Bodies, Names, independent, with_edges
 
 Build: TypeAlias = Callable[[Names, Bodies], object]
@@ -44,7 +44,7 @@ def _called(build: Build, name: str, agents: Names, bodies: Bodies) -> nx.Graph:
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        ours = {__file__, registry.__file__}
+        ours = {__file__, registry.__file__, settings.__file__}
         frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename not in ours]
         # Of the user's file, whatever library it has called.
         lines = [f.lineno for f in frames if f.filename == frames[0].filename]

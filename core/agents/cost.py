@@ -1,11 +1,11 @@
-"""What a hierarchy costs, counted by the paper's formulas (Section VII, Eq. 18-23).
+"""Computational cost of a hierarchy by the paper's formulas (Section VII, Eq. 18-23).
 
 One iteration updates every state-action pair of every agent by enumeration. Agent i chooses among
-the joint actions of itself and the agents it sees, ``|A| ** (1 + |below(i)|)`` of them; with |S|
-rules per agent, it has that many times |S| pairs, each maximised over as many joint actions. In the
-paper's chain of n agents the exponents are n, n - 1, ..., 1, and the sums have closed forms.
+``|A| ** (1 + |below(i)|)`` joint actions of itself and the agents that it searches over. With |S|
+rules per agent, it has |S| times as many pairs, and each is maximized over as many joint actions.
+In the paper's chain of n agents the exponents are n, n - 1, ..., 1, and the sums have closed forms.
 
-All results are exact integers (one is a fraction) of any size; floats would overflow before n = 50.
+Results are exact integers of any size, one is a fraction; floats would overflow before n = 50.
 """
 
 from collections.abc import Iterable
@@ -24,20 +24,20 @@ PAPER_ITERATIONS = 450
 
 @dataclass(frozen=True)
 class Problem:
-    """The quantities that the formulas share.
+    """Quantities that all formulas share.
 
     Raises
     ------
     ValueError
-        If a quantity is below its least; in the methods, if n is below 1.
+        If a quantity is too small, or n is below 1.
     """
 
     rules: int = PAPER_RULES
-    """|S_n|, states (rules) of one agent."""
+    """|S_n|, number of states (rules) of one agent."""
     actions: int = PAPER_ACTIONS
-    """|A|, actions of one agent; at least 2."""
+    """|A|, number of actions of one agent, at least 2."""
     iterations: int = PAPER_ITERATIONS
-    """L."""
+    """L, number of iterations."""
 
     def __post_init__(self) -> None:
         least = {"rules": 1, "actions": 2, "iterations": 1}
@@ -46,14 +46,14 @@ class Problem:
                 raise ValueError(f"{name} = {value}, allowed: {least[name]} or more")
 
     def nested(self, below: Iterable[int]) -> int:
-        """Return the cost of any hierarchy (Eq. 18, generalised).
+        """Return the cost of any hierarchy (Eq. 18, generalized).
 
         ``L * sum_i |S| * (|A| ** (1 + below_i)) ** 2``
 
         Parameters
         ----------
         below
-            The number of agents below each agent.
+            Number of agents that each agent searches over.
 
         Examples
         --------
@@ -65,7 +65,7 @@ class Problem:
         return self.sweep(self.actions ** (1 + count) for count in below)
 
     def sweep(self, tried: Iterable[int]) -> int:
-        """Return the cost of agents that choose among so many joint actions each (Eq. 18).
+        """Return the cost of agents by the number of joint actions that each tries (Eq. 18).
 
         ``L * sum_i |S| * tried_i ** 2``
         """
@@ -108,21 +108,21 @@ class Problem:
         return self.iterations * self.rules**n * self.actions ** (2 * n)
 
     def decision(self, below: Iterable[int]) -> int:
-        """Return how many joint actions one step of the running system tries.
+        """Return the number of joint actions that one joint decision tries.
 
-        ``sum_i |A| ** (1 + below_i)``: it visits one state per step, where the formulas sweep all,
-        and maximises once, where they do so for every pair.
+        ``sum_i |A| ** (1 + below_i)``. A decision visits one state and maximizes once, while the
+        other formulas sweep all states and maximize for every state-action pair.
         """
         return sum(self.actions ** (1 + count) for count in below)
 
 
 def below_counts(hierarchy: Hierarchy) -> tuple[int, ...]:
-    """Return the number of agents below each agent, in agent order."""
+    """Return the number of agents that each agent searches over, in agent order."""
     return tuple(len(hierarchy.searched(i)) for i in range(len(hierarchy)))
 
 
 def is_chain(below: Iterable[int]) -> bool:
-    """Return whether a hierarchy with these numbers of agents below is a chain.
+    """Return whether a hierarchy with these `below_counts` is a chain.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Fuzzy agents: rule bases whose values choose actions, and whose weights learn.
+"""Fuzzy agents: every agent has a value function, a fuzzy rule base with learned weights.
 
-Each agent values its own actions, by the states that they are predicted to lead to or, without a
-prediction, in the state that it is in. Consequent weights are an agent's own or a role's.
+An agent evaluates its actions by the predicted next states or, with learners of action values, in
+its present state. Consequent weights belong to an agent or to a role.
 """
 
 from __future__ import annotations
@@ -11,9 +11,6 @@ from typing import Self
 
 import numpy as np
 
-from ..adaptation.foresight import Foresight
-from ..adaptation.predictors import GivenPredictor, Mirror
-from ..evaluators.evaluator import NOBODY, NOTHING_GIVEN, Aggregation, Deliberation, Evaluator
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox, is_fully_communicating
 from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
@@ -22,49 +19,52 @@ from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
 from ..learners.learner import LearnerSettings
+from ..models.predictors import GivenPredictor, Mirror
+from ..models.team_model import TeamModel
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
+from ..search.evaluator import NOBODY, NOTHING_GIVEN, Aggregation, DecisionContext, Evaluator
 from .plain import as_explorer, as_learner
 from .valuing import Present, evaluator_of, is_private
 from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
 
 
 class FuzzyAgents(Agents[FuzzyInputs]):
-    """Agents with one rule base each.
+    """Agents with fuzzy rule bases: value function, search, exploration and prediction.
 
     Parameters
     ----------
     settings
-        How they explore, decide and learn.
+        Settings of rule base, learner, decision and exploration.
     context
-        Where they act.
+        Scenario, hierarchy and members.
 
     Attributes
     ----------
     learner
-        Owns the consequent weights.
+        Learner, which owns the consequent weights.
     members
-        ``(k,)`` the agents for whom they decide.
+        ``(k,)`` agents of the team that belong to this part.
     rows
-        ``(k,)`` which row of the weights each of them has.
+        ``(k,)`` row of weights of every member.
     space, rules
-        What values are functions of, and the rule base that all agents have.
+        Inputs of the value function as a state space, and the rule base over it.
     explorer
-        Chooses actions by value.
+        Chooses actions by their values.
     evaluator
-        Values actions; none: actions are drawn at random.
-    foresight
-        What they predict by.
+        Search that evaluates actions; None if actions are drawn at random.
+    model
+        Predictor, with self-model and calibration.
     mirror
-        Doubles what is learned from; none: it is what the agents met.
+        Adds mirror images to experience; None if experience is not mirrored.
     seen
-        ``(n, A)`` how often each agent was seen to take each action, one of each to begin with.
+        ``(n, A)`` counts of the actions of every agent, initially one.
     given
-        ``(n, A, n, A)`` the same given each action of another, if the teammate model asks for it.
+        ``(n, A, n, A)`` counts given each action of another agent, for conditional teammate models.
 
     Raises
     ------
     ValueError
-        If the settings do not fit the state space, or need a prediction that the scenario has not.
+        If the settings do not fit the state space, or require a prediction that is missing.
     """
 
     def __init__(self, settings: LearnerSettings, context: AgentContext) -> None:
@@ -83,7 +83,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
                 f"learner.predictor.kind = {settings.predictor.kind!r}: learner.kind = "
                 f"{settings.kind!r} decides without a prediction"
             )
-        self.foresight = Foresight(
+        self.model = TeamModel(
             settings.predictor, settings.self_model, settings.calibration, scenario
         )
         if settings.is_mirrored and not context.is_whole:
@@ -111,9 +111,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.is_private:
             n_rules = self.learner.theta.shape[1]
             plans = isinstance(self.evaluator, Aggregation) and self.evaluator.plans
-            self.views = Views(
-                settings, context, self._row_of, n_rules, self.foresight, plans=plans
-            )
+            self.views = Views(settings, context, self._row_of, n_rules, self.model, plans=plans)
             self.costs = self.views.costs
         self.explorer = as_explorer(settings.exploration.build(n))
         self.rng = np.random.Generator(np.random.PCG64(context.seed))
@@ -123,13 +121,13 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.given: FloatArray = np.ones((n, n_actions) * 2 if is_counted else (0, 0, 0, 0))
 
     def _evaluator(self) -> Evaluator | None:
-        """Return what values actions among those who are there."""
+        """Return the search for the agents that are present."""
         learned = self.learner if isinstance(self.learner, Evaluator) else None
         present = Present(self.hierarchy, self._left)
         return evaluator_of(self.settings, self.rules, learned, self._placement, present)
 
     def _can_search_jointly(self, context: AgentContext) -> bool:
-        """Return whether one search may find the actions of all agents, see `decide`."""
+        """Return whether one search finds the actions of all agents, see `act`."""
         return (
             self.evaluator is not None
             and context.is_whole
@@ -140,7 +138,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         )
 
     def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
-        """Consider from now on whom another hierarchy has below; who has left is known to all."""
+        """Search in a repaired hierarchy; all agents know the actions of those that have left."""
         self._evaluators.setdefault(self.hierarchy, self.evaluator)
         self.hierarchy = hierarchy
         self._left = left
@@ -154,27 +152,26 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     @property
     def counts(self) -> Counts:
-        """What they have evaluated so far."""
+        """Number of evaluations so far."""
         return Counts() if self.evaluator is None else self.evaluator.counts
 
     @property
     def weight_bytes(self) -> int:
-        """How much memory the consequent weights take."""
+        """Memory of the consequent weights [bytes]."""
         return self.learner.theta.nbytes
 
     def check(self, seen: Observation) -> None:
-        """Refuse a world without what they decide by.
+        """Refuse a scenario without the predictions that the search requires.
 
         Raises
         ------
         ValueError
-            If they decide by rewards, and none are predicted; or by plans, and the prediction does
-            not go on; one line.
+            If rewards or predictions from predicted states are missing; one line.
         """
         rule = self.settings.decision.rule
         if self.evaluator is None or rule == "value":
             return
-        prediction = self.foresight.predict(seen)
+        prediction = self.model.predict(seen)
         neutral = np.full(len(self.hierarchy), self.action_set.neutral)
         if prediction is None or prediction.rewards(neutral[None]) is None:
             raise ValueError(
@@ -187,17 +184,17 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             )
 
     def begin_episode(self) -> None:
-        """Begin an episode of learning."""
+        """Start an episode of training."""
         self.explorer.begin_episode()
         self.learner.begin_episode()
 
     def observe(self, seen: Observation, *, explore: bool) -> FuzzyInputs:
-        """Return what a decision is made by."""
+        """Return the inputs of a decision."""
         left = seen.present
-        if self._n_told:  # a column for each action told, as yet that of nobody
-            nobody = np.full((len(left), self._n_told), float(len(self.action_set)))
-            left = np.hstack([left, nobody])
-        prediction = None if self.settings.values_actions else self.foresight.predict(seen)
+        if self._n_told:  # columns for received actions, which `act` fills in
+            missing = np.full((len(left), self._n_told), float(len(self.action_set)))
+            left = np.hstack([left, missing])
+        prediction = None if self.settings.values_actions else self.model.predict(seen)
         theta = self.learner.theta
         shared = UNPREDICTED if prediction is None else prediction
         return FuzzyInputs(
@@ -211,11 +208,11 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         )
 
     def _joint_search(self, inputs: FuzzyInputs) -> IntArray | None:
-        """Return the joint action ``(n,)`` if one search finds it: all agents hear all others."""
+        """Return the joint action ``(n,)`` of one search for all agents, or None."""
         exploring = self.explorer.exploring if inputs.explore else NOT_EXPLORING
         if self.evaluator is None or exploring is None:
             return None
-        first = Deliberation(
+        first = DecisionContext(
             agent=self.hierarchy.order[0],
             joint_action=self._neutral.copy(),
             prediction=inputs.prediction,
@@ -227,9 +224,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         return self.evaluator.decide(first, exploring)
 
     def act(self, inputs: FuzzyInputs, inbox: Inbox) -> IntArray:
-        """Return the actions ``(k,)`` of the agents of a turn, one after the other.
+        """Return the actions ``(k,)`` of the agents of a stage, one after the other.
 
-        Where all agents hear all others, one search in the first turn may find the actions of all.
+        If all agents receive all earlier actions, one search in the first stage may find them all.
         """
         if self.evaluator is None:
             return self.rng.integers(len(self.action_set), size=len(inbox.agents))
@@ -249,7 +246,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         return np.array(chosen)
 
     def _choose(self, inputs: FuzzyInputs, agent: int, senders: IntArray, actions: IntArray) -> int:
-        """Return the action of an agent that has been told those of others."""
+        """Return the action of an agent, given the received actions."""
         assert self.evaluator is not None
         known = (self._neutral if inputs.previous is None else inputs.previous).copy()
         if len(self._left):
@@ -264,7 +261,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             given = self.given[agent] / self.given[agent].sum(axis=2, keepdims=True)
         view = inputs.views.get(agent) or OwnView(inputs.prediction, inputs.weights)
         values = self.evaluator.values(
-            Deliberation(
+            DecisionContext(
                 agent=agent,
                 joint_action=known,
                 prediction=view.prediction,
@@ -278,7 +275,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         )
         if len(values) != len(self.action_set):
             raise ValueError(
-                f"the evaluator gave {len(values)} values of {len(self.action_set)} actions"
+                f"the evaluator returned {len(values)} values for {len(self.action_set)} actions"
             )
         if inputs.values is not None:
             inputs.values[agent] = values.copy()
@@ -289,7 +286,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         return greatest(values, self.rng)
 
     def conclude(self, inputs: FuzzyInputs, joint_action: IntArray) -> None:
-        """Count what all have done, if they explore: the clock of exploration, the frequencies."""
+        """Advance exploration and count the actions of all agents, if the agents explore."""
         inputs.agreement = agreement(inputs.expected, joint_action)
         if not inputs.explore or self.evaluator is None:
             return
@@ -331,8 +328,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         return self.rules.values(self.learner.theta[row], flat).reshape(states.shape[:-1])
 
     def learn(self, experience: Experience, inputs: FuzzyInputs) -> None:
-        """Revise predictions, and learn from the states entered; after an episode, all of it."""
-        self.foresight.learn(experience, inputs.prediction)
+        """Update predictor and weights; after the last step, also learn from the episode."""
+        self.model.learn(experience, inputs.prediction)
         transition = experience.transition
         states = transition.states
         reward = transition.reward
@@ -345,7 +342,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             if np.ndim(reward):
                 reward = np.asarray(reward)[self.members]
         if transition.terminated and not transition.absorbing:
-            # Learners take a terminal state as entered again for ever.
+            # Learners assume that a terminal state is repeated forever.
             reward = reward * (1.0 - self.settings.discount)
         if self.mirror is not None:
             states = self.mirror.states(states)
@@ -358,20 +355,20 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             self.end_episode()
 
     def end_episode(self) -> None:
-        """Learn what is learned after an episode."""
+        """Make the updates that follow an episode."""
         self.count(self.learner.end_episode())
-        self.foresight.end_episode()
+        self.model.end_episode()
 
     def count(self, updates: int) -> None:
-        """Count weights that have changed."""
+        """Count changed weights."""
         self.counts.weight_updates += updates
 
     def check_scenario(self, scenario: Scenario) -> None:
-        """Refuse another world for the very same agents, if their values mean nothing there."""
+        """Refuse a scenario with other state variables, actions or owners of weights."""
         self._carried_rows(scenario, self.members)
 
     def _carried_rows(self, other: Scenario, members: IntArray) -> IntArray:
-        """Return from which of these rows each row of agents in another scenario goes on."""
+        """Return the row of these weights from which every row in another scenario starts."""
         return carried_rows(
             Members(self.scenario, self.members),
             Members(other, members),
@@ -379,17 +376,15 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         )
 
     def warm_start(self, former: Self) -> None:
-        """Begin where agents of the same settings ended in another world.
+        """Start from agents with the same settings that learned in another scenario.
 
-        They go on with weights and experience, with how often agents of each row were seen to take
-        each action, with exploration and random numbers; with self-model and calibration if the
-        bodies are alike, and with conditional frequencies if the agents are as many, which
-        otherwise begin anew.
+        Weights, experience, action counts, exploration and random numbers continue. Self-model and
+        calibration continue if the bodies are equal, conditional counts if the number of agents is.
 
         Raises
         ------
         ValueError
-            If the learner or the exploration knows no way; one line.
+            If the learner or the exploration does not support it; one line.
         """
         rows = former._carried_rows(self.scenario, self.members)
         self.learner.continue_from(former.learner, rows)
@@ -400,10 +395,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             self.seen[agent] = former.seen[alike].mean(axis=0)
         if self.given.shape == former.given.shape:
             self.given = former.given.copy()
-        self.foresight.continue_from(former.foresight)
+        self.model.continue_from(former.model)
 
     def state_dict(self) -> StateDict:
-        """Return all that they remember."""
+        """Return the saved state."""
         memory: StateDict = {
             "generator": words_of(self.rng),
             "explorer": self.explorer.memory,
@@ -412,7 +407,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.given.size:
             memory["given"] = self.given
         memory |= {f"learner.{key}": array for key, array in self.learner.arrays().items()}
-        for name, part in self.foresight.adaptive.items():
+        for name, part in self.model.adaptive.items():
             memory |= {f"{name}.{key}": array for key, array in part.arrays().items()}
         return memory
 
@@ -443,5 +438,5 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.given.size:
             self.given = state["given"].copy()
         self.learner.restore(select_prefix("learner.", state))
-        for name, part in self.foresight.adaptive.items():
+        for name, part in self.model.adaptive.items():
             part.restore(select_prefix(f"{name}.", state))

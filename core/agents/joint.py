@@ -1,16 +1,16 @@
-"""Who the agents are: one for every actuator, one for every body, or one for the whole team.
+"""Granularity of agents: one agent for every actuator, for every body, or for the whole team.
 
 A scenario has an agent for every actuator: a wheel, a joint, a player of a game. `join_agents`
-shows it as one of fewer agents. The action of each of these is the actions of all agents of its
-block at once, their digits read as one number, so that joint actions keep their indices.
-Everything else of this package, hierarchies too, works on it unchanged.
+returns a scenario with fewer agents, each of which acts for a block of the original agents. Its
+action is the tuple of their actions, read as the digits of one number, so that joint-action indices
+remain the same.
 
 `body`
-    One agent for every body: the mapping that the paper's one agent per wheel stands against (X-B).
-    Its state is the own variables of its actuators and the variables that they share.
+    One agent for every body, the alternative to the paper's one agent per wheel (Section X-B). Its
+    state consists of the own variables of its actuators and their shared variables.
 `team`
-    The one agent that Section VII compares with (Eq. 23). Its state is the states of all agents one
-    after the other, its action one of ``|A| ** n``: practicable for few agents only.
+    The single agent of Section VII (Eq. 23). Its state consists of the states of all agents, and it
+    has ``|A| ** n`` actions, which is feasible for few agents only.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..interface.plain import as_prediction, as_scenario
+from ..interface.plain import as_prediction
 from ..interface.prediction import (
     Blocks,
     EmbodiedPrediction,
@@ -30,47 +30,46 @@ from ..interface.prediction import (
     Tables,
     rewards_of,
 )
-from ..interface.scenario import Embodiment, Scenario, Transition
+from ..interface.scenario import Embodiment, Scenario, Transition, checked_scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 
 Granularity = Literal["actuator", "body", "team"]
-"""What there is one agent for."""
-MOST_ACTIONS = {"body": 4**4, "team": 4**6}
-"""The most actions of a body, those of four wheels, and of a team."""
+"""Part of a team that one agent controls."""
+MAX_ACTIONS = {"body": 4**4, "team": 4**6}
+"""Maximum number of actions of an agent for a body, as with four wheels, and for a team."""
 
 
 def join_agents(scenario: object, agents: Granularity) -> Scenario:
-    """Return a scenario as one of an agent for each of these; with ``actuator`` as it is.
+    """Return a scenario with agents of some granularity.
 
     Raises
     ------
     ValueError
-        As `joint_blocks`.
+        If `joint_blocks` refuses the granularity; one line.
     """
-    world = as_scenario(scenario)
-    return world if agents == "actuator" else JointAgents(world, agents)
+    checked = checked_scenario(scenario)
+    return checked if agents == "actuator" else JointAgents(checked, agents)
 
 
 def joint_blocks(
     agents: Sequence[str], groups: Sequence[Sequence[int]], n_actions: int, each: Granularity
 ) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
-    """Return the names of those who act, and which agents of a scenario each acts for.
+    """Return the names of joint agents, and the block of agents that each acts for.
 
     Parameters
     ----------
     agents, groups
-        Names of the scenario's agents, and these by body.
+        Names of the scenario's agents, and their indices by body.
     n_actions
-        Actions of each of them.
+        Number of actions of each of them.
     each
-        What there is one agent for.
+        Granularity of the joint agents.
 
     Raises
     ------
     ValueError
-        If bodies differ in their number of actuators, or there are more actions than
-        `MOST_ACTIONS`.
+        If bodies differ in their number of actuators, or there are more than `MAX_ACTIONS`.
 
     Examples
     --------
@@ -83,17 +82,17 @@ def joint_blocks(
     sizes = sorted({len(block) for block in blocks})
     if len(sizes) > 1:
         raise ValueError(f"agents = 'body': bodies of {sizes} actuators, allowed: equally many")
-    if n_actions ** sizes[0] > MOST_ACTIONS[each]:
+    if n_actions ** sizes[0] > MAX_ACTIONS[each]:
         raise ValueError(
             f"agents = {each!r}: {n_actions} ** {sizes[0]} actions each, allowed: "
-            f"{MOST_ACTIONS[each]} or fewer"
+            f"{MAX_ACTIONS[each]} or fewer"
         )
     names = ("single",) if each == "team" else tuple(body_of(agents[b[0]]) for b in blocks)
     return names, blocks
 
 
 def body_of(agent: str) -> str:
-    """Return the body's part of an actuator's name, or the name if it has none.
+    """Return the name of the body of an actuator, or its own name without a body.
 
     >>> body_of("robot1.front-left"), body_of("a")
     ('robot1', 'a')
@@ -102,15 +101,15 @@ def body_of(agent: str) -> str:
 
 
 class JointAgents(Scenario):
-    """A scenario seen as that of one agent per block of agents; see `join_agents`.
+    """A scenario with one agent per block of agents, see `join_agents`.
 
     Parameters
     ----------
     scenario
-        The scenario of all agents.
+        Scenario of all agents.
     each
-        What there is one agent for. One for the team perceives every variable of each; what the
-        agents of a body share is perceived once.
+        Granularity. The agent of a team observes all variables of all agents; the agent of a body
+        observes their shared variables once.
     """
 
     def __init__(self, scenario: Scenario, each: Granularity) -> None:
@@ -148,48 +147,48 @@ class JointAgents(Scenario):
         self.action_set = ActionSet(names, zeros, zeros, neutral)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
-        """Start an episode; return the states of those who act."""
+        """Start an episode; return the states of the joint agents."""
         return self._states(self.scenario.reset(seed, episode))
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Carry out the actions of those who act."""
+        """Execute the actions of the joint agents."""
         transition = self.scenario.step(self.actions(joint_action))
         reward = transition.reward
-        if np.ndim(reward):  # each acts for the mean reward of its agents
+        if np.ndim(reward):  # the reward of a joint agent is the mean of its block
             reward = np.array([np.take(reward, block).mean() for block in self.blocks])
         return replace(transition, states=self._states(transition.states), reward=reward)
 
     @property
     def predicts(self) -> bool:
-        """Whether the scenario predicts."""
+        """Whether the scenario has a prediction."""
         return self.scenario.predicts
 
     @property
     def lacks_prediction(self) -> str:
-        """Why it predicts nothing."""
+        """Reason why the scenario has no prediction."""
         return self.scenario.lacks_prediction
 
     def predict(self) -> JointPrediction | None:
-        """Predict from the present state, if the scenario does."""
+        """Return the prediction from the present state, if there is one."""
         prediction = as_prediction(self.scenario.predict())
         return None if prediction is None else JointPrediction(prediction, self)
 
     def embodiment(self) -> Embodiment | None:
-        """Return the scenario's bodies, if there is an agent for each of them."""
+        """Return the scenario's bodies, if every agent is a body."""
         bodies = None if self.whole else self.scenario.embodiment()
         return None if bodies is None else JointEmbodiment(bodies, self)
 
     def actions(self, joint_actions: IntArray) -> IntArray:
-        """Return the actions ``(..., n)`` of all agents, of the actions of those who act."""
+        """Return the actions ``(..., n)`` of all agents for the actions of joint agents."""
         shape = (*joint_actions.shape[:-1], len(self.scenario.agents))
         return self._local[joint_actions].reshape(shape)
 
     def every(self) -> IntArray:
-        """Return all actions ``(A, 1)`` of one who acts alone."""
+        """Return all actions ``(A, 1)`` of a single joint agent."""
         return np.arange(len(self._local))[:, None]
 
     def joined(self, parts: Sequence[FloatArray]) -> FloatArray:
-        """Return states of who acts for the states of its agents, variables last."""
+        """Return the states of a joint agent from those of its block, variables last."""
         own = [part[..., : self._n_each] for part in parts]
         return np.concatenate([*own, parts[0][..., self._n_each :]], axis=-1)
 
@@ -198,16 +197,14 @@ class JointAgents(Scenario):
 
 
 class JointPrediction(Prediction, Tables):
-    """The prediction of a scenario of all agents, for those who act for blocks of them.
-
-    One who acts for all has tables of next states, also where the scenario's own has none.
+    """Prediction of a scenario for joint agents. A single joint agent always has tables.
 
     Parameters
     ----------
     prediction
-        The scenario's own.
+        Prediction of the original scenario.
     joint
-        The scenario as those who act see it.
+        Scenario of the joint agents.
     """
 
     def __init__(self, prediction: Prediction, joint: JointAgents) -> None:
@@ -216,29 +213,29 @@ class JointPrediction(Prediction, Tables):
         self._tables = prediction.tables()
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(m, d)`` of who acts for a block, for actions ``(m, M)``."""
+        """Return the next states ``(m, d)`` of a joint agent for joint actions ``(m, M)``."""
         actions = self._joint.actions(joint_actions)
         block = self._joint.blocks[agent]
         return self._joint.joined([np.array(self._prediction.states(i, actions)) for i in block])
 
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
-        """Return the rewards of actions ``(m, M)``, if the scenario predicts them."""
+        """Return the rewards of joint actions ``(m, M)``, if the scenario predicts them."""
         return self._prediction.rewards(self._joint.actions(joint_actions))
 
     @cached_property
-    def rewarded(self) -> bool:  # type: ignore[override]  # known of a prediction, not of its class
+    def rewarded(self) -> bool:  # type: ignore[override]  # depends on the prediction
         """Whether there is a table of rewards."""
         if self._joint.whole:
             return self.rewards(self._joint.every()[:1]) is not None
         return self._tables is not None and self._tables.rewarded
 
     def tables(self) -> Tables | None:
-        """Return tables: of who acts for all, or the scenario's own that have rewards, too."""
+        """Return tables of a single joint agent, or those of the scenario if they have rewards."""
         return self if self._joint.whole or self.rewarded else None
 
     def blocks(self, agent: int) -> Blocks:
-        """Return the next states of who acts for a block, for all joint actions."""
-        if self._joint.whole:  # no variable is its own alone
+        """Return the next states of a joint agent for all joint actions."""
+        if self._joint.whole:  # a single agent has shared variables only
             return Blocks(np.zeros((1, 0)), self.states(agent, self._joint.every()), 1)
         assert self._tables is not None
         blocks = [self._tables.blocks(i) for i in self._joint.blocks[agent]]
@@ -254,7 +251,7 @@ class JointPrediction(Prediction, Tables):
 
 
 class JointEmbodiment(Embodiment):
-    """The bodies of a scenario, of which each is one agent."""
+    """Bodies of a scenario in which every body is one agent."""
 
     def __init__(self, bodies: Embodiment, joint: JointAgents) -> None:
         self._bodies = bodies
@@ -266,12 +263,12 @@ class JointEmbodiment(Embodiment):
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> EmbodiedPrediction:
-        """Predict, believing in these effects and constants."""
+        """Return the prediction for assumed effects and constants."""
         return JointBodiesPrediction(self._bodies.predict_with(effects, constants), self._joint)
 
 
 class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
-    """The same, for self-models and calibration."""
+    """Prediction of bodies for self-models and calibration, for joint agents."""
 
     def __init__(self, prediction: EmbodiedPrediction, joint: JointAgents) -> None:
         super().__init__(prediction, joint)
@@ -279,13 +276,13 @@ class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
         self.groups = prediction.groups
 
     def commands(self, joint_action: IntArray) -> FloatArray:
-        """Return the wheel speeds that the actions of bodies would command."""
+        """Return the wheel speeds that the actions of bodies command."""
         return self._bodies.commands(self._joint.actions(joint_action))
 
     def slips(self, joint_action: IntArray) -> FloatArray:
-        """Return by how much contact changes the bodies' twists."""
+        """Return the change of the bodies' twists by contact."""
         return self._bodies.slips(self._joint.actions(joint_action))
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
-        """Return what the actions of bodies would lead to by choices of constants."""
+        """Return predicted twists for choices of constants."""
         return self._bodies.outcomes(self._joint.actions(joint_action), constants)

@@ -14,7 +14,7 @@ from ..numerics import AnyArray
 from ..plugins import sources
 
 OF_A_RUN = ("generator", "explorer", "seen", "given")
-"""What is not of what a team has learned, but of the run in which it did."""
+"""Saved arrays that belong to a run, not to what a team has learned."""
 
 
 def begin_with(agents: Agents[Any], file: str, part: int) -> None:

@@ -1,10 +1,10 @@
 """The three-layer control loop (Section VIII) as a generator of step records.
 
-1. *Error observation*: the scenario turns the goal and what it senses into the agents' states.
-2. *Action selection*, coupled with learning: the team predicts, values and chooses a joint action.
-3. *Servo control*: the scenario turns it into commanded speeds and moves the bodies.
+1. *Error observation*: the scenario computes the agents' states from the goal and its sensors.
+2. *Action selection*, with learning: the team predicts, evaluates and chooses a joint action.
+3. *Servo control*: the scenario converts the joint action to commanded speeds and moves the bodies.
 
-Recording, progress and plotting consume the records; none of them enters the loop.
+Recordings, progress bars and plots use the records; the loop knows none of them.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from time import perf_counter
 import numpy as np
 
 from ..interface.experience import Experience, Observation
-from ..interface.plain import as_scenario
-from ..interface.scenario import Transition, checked_transition
+from ..interface.scenario import Transition, checked_scenario, checked_transition
 from ..numerics import FloatArray, IntArray
 from ..plugins.words import expect
 from .team import Team
@@ -37,24 +36,24 @@ class StepRecord:
     joint_action: IntArray
     """``(n,)`` action indices, in agent order."""
     transition: Transition
-    """What the step led to."""
+    """Result of the step."""
     last: bool
     """Whether the episode ends with this step."""
     deciding: float
-    """Seconds that the team took to decide; the scenario reports its own in ``transition.info``."""
+    """Duration of the decision [s]; scenarios report their own times in ``transition.info``."""
     learning: float
-    """Seconds that the team took to learn."""
+    """Duration of learning [s]."""
     decision_costs: Mapping[str, float]
-    """What the decision cost, by the names of `Team.costs`."""
+    """Costs of the decision, by the names of `Team.costs`."""
 
 
 def world_seed(seed: int, episode: int) -> np.random.SeedSequence:
-    """Return the seed of an episode's world: the same for every condition of a study."""
+    """Return the seed of an episode's environment, equal for all conditions of a study."""
     return np.random.SeedSequence(seed, spawn_key=(0, episode))
 
 
 def policy_seed(seed: int) -> np.random.SeedSequence:
-    """Return the seed of a team, independent of all worlds."""
+    """Return the seed of a team, independent of all environments."""
     expect("a whole number from 0", Integral, seed=seed)
     return np.random.SeedSequence(seed, spawn_key=(1,))
 
@@ -76,31 +75,32 @@ def control_loop(
     Parameters
     ----------
     scenario, team
-        The world and those who act in it; both are modified.
+        Environment and team; both are modified.
     episodes, steps
-        How many episodes, and how many steps each may take.
+        Number of episodes, and maximum number of steps of an episode.
     seed
-        Seed of the worlds, see `world_seed`.
+        Seed of the environments, see `world_seed`.
     first_episode
-        Number of the first episode: a run can be continued with a restored team.
+        Number of the first episode, to continue a run with a saved team.
     first_world
-        Number of its world, see `world_seed`; None: the same.
+        Number of the environment of the first episode, see `world_seed`; by default
+        `first_episode`.
     learn
-        Whether the team learns, or is evaluated.
+        Whether the team learns.
     explore
-        Whether it explores; None: if it learns.
+        Whether the team explores; by default it does if it learns.
 
     Raises
     ------
     ValueError
-        If the scenario does not predict what the team decides by, see `Team.check`, or its states
-        or rewards cannot be learned from, see `checked_transition`.
+        If the scenario lacks a prediction that the team requires, see `Team.check`, or returns
+        invalid states or rewards, see `checked_transition`.
     """
     expect("a team", Team, team=team)
     expect("whole numbers", Integral, episodes=episodes, steps=steps, seed=seed)
     first_world = first_episode if first_world is None else first_world
     explore = learn if explore is None else explore
-    world = as_scenario(scenario)
+    world = checked_scenario(scenario)
     space = world.state_space
     for k in range(episodes):
         episode = first_episode + k

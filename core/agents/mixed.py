@@ -1,9 +1,9 @@
-"""Teams of several kinds of agents: who is of which, as settings of a learner.
+"""Teams of several kinds of agents: settings of the parts and their members.
 
-Every part of a team has settings of its own. An agent is of the first part that names it, by its
-name, its role, its body, or its level in the hierarchy (``level1`` is the first), or by a pattern
-of these. Two parts may reach for an agent by a pattern, ``*`` for the rest, but only one may name
-it. Values decide of agents of one part only: nobody knows the weights of another kind.
+Every part of a team has settings of its own. An agent belongs to the first part that lists it: by
+its name, its role, its body, its level in the hierarchy (``level1`` is the first), or a pattern of
+these. Several patterns may match an agent, such as ``*`` for the rest, but only one part may list
+it without a pattern. Agents do not know the weights of other parts.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from ..interface.scenario import Scenario
 from ..learners import LEARNERS
 from ..learners.learner import MembersOf, TeamSettings
 from ..plugins.registry import Plugged
-from ..plugins.settings import Names, Settings, unwritten
+from ..plugins.settings import Names, Settings
 from .joint import body_of
 
 
 class PartOfTeam(Settings):
-    """Agents of a team that are of one kind."""
+    """Agents of one kind in a team."""
 
     agents: Names
-    """Their names or patterns of these, roles, bodies, or levels (``level1``); one or a list."""
+    """Agents by name, role, body or level (``level1``), or a pattern of these; one or a list."""
     learner: Annotated[TeamSettings, Plugged(LEARNERS)]
-    """How they decide and learn: a table as that of a whole team."""
-    team: Annotated[str | None, unwritten(None)] = None
-    """A file ``.npz`` that `Team.save` wrote, whose weights they begin with; of a team of several
-    kinds, those of the part in the same place. None: they have learned nothing."""
+    """Settings of the agents, like those of a whole team."""
+    team: str | None = None
+    """File ``.npz`` of `Team.save` with the initial weights of the agents; of a team with several
+    parts, those of the part in the same position. By default the agents are untrained."""
 
 
 class MixedSettings(TeamSettings):
@@ -43,16 +43,16 @@ class MixedSettings(TeamSettings):
     kind: Literal["mixed"] = "mixed"
     uses_hierarchy = True
     parts: Annotated[tuple[PartOfTeam, ...], Field(min_length=1)]
-    """The parts; an agent is of the first one that names it."""
+    """The parts. An agent belongs to the first part that lists it."""
 
     @property
     def needs_prediction(self) -> bool:
-        """Whether agents of a part act only in scenarios that predict."""
+        """Whether some part requires a scenario with a predictor."""
         return any(part.learner.needs_prediction for part in self.parts)
 
     @property
     def needs_rewards(self) -> bool:
-        """Whether agents of a part decide by predicted rewards."""
+        """Whether some part decides by predicted rewards."""
         return any(part.learner.needs_rewards for part in self.parts)
 
     def members(self, scenario: Scenario, hierarchy: Hierarchy) -> list[MembersOf]:
@@ -61,35 +61,35 @@ class MixedSettings(TeamSettings):
         Raises
         ------
         ValueError
-            If an agent is of no part or of two, or a part has no agents; one line.
+            If an agent belongs to no part or to two, or a part has no agents; one line.
         """
         names = _names_of(scenario, hierarchy)
         named = zip(scenario.agents, names, strict=True)
         part_of = [self._part_named(agent, own) for agent, own in named]
         if None in part_of:
-            nobody = scenario.agents[part_of.index(None)]
-            raise ValueError(f"learner.parts: nobody decides for agent {nobody!r}")
+            agent = scenario.agents[part_of.index(None)]
+            raise ValueError(f"learner.parts: agent {agent!r} belongs to no part")
         known = ", ".join(dict.fromkeys(name for own in names for name in own))
         kinds = []
         for k, part in enumerate(self.parts):
             own = np.flatnonzero([other == k for other in part_of])
             if not len(own):
                 raise ValueError(
-                    f"learner.parts[{k}].agents = {list(part.agents)}: nobody is called so who is "
-                    f"not of a part before, known: {known}"
+                    f"learner.parts[{k}].agents = {list(part.agents)}: lists no agent that is not "
+                    f"in an earlier part, known: {known}"
                 )
             kinds.append(MembersOf(own, part.learner, part.team))
         return kinds
 
     def _part_named(self, agent: str, names: Sequence[str]) -> int | None:
-        """Return the part of an agent that is called by any of some names."""
+        """Return the part of an agent by its names, or None."""
         by_name = [k for k, part in enumerate(self.parts) if {*part.agents} & {*names}]
         if len(by_name) > 1:
             first, second = by_name[:2]
             raise ValueError(
                 f"learner.parts[{second}].agents = {list(self.parts[second].agents)}: agent "
-                f"{agent!r} is of learner.parts[{first}] already; a pattern such as '*' names "
-                "those that are left"
+                f"{agent!r} belongs to learner.parts[{first}] already; a pattern such as '*' lists "
+                "the remaining agents"
             )
         for k, part in enumerate(self.parts):
             if any(fnmatchcase(name, pattern) for name in names for pattern in part.agents):
@@ -98,7 +98,7 @@ class MixedSettings(TeamSettings):
 
 
 def _names_of(scenario: Scenario, hierarchy: Hierarchy) -> list[list[str]]:
-    """Return by what every agent can be named: name, role, body, level."""
+    """Return the names of every agent: its own, its role, its body and its level."""
     levels = communication_levels(hierarchy)
     return [
         [name, role, body_of(name), f"level{level + 1}"]

@@ -13,13 +13,13 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field
 
-from ..decision.exploration import no_way_on
 from ..hierarchy.stages import Inbox
 from ..interface.agents import AgentContext, Agents, StateDict
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Transition
 from ..learners.learner import CORE, TeamSettings
 from ..numerics import AnyArray, FloatArray, IntArray
+from ..search.exploration import no_way_on
 
 
 class PeerSettings(TeamSettings):
@@ -34,12 +34,12 @@ class PeerSettings(TeamSettings):
 
 
 class Peer(ABC):
-    """Base class of joint learners. Without overriding more than `act` it learns nothing.
+    """Base class of joint learners. A subclass that overrides only `act` does not learn.
 
     Parameters
     ----------
     seed
-        Seed of everything random in it.
+        Seed of its random numbers.
     """
 
     is_stochastic = False
@@ -62,7 +62,7 @@ class Peer(ABC):
         """Learn after an episode."""
 
     def state_dict(self) -> dict[str, FloatArray]:
-        """Return what it has learned."""
+        """Return the learned arrays by name."""
         return {}
 
     def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
@@ -71,18 +71,18 @@ class Peer(ABC):
         Raises
         ------
         ValueError
-            If it cannot; one line.
+            If the learner does not support it; one line.
         """
         if state:
             raise ValueError(f"learner.kind: {type(self).__name__} has no method load_state_dict")
 
     def warm_start(self, former: Self) -> None:
-        """Start with what a learner of equal settings has learned elsewhere.
+        """Start with what a learner with equal settings has learned in another scenario.
 
         Raises
         ------
         ValueError
-            If it cannot; one line.
+            If the learner does not support it; one line.
         """
         raise ValueError(no_way_on("learner.kind", self, "warm_start"))
 
@@ -98,7 +98,7 @@ class PeerInputs:
 
 
 class PeerAgents(Agents[PeerInputs]):
-    """The agents of a team whose joint action a `Peer` chooses.
+    """Agents of a team with joint actions chosen by a `Peer`.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class PeerAgents(Agents[PeerInputs]):
         return PeerInputs(seen, explore)
 
     def act(self, inputs: PeerInputs, inbox: Inbox) -> IntArray:
-        """Return the actions of the agents of a turn; the first turn chooses those of all."""
+        """Return the actions of a stage; the first stage chooses the joint action."""
         if inputs.joint_action is None:
             joint_action = self.peer.act(inputs.seen, explore=inputs.explore)
             inputs.joint_action = np.asarray(joint_action)
@@ -136,7 +136,7 @@ class PeerAgents(Agents[PeerInputs]):
             self.peer.end_episode()
 
     def state_dict(self) -> StateDict:
-        """Return what has been learned."""
+        """Return the learned arrays by name."""
         return dict(self.peer.state_dict())
 
     def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
@@ -144,5 +144,5 @@ class PeerAgents(Agents[PeerInputs]):
         self.peer.load_state_dict(state)
 
     def warm_start(self, former: Self) -> None:
-        """Start with what was learned elsewhere, if the learner can."""
+        """Start with what was learned in another scenario, if the learner supports it."""
         self.peer.warm_start(former.peer)

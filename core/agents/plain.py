@@ -1,6 +1,6 @@
-"""The door for plain classes of users: learners, evaluators and explorers that inherit nothing.
+"""Adapters for learners, evaluators and explorers of users that do not inherit a base class.
 
-What they may have is asked for by name here, once, and nowhere else.
+This is the only module that looks up their optional members by name.
 """
 
 from __future__ import annotations
@@ -11,39 +11,38 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..decision.exploration import Explorer, no_way_on
-from ..evaluators.evaluator import Deliberation, Evaluator
 from ..interface.agents import Counts
-from ..interface.plain import offered
 from ..learners.learner import Learner
 from ..numerics import FloatArray, IntArray
+from ..search.evaluator import DecisionContext, Evaluator
+from ..search.exploration import Explorer, no_way_on
 
 
 def as_learner(thing: Any) -> Learner:
-    """Return a learner: the thing itself if it is one, else one that lets it learn."""
+    """Return an object as a learner, with an adapter if it does not inherit from `Learner`."""
     return thing if isinstance(thing, Learner) else PlainLearner(thing)
 
 
 def as_evaluator(thing: Any) -> Evaluator:
-    """Return an evaluator: the thing itself if it is one, else one that asks it."""
+    """Return an object as an evaluator, with an adapter if it is not an `Evaluator`."""
     return thing if isinstance(thing, Evaluator) else PlainEvaluator(thing)
 
 
 def as_explorer(thing: Any) -> Explorer:
-    """Return an explorer: the thing itself if it is one, else one that asks it."""
+    """Return an object as an explorer, with an adapter if it is not an `Explorer`."""
     return thing if isinstance(thing, Explorer) else PlainExplorer(thing)
 
 
 class PlainLearner(Learner):
-    """A learner of a user's plain class.
+    """Adapter for a learner that does not inherit from `Learner`.
 
-    A class whose ``observe`` has arguments named ``left`` and ``joint_action`` is given them, too,
-    see `Learner.observe_decision`: what learners of state-action values learn from.
+    Its method ``observe`` also receives the states and actions of the decision if it has
+    parameters ``left`` and ``joint_action``, as learners of action values need.
 
     Parameters
     ----------
     plain
-        An object that has what a learner cannot do without.
+        Object with the required members of a learner.
     """
 
     def __init__(self, plain: Any) -> None:
@@ -51,17 +50,17 @@ class PlainLearner(Learner):
         self._more = signature(plain.observe).parameters.keys() & {"left", "joint_action"}
 
     @property
-    def theta(self) -> FloatArray:  # type: ignore[override]  # a user's may be another array later
+    def theta(self) -> FloatArray:  # type: ignore[override]  # users may replace the array
         """The consequent weights."""
         theta: FloatArray = self.plain.theta
         return theta
 
     def begin_episode(self) -> None:
-        """Begin an episode."""
+        """Start an episode."""
         self.plain.begin_episode()
 
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
-        """Take in the states entered."""
+        """Learn from the states entered."""
         return int(self.plain.observe(states, reward, terminated))
 
     def observe_decision(
@@ -72,70 +71,70 @@ class PlainLearner(Learner):
         reward: float | FloatArray,
         terminated: bool,
     ) -> int:
-        """Take in what a decision led to, as far as the user's class asks for it."""
+        """Learn from a decision, as far as the user's method has parameters for it."""
         known = {"left": left, "joint_action": joint_action}
         more = {name: known[name] for name in self._more}
         return int(self.plain.observe(states, reward, terminated, **more))
 
     def end_episode(self) -> int:
-        """Learn what is learned after an episode."""
+        """Make the updates that follow an episode."""
         return int(self.plain.end_episode())
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Return everything that `restore` needs."""
+        """Return the saved state."""
         arrays: dict[str, FloatArray] = self.plain.arrays()
         return arrays
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
+        """Continue from a saved state."""
         self.plain.restore(arrays)
 
     def continue_from(self, former: Self, rows: IntArray) -> None:
-        """Begin with what another learner has learned, if the user's class can."""
-        if offered(self.plain, "continue_from") is None:
+        """Start from the weights of another learner, if the user's class supports it."""
+        if getattr(self.plain, "continue_from", None) is None:
             raise ValueError(no_way_on("learner.kind", self.plain))
         self.plain.continue_from(former.plain, rows)
 
 
 class PlainEvaluator(Evaluator):
-    """An evaluator of a user's plain class.
+    """Adapter for an evaluator that does not inherit from `Evaluator`.
 
     Parameters
     ----------
     plain
-        An object with ``values(deliberation)``; its ``counts``, if it counts, are ours.
+        Object with ``values(context)`` and, optionally, ``counts``.
     """
 
     def __init__(self, plain: Any) -> None:
         self.plain = plain
-        self.counts: Counts = offered(plain, "counts", Counts())
+        self.counts: Counts = getattr(plain, "counts", Counts())
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        values: FloatArray = self.plain.values(deliberation)
+        values: FloatArray = self.plain.values(context)
         return values
 
 
 class PlainExplorer(Explorer):
-    """An explorer of a user's plain class.
+    """Adapter for an explorer that does not inherit from `Explorer`.
 
     Parameters
     ----------
     plain
-        An object with ``memory``, ``begin_episode``, ``choose`` and ``advance``.
+        Object with ``memory``, ``begin_episode``, ``choose`` and ``advance``.
     """
 
     def __init__(self, plain: Any) -> None:
         self.plain = plain
 
     @property
-    def memory(self) -> FloatArray:  # type: ignore[override]  # a user's may be another array later
-        """All that it remembers."""
+    def memory(self) -> FloatArray:  # type: ignore[override]  # users may replace the array
+        """The complete state."""
         memory: FloatArray = self.plain.memory
         return memory
 
     def begin_episode(self) -> None:
-        """Begin an episode of learning."""
+        """Start an episode of training."""
         self.plain.begin_episode()
 
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
@@ -143,11 +142,11 @@ class PlainExplorer(Explorer):
         return int(self.plain.choose(agent, values, rng))
 
     def advance(self) -> None:
-        """Go on to the next step."""
+        """Advance to the next step."""
         self.plain.advance()
 
     def continue_from(self, former: Self) -> None:
-        """Go on from an explorer of other agents, if the user's class can."""
-        if offered(self.plain, "continue_from") is None:
+        """Continue from an explorer of other agents, if the user's class supports it."""
+        if getattr(self.plain, "continue_from", None) is None:
             raise ValueError(no_way_on("learner.exploration.kind", self.plain))
         self.plain.continue_from(former.plain)

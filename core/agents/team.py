@@ -18,8 +18,7 @@ from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_p
 from ..interface.environments import Transitions
 from ..interface.experience import Decision, Experience, Observation
 from ..interface.measures import Measure
-from ..interface.plain import as_scenario
-from ..interface.scenario import Scenario
+from ..interface.scenario import Scenario, checked_scenario
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from ..plugins.settings import Settings
 from ..plugins.words import expect
@@ -79,7 +78,7 @@ class Team:
         expect("settings of a team or of a learner", Settings, settings=settings)
         expect("a hierarchy", Hierarchy, hierarchy=hierarchy)
         expect("what policy_seed returns", np.random.SeedSequence, seed=seed)
-        checked = as_scenario(scenario)
+        checked = checked_scenario(scenario)
         if hierarchy.agents != tuple(checked.agents):
             raise ValueError(
                 f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "

@@ -1,31 +1,31 @@
-"""What values the actions of fuzzy agents: an evaluator of their place in a team."""
+"""Evaluators of fuzzy agents for their part of a team."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..evaluators.budget import check_budget
-from ..evaluators.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
 from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import AgentContext
 from ..interface.scenario import Scenario
 from ..learners.learner import LearnerSettings
 from ..numerics import IntArray
+from ..search.budget import check_budget
+from ..search.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
 from ..values.rule_base import RuleBase
 from .plain import as_evaluator
 
 
 class Present(NamedTuple):
-    """Who takes part in decisions."""
+    """Agents that are present in decisions."""
 
     hierarchy: Hierarchy
-    """Who decides before whom; those who have left are in no relation."""
+    """Hierarchy; agents that have left have no edges."""
     left: IntArray
-    """``(k,)`` who has left."""
+    """``(k,)`` agents that have left."""
 
 
 def is_private(settings: LearnerSettings, scenario: Scenario) -> bool:
-    """Return whether each agent decides by a view of its own, see `views`."""
+    """Return whether every agent has a view of its own, see `views`."""
     return settings.decision.errors is not None or scenario.is_private
 
 
@@ -36,23 +36,23 @@ def evaluator_of(
     context: AgentContext,
     present: Present,
 ) -> Evaluator | None:
-    """Return the evaluator of some agents; None: their actions are drawn at random.
+    """Return the evaluator of some agents, or None if they act at random.
 
     Parameters
     ----------
     settings, rules
-        Of the agents.
+        Settings and rule base of the agents.
     learned
-        Their learner, if it values actions itself.
+        The learner, if it evaluates actions itself.
     context
         Where they act.
     present
-        Who takes part.
+        Agents that are present.
 
     Raises
     ------
     ValueError
-        If they decide by values that they do not know; one line.
+        If they decide by values of agents of another part; one line.
     """
     decision = settings.decision
     if decision.rule == "random":
@@ -96,12 +96,12 @@ def evaluator_of(
 
 
 def _check_values(hierarchy: Hierarchy, own: set[int], value_of: ValueOf) -> None:
-    """Refuse to decide by values of agents of other parts, whose weights nobody knows."""
+    """Refuse to decide by values of agents of other parts, because their weights are unknown."""
     agents = hierarchy.agents
-    whose = concerned(hierarchy, value_of)
+    valued = concerned(hierarchy, value_of)
     for agent in own:
-        for other in sorted(set(whose[agent].tolist()) - own):
+        for other in sorted(set(valued[agent].tolist()) - own):
             raise ValueError(
                 f"learner.decision.value_of = {value_of!r}: values of {agents[other]!r} are "
-                f"not known to {agents[agent]!r}, who is of another part; use 'own'"
+                f"unknown to {agents[agent]!r}, which belongs to another part; use 'own'"
             )

@@ -1,10 +1,8 @@
-"""What fuzzy agents decide by: one view that all share, or a view of each agent's own.
+"""Inputs of decisions of fuzzy agents: one view that all share, or one view for each agent.
 
-As a rule the agents of a team share one prediction and know each other's consequent weights. With
-``[learner.decision.errors]``, or in a scenario that agents perceive each for itself, every agent
-decides by
-a view of its own. Then it plans for itself, too: no plan is handed down, and what it is told are
-actions alone.
+The agents of a team usually share one prediction and know each other's consequent weights. With
+``[learner.decision.errors]``, or if every agent has its own sensors, every agent decides by a view
+of its own. It then also plans for itself: agents send actions, but no plans.
 """
 
 from __future__ import annotations
@@ -15,93 +13,92 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..adaptation.foresight import Foresight
-from ..decision.errors import Errors
-from ..evaluators.evaluator import concerned
 from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import AgentContext
 from ..interface.experience import Observation
 from ..interface.measures import Measure
 from ..interface.prediction import Prediction
 from ..learners.learner import LearnerSettings
+from ..models.team_model import TeamModel
 from ..numerics import FloatArray, IntArray
+from ..search.errors import Errors
+from ..search.evaluator import concerned
 
 UNKNOWN: FloatArray = np.zeros(0)
-"""The weights of agents of another part."""
+"""Weights of agents of another part, which are unknown."""
 COSTS = (
     Measure("agreement", "agreement", gathering="mean", better="higher", least=0.0, greatest=1.0),
     Measure("received", "actions received", "1/decision", gathering="mean", least=0.0),
     Measure("broadcast", "states broadcast", "1/decision", gathering="mean", least=0.0),
 )
-"""What is measured of agents with views of their own, as means of an episode: in how many of the
-others an agent was right about what they then did (those that told it are among them), where it
-makes plans; and what was
-communicated in a decision, the actions told and the states of other bodies sent to an agent."""
+"""Measures of agents with views of their own, as means of an episode: share of other agents whose
+actions an agent expected rightly (with plans only; senders count as well), and numbers of received
+actions and of received states of other bodies."""
 
 
 class OwnView(NamedTuple):
-    """What one agent decides by."""
+    """Prediction and weights by which one agent decides."""
 
     prediction: Prediction
-    """What it predicts joint actions to lead to."""
+    """Prediction of the agent."""
     weights: list[FloatArray]
-    """What it takes for the consequent weights of every agent."""
+    """Consequent weights of every agent, as the agent knows them."""
 
 
 @dataclass
 class FuzzyInputs:
-    """What fuzzy agents decide by."""
+    """Inputs of one decision of fuzzy agents."""
 
     left: FloatArray
-    """``(n, d)`` the states that they are in; where they value actions, with a column for each
-    action that they are told, filled in stage by stage."""
+    """``(n, d)`` present states. For learners of action values, further columns hold the received
+    actions, which are filled in stage by stage."""
     previous: IntArray | None
-    """``(n,)`` what all did in the decision before; none: there was none, or nobody asks."""
+    """``(n,)`` previous joint action, if unseen agents are assumed to repeat it; else None."""
     prediction: Prediction
-    """What joint actions would lead to."""
+    """Prediction that all agents share."""
     weights: list[FloatArray]
-    """The consequent weights of every agent."""
+    """Consequent weights of every agent."""
     frequencies: FloatArray
-    """``(n, A)`` how often each agent was seen to take each action, rows summing to one."""
+    """``(n, A)`` relative frequencies of the actions of every agent."""
     explore: bool
-    """Whether they explore."""
+    """Whether the agents explore."""
     values: dict[int, FloatArray] | None = None
     """Values ``(A,)`` of actions by agent, if the decision is inspected."""
     joint_action: IntArray | None = None
-    """``(n,)`` the joint action, if one search has found the actions of all agents."""
+    """``(n,)`` joint action, if one search has found the actions of all agents."""
     views: dict[int, OwnView] = field(default_factory=dict)
-    """By agent, what it decides by in place of prediction and weights; empty: all by these."""
+    """Own views by agent; empty if all agents share prediction and weights."""
     expected: dict[int, IntArray] = field(default_factory=dict)
-    """By agent with a view and a plan, the joint action that it expected when it decided."""
+    """Joint action that an agent expected when it decided, for agents with own views and plans."""
     agreement: float = 1.0
-    """How far these were right, see `nested_agents.core.agents.views`."""
+    """Share of expected actions that came true, see `agreement`."""
 
 
 class Views:
-    """The views of agents that each have one of their own.
+    """Views of agents that each have one of their own.
 
     Parameters
     ----------
     settings, context
-        Of the agents.
+        Settings and context of the agents.
     rows
-        Per agent of the team the row of its weights; none: they are not known.
+        Row of weights of every agent of the team; None if its weights are unknown.
     n_rules
-        Rules of the rule base.
-    foresight
-        What they predict by.
+        Number of rules of the rule base.
+    model
+        Predictor of the agents.
     plans
-        Whether they make plans, so that they expect something of the others.
+        Whether the agents plan, so that they expect actions of the others.
 
     Attributes
     ----------
     costs
-        What is measured of them in an episode.
+        Measures of the agents, see `COSTS`.
 
     Raises
     ------
     ValueError
-        If constants shall be wrong that the scenario's predictor has not; one line.
+        If the settings name errors of constants that the predictor does not have; one line.
     """
 
     def __init__(
@@ -110,31 +107,31 @@ class Views:
         context: AgentContext,
         rows: list[int | None],
         n_rules: int,
-        foresight: Foresight,
+        model: TeamModel,
         *,
         plans: bool,
     ) -> None:
         self.costs = COSTS if plans else COSTS[1:]
         self._members = context.members.tolist()
         self._rows = rows
-        self._foresight = foresight
+        self._model = model
         hierarchy = context.hierarchy
-        # Who values its own actions where it is predicts nothing, and needs no state but its own.
+        # Learners of action values do not predict and need only their own states.
         perceived = context.scenario.perceived[context.members]
         self._broadcast = 0.0 if settings.values_actions else float(perceived.sum())
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
             bodies = context.scenario.embodiment() if settings.decision.errors.constants else None
-            whose = concerned(hierarchy, settings.decision.value_of)
+            valued = concerned(hierarchy, settings.decision.value_of)
             n_constants = 0 if bodies is None else len(bodies.constants)
             self._errors = Errors(
-                settings.decision.errors, whose, rows, n_rules, n_constants, context.seed
+                settings.decision.errors, valued, rows, n_rules, n_constants, context.seed
             )
 
     def by_agent(
         self, seen: Observation, shared: Prediction, theta: FloatArray
     ) -> dict[int, OwnView]:
-        """Return by agent what it takes for true, of a prediction and of weights."""
+        """Return the view of every agent: prediction and weights, with its own errors."""
         views: dict[int, OwnView] = {}
         for agent in self._members:
             prediction = shared
@@ -143,13 +140,13 @@ class Views:
                 own = self._errors.weights(agent, theta)
                 constants = self._errors.constants(agent)
                 if constants is not None:
-                    prediction = self._foresight.predict(seen, constants) or shared
+                    prediction = self._model.predict(seen, constants) or shared
             views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
         return views
 
     def decision_costs(self, inputs: FuzzyInputs, hierarchy: Hierarchy) -> Mapping[str, float]:
-        """Return how far expectations were right, and what was communicated in a decision."""
-        share = len(self._members) / len(hierarchy)  # those of other parts add theirs
+        """Return agreement and communication of a decision by the names of `costs`."""
+        share = len(self._members) / len(hierarchy)  # the other parts add their shares
         spent = {
             "agreement": inputs.agreement * share,
             "received": float(sum(len(hierarchy.senders(i)) for i in self._members)),
@@ -159,19 +156,19 @@ class Views:
 
 
 def weights_by_agent(rows: list[int | None], theta: FloatArray) -> list[FloatArray]:
-    """Return the consequent weights of every agent by the rows that agents have."""
+    """Return the consequent weights of every agent, given the row of each agent."""
     return [UNKNOWN if row is None else theta[row] for row in rows]
 
 
 def agreement(expected: dict[int, IntArray], joint_action: IntArray) -> float:
-    """Return in how many of the others an agent was right, on average, as a share.
+    """Return the share of other agents' actions that agents expected rightly, mean over agents.
 
     Parameters
     ----------
     expected
-        By agent, the joint action ``(n,)`` that it expected when it decided.
+        Joint action ``(n,)`` that an agent expected when it decided.
     joint_action
-        ``(n,)`` what all then did.
+        ``(n,)`` joint action that was then taken.
 
     Examples
     --------
@@ -189,7 +186,7 @@ def agreement(expected: dict[int, IntArray], joint_action: IntArray) -> float:
 
 
 def senders_of(settings: LearnerSettings, hierarchy: Hierarchy) -> list[list[int]]:
-    """Return, by agent, whose actions are part of its state, in the order of decision."""
+    """Return the agents with actions in an agent's state, in the order of decision."""
     if not settings.values_actions:
         return []
     if hierarchy.neighbors:

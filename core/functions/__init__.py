@@ -1,1 +1,1 @@
-"""Agents that decide by a function of a user."""
+"""Agents that decide by a user-defined function."""

@@ -114,7 +114,7 @@ class FunctionAgents(Agents[FunctionInputs]):
         return FunctionInputs(seen.present)
 
     def act(self, inputs: FunctionInputs, inbox: Inbox) -> IntArray:
-        """Return the actions of the agents whose turn it is ``(k,)``.
+        """Return the actions ``(k,)`` of the agents of a stage.
 
         Raises
         ------

@@ -18,6 +18,6 @@ class FunctionSettings(TeamSettings):
     kind_of_agents = f"{CORE}.functions.agents:FunctionAgents"
 
     hears: Literal["contents", "actions"] = "contents"
-    """What an agent receives: actions with the contents that senders add, or actions alone."""
+    """Whether agents receive actions with the contents that senders add, or actions only."""
     costs: Mapping[str, Unit] = {}
     """Costs that the function reports, with their units: ``{tokens = "1", price = "EUR"}``."""

@@ -1,1 +1,1 @@
-"""Who decides after whom: hierarchies, and what fails of their messages."""
+"""Hierarchies of agents, their messages, and failures of these messages."""

@@ -1,10 +1,9 @@
-"""What fails, by name and from when to when: messages down the hierarchy, and agents that leave.
+"""Failures of messages between agents, and absences of agents, with their times.
 
-An agent is told the actions that those above it have decided. A failure of messages concerns what
-named agents say: it is lost, late, wrong, or not said at all because the agent is absent; or an
-agent is told by others than it was. All that is random here has a stream of its own, so that worlds
-and policies stay paired. How an agent reads what it was not told is the team's own business, see
-`nested_agents.core.learners.learner`.
+Messages of named agents are lost, delayed or replaced by random actions; agents are absent, leave
+the team or get another superior. Random failures have a random stream of their own, so that
+environments and policies stay paired. The setting `unseen` of `core.search.settings` says what
+agents assume about actions that they did not receive.
 """
 
 from collections.abc import Sequence
@@ -20,43 +19,43 @@ from .repair import Repair
 
 
 class Scheduled(Settings):
-    """From when to when something fails.
+    """A failure with a beginning and, optionally, an end.
 
-    A failure begins at its step of its episode and lasts, from episode to episode, until its end;
-    evaluation comes after all training.
+    A failure begins at a step of an episode and lasts over all further episodes until its end.
+    Evaluation follows all training.
     """
 
     part: ClassVar[str] = ""
-    """The field that names what fails."""
+    """Name of the field that lists what fails."""
 
     episode: NonNegativeInt = 0
-    """Episode in which it begins, counted from 0."""
+    """Episode in which the failure begins, counted from 0."""
     step: NonNegativeInt = 0
-    """Step of that episode at which it begins."""
+    """Step of that episode at which the failure begins."""
     end_episode: NonNegativeInt | None = None
-    """Episode in which it ends; none: it lasts."""
+    """Episode in which the failure ends; by default it does not end."""
     end_step: NonNegativeInt = 0
-    """Step of that episode at which it ends."""
+    """Step of that episode at which the failure ends."""
 
     @property
     def named(self) -> tuple[str, ...]:
-        """What it names, by name, pattern or number: its field called `part`."""
+        """Names, patterns or numbers of what fails."""
         names: tuple[str, ...] = dict(self)[self.part]
         return names
 
     def lasts(self, episode: int, step: int) -> bool:
-        """Return whether it is on at a step of an episode."""
+        """Return whether the failure is active at a step of an episode."""
         now = episode, step
         over = self.end_episode is not None and now >= (self.end_episode, self.end_step)
         return now >= (self.episode, self.step) and not over
 
     def mask(self, agents: Sequence[str], where: str) -> BoolArray:
-        """Return which of the agents ``(n,)`` it names.
+        """Return whether the failure names an agent ``(n,)``.
 
         Raises
         ------
         ValueError
-            If it names one that there is not; the line begins with the key `where` it stands.
+            If it names an unknown agent; `where` is the key of the failure in the settings.
         """
         return mask_of(self.named, agents, f"{where}.{self.part}")
 
@@ -71,68 +70,68 @@ class Scheduled(Settings):
 
 
 STREAM = 2**32 - 2
-"""Key of the stream from which failures of messages draw, under the seed of an episode's world;
-failures of a scenario have 0, 1, ..., and sensor noise the key after this."""
+"""Key of the random stream of message failures, derived from the seed of an episode. Failures of a
+scenario have the keys 0, 1, ...; sensor noise has the next key after this one."""
 
 
 LOST = -1
-"""What arrives where a message does not."""
+"""Action in place of a lost message."""
 GARBLED = -1
-"""Age of a message whose content nobody can read any more."""
+"""Age of a message whose payload is unreadable."""
 
 
 class Sent(NamedTuple):
-    """Messages of some agents before they fail."""
+    """Messages as some agents send them."""
 
     actions: IntArray
-    """``(k,)`` what they have decided."""
+    """``(k,)`` decided actions."""
     past: Sequence[IntArray]
-    """The same of the decisions before, the last one last."""
+    """Actions ``(k,)`` of these agents in earlier decisions, the most recent last."""
     n_actions: int
-    """Actions of every agent."""
+    """Number of actions of every agent."""
     rng: Generator
-    """For what is random."""
+    """Random stream of the failures."""
 
 
 class MessageFailure(Scheduled):
-    """A failure of the messages of some agents, from when to when."""
+    """A failure of the messages of some agents during some time."""
 
     part: ClassVar[str] = "agents"
 
     kind: str = ""
     agents: Names
-    """Agents by name or pattern, one or a list."""
+    """Names or patterns of agents, one or a list."""
 
     @property
     def text(self) -> str:
-        """What fails, in a line."""
+        """One-line description."""
         written = self.model_dump(exclude={"kind", "agents"}, exclude_defaults=True).items()
         rest = "".join(f", {key} {value}" for key, value in written)
         return f"{self.kind or 'failing'}: {', '.join(self.agents)}{rest}"
 
     @property
     def history_length(self) -> int:
-        """How many decisions back it needs what was decided."""
+        """Number of earlier decisions that the failure requires."""
         return 0
 
     def passed(self, sent: Sent) -> IntArray:
-        """Return what arrives ``(k,)``, `LOST` where nothing does."""
+        """Return the actions that arrive ``(k,)``, with `LOST` for lost messages."""
         return sent.actions
 
     def ages(self, sent: Sent, arrived: IntArray, ages: IntArray) -> IntArray:
-        """Return how many decisions ago was said what arrives ``(k,)``, or `GARBLED`."""
+        """Return the age of every message in decisions ``(k,)``, or `GARBLED`."""
         return np.where(arrived == sent.actions, ages, GARBLED)
 
 
 class LostMessages(MessageFailure):
-    """Each message of the agents is lost with a probability."""
+    """Each message of the agents is lost with some probability."""
 
     kind: Literal["lost"] = "lost"
     probability: Fraction = 1.0
-    """Of each message; 1: the agents are silent."""
+    """Probability that a message is lost. At 1 the agents are silent."""
 
     def passed(self, sent: Sent) -> IntArray:
-        """Return what is not lost."""
+        """Return the actions, some of them lost."""
         arrives = sent.rng.random(len(sent.actions)) >= self.probability
         return np.where(arrives, sent.actions, LOST)
 
@@ -142,71 +141,72 @@ class DelayedMessages(MessageFailure):
 
     kind: Literal["delayed"] = "delayed"
     decisions: Annotated[int, Field(ge=1, le=1000)] = 1
-    """How many; before as many have been made, nothing is said."""
+    """Delay in decisions. No message arrives in the first decisions of an episode."""
 
     @property
     def history_length(self) -> int:
-        """As many decisions back."""
+        """The delay."""
         return self.decisions
 
     def passed(self, sent: Sent) -> IntArray:
-        """Return what the agents did as many decisions before."""
+        """Return the actions of an earlier decision."""
         is_early = len(sent.past) < self.decisions
         return np.full_like(sent.actions, LOST) if is_early else sent.past[-self.decisions]
 
     def ages(self, sent: Sent, arrived: IntArray, ages: IntArray) -> IntArray:
-        """Return as many decisions more."""
+        """Return the ages plus the delay."""
         return ages + self.decisions
 
 
 class NoisyMessages(MessageFailure):
-    """Each message of the agents is replaced by a random action with a probability."""
+    """Each message of the agents is replaced by a random action with some probability."""
 
     kind: Literal["noisy"] = "noisy"
     probability: Fraction = 0.3
-    """Of each message."""
+    """Probability that a message is replaced."""
 
     def passed(self, sent: Sent) -> IntArray:
         """Return the actions, some of them replaced by random ones."""
-        k, rng = len(sent.actions), sent.rng
-        noise = rng.integers(sent.n_actions, size=k, dtype=np.int64)
-        return np.where(rng.random(k) < self.probability, noise, sent.actions)
+        k = len(sent.actions)
+        noise = sent.rng.integers(sent.n_actions, size=k, dtype=np.int64)
+        return np.where(sent.rng.random(k) < self.probability, noise, sent.actions)
 
 
 class AbsentAgents(MessageFailure):
-    """The agents perform the neutral action and send no messages; nobody knows."""
+    """The agents perform the neutral action and send no messages; the others do not know."""
 
     kind: Literal["absent"] = "absent"
 
     def passed(self, sent: Sent) -> IntArray:
-        """Return that nothing arrives."""
+        """Return that all messages are lost."""
         return np.full_like(sent.actions, LOST)
 
 
 class ReparentedAgents(MessageFailure):
-    """The agents are told by another superior; those who consider them do not know."""
+    """The agents receive from another superior; agents that search over them do not know."""
 
     kind: Literal["reparented"] = "reparented"
     superior: str
-    """Name of an agent that decides before them."""
+    """Name of the new superior, which must decide before the agents."""
 
 
 class LeftAgents(MessageFailure):
-    """The agents have left the team, and all know; the hierarchy is repaired by a rule.
+    """The agents have left the team, and all others know. The hierarchy is repaired.
 
-    They decide nothing, say nothing, and are neither told nor considered. An agent that joins later
-    has left from the first episode on, until it comes.
+    Agents that have left neither decide nor communicate, and no agent searches over them. An agent
+    that joins later is absent from the first episode until it joins.
     """
 
     kind: Literal["left"] = "left"
     repair: Repair = "grandparents"
-    """Who stands above those right below an agent that has left: those above it, ``grandparents``;
-    the ``next`` of them in the order of decision, who takes its place; or ``none``."""
+    """New superiors of the subordinates of an agent that has left: its superiors
+    (``grandparents``), the ``next`` subordinate in the order of decision, which takes its place, or
+    no agent (``none``)."""
     action: str | None = None
-    """Name of the action that they perform meanwhile; none: the neutral one."""
+    """Action of the agents meanwhile; by default the neutral one."""
 
     def passed(self, sent: Sent) -> IntArray:
-        """Return that nothing arrives."""
+        """Return that all messages are lost."""
         return np.full_like(sent.actions, LOST)
 
 
@@ -214,4 +214,4 @@ AnyMessageFailure = Annotated[
     LostMessages | DelayedMessages | NoisyMessages | AbsentAgents | ReparentedAgents | LeftAgents,
     Field(discriminator="kind"),
 ]
-"""Any failure of messages: a table distinguished by `kind`."""
+"""Any message failure, distinguished by `kind`."""

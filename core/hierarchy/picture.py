@@ -1,6 +1,6 @@
-"""A small picture of a hierarchy as SVG, for notebooks; superiors above, subordinates below.
+"""Small picture of a hierarchy as SVG, for notebooks: superiors above, subordinates below.
 
-Figures for papers are of `nested_agents.topologies.drawing`, which needs matplotlib.
+`nested_agents.topologies.drawing` draws figures for papers with matplotlib.
 """
 
 from collections.abc import Sequence
@@ -11,28 +11,28 @@ DOWN = 38
 WIDTH = 84
 HEIGHT = 22
 """Distances and sizes [px]."""
-MOST = 32
-"""Agents that are drawn; of more, their number is said."""
+MAX_AGENTS = 32
+"""Maximum number of agents that are drawn; a line of text describes larger hierarchies."""
 
 
 def svg(
     agents: Sequence[str],
     levels: Sequence[int],
     edges: Sequence[tuple[int, int]],
-    neighbours: Sequence[tuple[int, int]] = (),
+    neighbors: Sequence[tuple[int, int]] = (),
 ) -> str:
     """Return an SVG element.
 
     Parameters
     ----------
     agents
-        Names.
+        Names of the agents.
     levels
-        How many decide before each at least, by which it stands lower.
+        Row of every agent, from the top.
     edges
-        Superior and subordinate, by index.
-    neighbours
-        Pairs by index; their lines are dashed.
+        Pairs (superior, subordinate) of agent indices.
+    neighbors
+        Pairs of agent indices, joined by dashed lines.
 
     Examples
     --------
@@ -41,8 +41,8 @@ def svg(
     """
     rows = [[i for i, own in enumerate(levels) if own == k] for k in sorted({*levels})]
     widest = max(map(len, rows))
-    if len(agents) > MOST:
-        text = f"{len(agents)} agents, {len(edges) + len(neighbours)} edges, depth {len(rows)}"
+    if len(agents) > MAX_AGENTS:
+        text = f"{len(agents)} agents, {len(edges) + len(neighbors)} edges, depth {len(rows)}"
         return _element(ACROSS * 4, DOWN, [_text(ACROSS * 2, DOWN / 2, text, len(text))])
     places = {}
     for k, row in enumerate(rows):
@@ -52,7 +52,7 @@ def svg(
                 DOWN * (k + 0.5),
             )
     lines = [_line(places[a], places[b], "") for a, b in edges]
-    lines += [_line(places[a], places[b], ' stroke-dasharray="3"') for a, b in neighbours]
+    lines += [_line(places[a], places[b], ' stroke-dasharray="3"') for a, b in neighbors]
     boxes = []
     for agent, (x, y) in places.items():
         boxes.append(
@@ -74,6 +74,6 @@ def _line(a: tuple[float, float], b: tuple[float, float], style: str) -> str:
     return f'<line {ends} stroke="#456"{style}/>'
 
 
-def _text(x: float, y: float, text: str, most: int = 14) -> str:
-    shown = text if len(text) <= most else f"{text[: most - 1]}…"
+def _text(x: float, y: float, text: str, max_length: int = 14) -> str:
+    shown = text if len(text) <= max_length else f"{text[: max_length - 1]}…"
     return f'<text x="{x:g}" y="{y + 4:g}">{escape(shown)}</text>'

@@ -1,4 +1,4 @@
-"""What becomes of a hierarchy when agents leave it."""
+"""Repair of a hierarchy from which agents leave."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -7,22 +7,22 @@ from ..numerics import nx
 from .hierarchy import Hierarchy
 
 Repair = Literal["grandparents", "next", "none"]
-"""By which rule a hierarchy is repaired, see `without`."""
+"""Rule of the repair, see `without`."""
 
 
 def without(hierarchy: Hierarchy, gone: Sequence[int], repair: Repair) -> Hierarchy:
-    """Return a hierarchy in which agents are in no relation any more, one after the other.
+    """Return a hierarchy in which some agents have no edges. They are removed one after another.
 
     Parameters
     ----------
     hierarchy
-        As it was; not modified.
+        The hierarchy before.
     gone
-        Who leaves.
+        Agents that leave.
     repair
-        Who stands above the subordinates of each: its superiors (``grandparents``); the ``next`` of
-        the subordinates in the order of decision, who takes its place below these superiors; or
-        nobody in its place (``none``). Neighbours of an agent that leaves are joined by no rule.
+        New superiors of the subordinates of an agent that leaves: its superiors
+        (``grandparents``); the ``next`` subordinate in the order of decision, which takes its
+        place; or no agent (``none``). Neighbors of an agent that leaves are not connected.
 
     Examples
     --------

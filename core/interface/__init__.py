@@ -1,1 +1,1 @@
-"""What a scenario and those who act in it promise each other."""
+"""Interfaces of scenarios and agents, and the values that they exchange."""

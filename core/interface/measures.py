@@ -1,4 +1,4 @@
-"""What is measured of an episode: the columns of results that a scenario declares."""
+"""Measures of an episode: the columns of results that a scenario declares."""
 
 import math
 from collections.abc import Sequence
@@ -8,30 +8,28 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Measure:
-    """A number that describes an episode: a column of results."""
+    """A number that describes an episode, a column of results."""
 
     name: str
-    """Of the column; ``success`` is the one by which scenarios are compared."""
+    """Name of the column. Scenarios are compared by ``success``."""
     title: str
-    """Its heading in tables and figures."""
+    """Heading in tables and figures."""
     unit: str = "1"
-    """In words of the SI, ``"1"`` for a pure number."""
+    """SI unit, ``"1"`` for a pure number."""
     source: str = ""
-    """Where it is taken from at every step: a key of `Transition.info`, or ``terminated``; empty:
-    the key of its own name."""
+    """Key of `Transition.info` with the value of a step, or ``terminated``; by default the name."""
     gathering: Literal["last", "mean", "sum", "max"] = "last"
-    """How the steps of an episode make one number: their ``last``, ``mean``, ``sum`` or ``max``."""
+    """Aggregation over the steps of an episode: ``last``, ``mean``, ``sum`` or ``max``."""
     better: Literal["higher", "lower"] | None = None
-    """Which way is better, if one is."""
+    """Whether higher or lower values are better; None if neither is."""
     is_rate: bool = False
-    """Whether an episode has it or has it not: 1 or 0."""
+    """Whether the values are 1 and 0, for yes and no."""
     least: float | None = None
-    """What it cannot be below, if there is such; intervals end there."""
+    """Lower bound of possible values, at which intervals end."""
     greatest: float | None = None
-    """What it cannot be above, if there is such; intervals end there."""
+    """Upper bound of possible values, at which intervals end."""
 
     def __post_init__(self) -> None:
-        """Take it from the key of its own name, if no other is given."""
         object.__setattr__(self, "source", self.source or self.name)
 
     @property
@@ -57,15 +55,15 @@ class Measure:
 
 
 SUCCESS = Measure("success", "success", source="terminated", better="higher", is_rate=True)
-"""Whether the episode ended with the task solved: success, unless a scenario says otherwise."""
+"""Whether the task was solved; the measure of success of most scenarios."""
 NO_SUCCESS = replace(SUCCESS, greatest=0.0)
-"""Success in a task in which nothing is one: teams are compared by their returns."""
+"""Success in a task that cannot be solved: teams are compared by their returns."""
 RETURN = Measure("return", "return", better="higher")
-"""The return of an episode, which every scenario has."""
+"""Return of an episode, a measure of every scenario."""
 
 
 def measures_of(declared: Sequence[Measure]) -> tuple[Measure, ...]:
-    """Return what is measured of an episode, success first: `SUCCESS` unless another is declared.
+    """Return the measures of an episode, success first; by default this is `SUCCESS`.
 
     >>> [measure.name for measure in measures_of([Measure("spread", "spread", "m")])]
     ['success', 'spread']
@@ -75,7 +73,7 @@ def measures_of(declared: Sequence[Measure]) -> tuple[Measure, ...]:
 
 
 def main_measure(measures: Sequence[Measure]) -> Measure:
-    """Return by which of its measures a task is judged: the first, or the return if that is never.
+    """Return the measure by which a task is judged: the first, or the return without success.
 
     >>> main_measure([SUCCESS]).name, main_measure([NO_SUCCESS]).name
     ('success', 'return')

@@ -1,6 +1,6 @@
-"""What a predictor promises: where joint actions would lead, and what of it is tabulated.
+"""Interface of predictions: next states and rewards of joint actions, and their tables.
 
-Conventions are those of `spaces`.
+Arrays follow the conventions of `spaces`.
 """
 
 from __future__ import annotations
@@ -17,30 +17,29 @@ from ..numerics import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Blocks:
-    """Next states of one agent for all joint actions, in their two blocks.
+    """Next states of one agent for all joint actions: own and shared variables.
 
-    Compiled kernels read the tables without looking at their sizes.
-    `nested_agents.scenarios.checking.checker` does look.
+    Compiled kernels do not check the sizes of the tables;
+    `nested_agents.scenarios.checking.checker` does.
     """
 
     own: FloatArray
-    """``(K, n_own)`` own variables, one row per robot-action index of the agent's group of ``w``
-    agents; fewer with `own_rows`, or if there are no own variables: then one row will do."""
+    """``(K, n_own)`` own variables, one row for each robot-action index of the agent's group of
+    ``w`` agents. With `own_rows` there are fewer rows; without own variables one row suffices."""
     shared: FloatArray
-    """``(R, d - n_own)`` shared variables, one row per joint-action index; fewer with
+    """``(R, d - n_own)`` shared variables, one row for each joint-action index, or fewer rows with
     `shared_rows`."""
     divisor: int
-    """``A`` to the power of the number of agents behind the group: the robot-action index of
+    """``A`` to the power of the number of agents after the group. The robot-action index of a
     joint-action index ``c`` is ``c // divisor % A ** w``."""
     own_rows: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """``(A ** w,)`` the row of `own` of every robot-action index, where several lead to one; empty:
-    each has its row."""
+    """``(A ** w,)`` row of `own` for every robot-action index; empty if every index has a row."""
     shared_rows: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """``(A ** n,)`` the row of `shared` of every joint-action index; empty: each has its row."""
+    """``(A ** n,)`` row of `shared` for every joint-action index; empty if every index has a
+    row."""
     alone: bool = False
-    """Whether own variables are those that the group would reach alone, which is an approximation
-    where others matter to them. If not, the blocks give for every index exactly what
-    `Prediction.states` gives; if so, of the shared variables only."""
+    """Whether own variables ignore the other groups, which is an approximation. Otherwise the
+    tables agree exactly with `Prediction.states`."""
 
     def rows(self, indices: IntArray) -> tuple[IntArray, IntArray]:
         """Return the rows ``(m,)`` of `own` and of `shared` for joint-action indices ``(m,)``."""
@@ -55,48 +54,48 @@ class Blocks:
 
 
 class Exploring(NamedTuple):
-    """How agents explore by random actions that are held, as compiled code takes it."""
+    """State and probabilities of burst exploration, for compiled code."""
 
     memory: FloatArray
-    """``(1 + 2 n,)``, changed: per agent, behind the first, decisions left and the action held."""
+    """``(1 + 2 n,)`` after the first entry the remaining decisions and the action of every agent's
+    burst; modified."""
     chance: float
-    """Probability with which an agent begins to hold one; below zero: nobody does."""
+    """Probability that an agent starts a burst; negative without exploration."""
     stop: float
-    """Probability with which it ends."""
+    """Probability that a burst ends."""
 
 
 NOT_EXPLORING = Exploring(np.zeros(0), -1.0, 1.0)
-"""Nobody explores."""
+"""No exploration."""
 
 
 class Tables(ABC):
-    """Next states, and perhaps rewards, of all joint actions at once: of few agents."""
+    """Next states and rewards of all joint actions, for small numbers of agents."""
 
     rewarded: bool = True
-    """Whether there is a table of rewards, too."""
+    """Whether there is a table of rewards."""
 
     @abstractmethod
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of an agent for all ``A ** n`` joint actions."""
 
     def reward_table(self) -> FloatArray:
-        """Return the rewards ``(A ** n,)`` of all joint actions, as `Prediction.rewards` gives."""
+        """Return the rewards ``(A ** n,)`` of all joint actions, see `Prediction.rewards`."""
         raise TypeError(f"{type(self).__name__} has no table of rewards")
 
 
 class Prediction(ABC):
-    """What joint actions taken now would lead to. Valid until the scenario's next step.
+    """Next states and rewards of joint actions, valid until the next step of the scenario.
 
-    `states` is all that is needed. What else a prediction knows it says by its other methods; where
-    they return None, whoever asks does without or says so.
-    `nested_agents.scenarios.checking` compares them with `states`.
+    Only `states` is required. The other methods may return None, which means that they are not
+    supported. `nested_agents.scenarios.checking` compares them with `states`.
     """
 
     @cached_property
     def alike(self) -> IntArray | None:
-        """``(G, L)`` for every robot-action index the first one that comes to the same.
+        """``(G, L)`` first robot-action index with the same result as each index; None if unknown.
 
-        The evaluator ``best-response`` tries only that; None: it is not known which do.
+        The evaluator ``best-response`` tries only these.
         """
         return None
 
@@ -105,37 +104,34 @@ class Prediction(ABC):
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray] | None:
-        """Return own variables ``(n, m, n_own)`` of all agents, shared ones ``(G, m, d - n_own)``.
-
-        See `states_by_group`, which does without.
-        """
+        """Return own variables ``(n, m, n_own)`` and shared variables ``(G, m, d - n_own)``."""
         return None
 
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
-        """Return the rewards ``(m,)`` of joint actions ``(m, n)``: to decide by rewards."""
+        """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
         return None
 
     def of(self, agent: int) -> Prediction:
-        """Return what an agent predicts itself: the same, unless agents perceive for themselves."""
+        """Return the prediction of an agent with its own sensors; by default this prediction."""
         return self
 
     def after(self, joint_action: IntArray) -> Prediction | None:
-        """Return the prediction from where a joint action ``(n,)`` leads in one decision.
+        """Return the prediction from the states after a joint action ``(n,)``.
 
-        It knows rewards and goes on likewise: what plans of several decisions need.
+        Plans of several decisions require it, and rewards.
         """
         return None
 
     def tables(self) -> Tables | None:
-        """Return tables of all joint actions, which the evaluator ``exact`` reads."""
+        """Return tables of all joint actions, for the evaluator ``exact``."""
         return None
 
 
 class Unpredicted(Prediction):
-    """What agents decide by who predict nothing: they value their actions where they are."""
+    """Prediction of agents that do not predict: they value actions in their present states."""
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Refuse to predict.
+        """Raise an error.
 
         Raises
         ------
@@ -146,7 +142,7 @@ class Unpredicted(Prediction):
 
 
 UNPREDICTED = Unpredicted()
-"""The only one that there need be."""
+"""The only instance."""
 
 
 def rewards_of(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
@@ -164,29 +160,29 @@ def rewards_of(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
 
 
 class EmbodiedPrediction(Prediction):
-    """A prediction that believes in effects of wheels, and perhaps in constants."""
+    """A prediction for assumed effects of actuators, and possibly for assumed constants."""
 
     groups: tuple[tuple[int, ...], ...]
-    """Agents by body."""
+    """Indices of the agents of every body."""
 
     @abstractmethod
     def commands(self, joint_action: IntArray) -> FloatArray:
-        """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` would command."""
+        """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` commands."""
 
     @abstractmethod
     def slips(self, joint_action: IntArray) -> FloatArray:
-        """Return by how much contact changes the bodies' twists, as predicted, ``(M, 3)``."""
+        """Return the predicted change ``(M, 3)`` of the bodies' twists by contact."""
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
-        """Return what a joint action would lead to by choices of constants ``(k, c)``.
+        """Return predicted mean twists ``(k, K + M, 3)`` for choices of constants ``(k, c)``.
 
-        Mean twists ``(k, K + M, 3)`` of what is moved, then of the bodies, see `Transition.twists`.
+        Twists of moved objects come before those of bodies, see `Transition.twists`.
         """
         raise TypeError(f"{type(self).__name__} has no constants")
 
 
 def first_alike(keys: IntArray | FloatArray) -> IntArray:
-    """Return in every row of ``(G, L)`` the first column that holds the same."""
+    """Return the first column with the same key for every entry of ``(G, L)``."""
     return (keys[:, :, None] == keys[:, None, :]).argmax(axis=2)
 
 

@@ -14,8 +14,8 @@ class EpisodeRecorder:
     Parameters
     ----------
     scenario
-        As it is before the first step, which no transition describes; another instance than the one
-        that steps may be given, if it is in the same state.
+        Scenario in the state before the first step. It may be another instance than the one that
+        steps, in the same state.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -26,12 +26,12 @@ class EpisodeRecorder:
         self._rewards: list[FloatArray] = []
 
     def add(self, transition: Transition) -> None:
-        """Take in one step."""
+        """Record a step."""
         for name, frames in self._frames.items():
             frames.append(np.array(transition.info[name]))
         self._rewards.append(np.array(transition.reward, dtype=float))
 
     def recording(self) -> dict[str, Any]:
-        """Return what was recorded, arrays by name."""
+        """Return the recorded arrays by name."""
         arrays = {name: np.stack(frames) for name, frames in self._frames.items()}
         return arrays | {"reward": np.array(self._rewards)} | self._constants

@@ -1,8 +1,7 @@
-"""A world with a task: what a scenario promises, and what a step of it returns.
+"""Interface of scenarios, environments with a task, and the transitions that they return.
 
-Conventions are those of `spaces`. Scenarios inherit `Scenario`, whose defaults say what holds
-without more; plain classes of users that have its five necessary members are taken in by
-`nested_agents.core.interface.plain`.
+Arrays follow the conventions of `spaces`. Scenarios inherit from `Scenario`. Classes of users that
+have its five required members need not, see `nested_agents.core.interface.plain`.
 """
 
 from __future__ import annotations
@@ -28,14 +27,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Twists = FloatArray | Callable[[], FloatArray | None] | None
-"""Those of a transition, what measures them, or nothing."""
+"""Twists of a transition, a function that measures them, or None."""
 
 
 class DeferredTwists:
-    """The twists of a transition: given, or measured when they are first asked for."""
+    """Twists of a transition, measured on first access if a function was given."""
 
     def __get__(self, transition: Transition | None, owner: type[Transition]) -> FloatArray | None:
-        """Return them; None, which is the default, of no transition."""
+        """Return the twists; None is the default."""
         if transition is None:
             return None
         twists: Twists = vars(transition)["twists"]
@@ -45,43 +44,40 @@ class DeferredTwists:
         return twists
 
     def __set__(self, transition: Transition, twists: Twists) -> None:
-        """Keep them, or what measures them."""
+        """Store the twists, or the function that measures them."""
         vars(transition)["twists"] = twists
 
 
 @dataclass(frozen=True)
 class Transition:
-    """What one step of a scenario returns."""
+    """Result of one step of a scenario."""
 
     states: FloatArray
     """``(n, d)`` states of the agents after the step."""
     reward: float | FloatArray
     """Reward received on entering these states: one number for all agents, or ``(n,)``."""
     terminated: bool
-    """Whether the task is solved (or lost) for good."""
+    """Whether the task is solved, or lost, for good."""
     truncated: bool
     """Whether the episode ends for lack of time."""
     info: Mapping[str, Any]
-    """Measurements of the step by name, scalars or small arrays; for records, not for learners."""
+    """Measurements by name, scalars or small arrays. They are recorded; learners ignore them."""
     twists: DeferredTwists = DeferredTwists()
-    """``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], where bodies
-    measure it; ``(K + M, 3)`` where they also measure what they move, its twists standing first,
-    and nothing else than these bodies moved it. Given is also a function that returns them, which
-    is called if they are asked for."""
+    """``(M, 3)`` mean twist of every body in its own frame [m/s, m/s, rad/s], if it is measured.
+    ``(K + M, 3)`` if the twists of K moved objects are measured, too. These come first, and only
+    the bodies may have moved the objects. A given function is called on first access."""
     absorbing: bool = True
-    """Whether a terminal state is as if entered again for ever, as where a box stands at its goal;
-    if not, its reward is received once, as in Gymnasium."""
+    """Whether a terminal state is repeated forever, with its reward, like a box at its goal. If
+    not, its reward is received once, as in Gymnasium."""
 
 
 def checked_transition(transition: object, space: StateSpace, agents: Sequence[str]) -> Transition:
-    """Return a copy of a transition if agents can learn from it.
-
-    A scenario may reuse its arrays: learners keep transitions, so each enters as a copy.
+    """Return a checked copy of a transition; scenarios may reuse their arrays.
 
     Raises
     ------
     ValueError
-        If it is no `Transition`, or its states or its reward cannot be learned from; one line.
+        If it is no `Transition`, or its states or its reward are invalid; one line.
     """
     if not isinstance(transition, Transition):
         given = type(transition).__name__
@@ -99,17 +95,17 @@ def checked_transition(transition: object, space: StateSpace, agents: Sequence[s
 
 
 def _copied(value: object) -> object:
-    """Return a copy of what code of users might change in place."""
+    """Return a copy of a mutable value."""
     return deepcopy(value) if isinstance(value, np.ndarray | list | dict) else value
 
 
 def checked_reward(reward: object, agents: Sequence[str]) -> float | FloatArray:
-    """Return a copy of the reward of agents if it can be learned from.
+    """Return a checked copy of a reward.
 
     Raises
     ------
     ValueError
-        If it is neither a finite number nor one for each of them.
+        If it is neither a finite number nor one for each agent.
     """
     if isinstance(reward, float) and isfinite(reward):
         return reward  # most scenarios return a float
@@ -124,42 +120,43 @@ def checked_reward(reward: object, agents: Sequence[str]) -> float | FloatArray:
 
 
 class Embodiment(ABC):
-    """Bodies on wheels, open to self-models, and perhaps to calibration."""
+    """Bodies with actuators, for self-models and calibration."""
 
     nominal_effects: tuple[FloatArray, ...]
-    """Per body the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
+    """Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body."""
     constants: tuple[str, ...] = ()
-    """Names of the positive constants of its predictor that can be calibrated."""
+    """Names of the positive constants of the predictor that can be calibrated."""
     levers: FloatArray = np.zeros(0)
-    """``(K + M,)`` the speed per turning rate of what is moved and of the bodies [m], if there are
-    constants."""
+    """``(K + M,)`` speed per turning rate of moved objects and of bodies [m], with constants
+    only."""
 
     @abstractmethod
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> EmbodiedPrediction:
-        """Predict from the present state, believing in these effects, and in constants if given.
+        """Return the prediction from the present state for assumed effects and constants.
 
-        The constants are logarithms, in units of what is believed without them.
+        Constants are logarithms of factors on their nominal values.
         """
 
 
 class PolicyMap(ABC):
-    """What a team does in many places, to be looked at."""
+    """Actions of a team in many situations, for display."""
 
     @abstractmethod
     def lines(self) -> Iterator[str]:
-        """Yield it in words, a line each."""
+        """Yield lines of text."""
 
     @abstractmethod
     def figure(self) -> Figure:
-        """Draw it."""
+        """Return a figure."""
 
 
 class Scenario(ABC):
-    """A world with a task. Everything a learner may know of it.
+    """An environment with a task.
 
-    Necessary are `agents`, `state_space`, `action_set`, `reset` and `step`; the rest has defaults.
+    Required are `agents`, `state_space`, `action_set`, `reset` and `step`. All other members have
+    defaults.
     """
 
     agents: tuple[str, ...]
@@ -169,32 +166,32 @@ class Scenario(ABC):
     action_set: ActionSet
     """The actions of every agent."""
     measures: tuple[Measure, ...] = ()
-    """What is measured of an episode beside success, see `measures_of`. By `NO_SUCCESS` nothing is
-    one, and returns are compared."""
+    """Measures of an episode in addition to success, see `measures_of`. With `NO_SUCCESS`, returns
+    are compared."""
     interactions: Sequence[tuple[int, int]] | None = None
-    """Pairs of agents, by index, whose actions matter to each other: what a topology with ``shape =
-    "scenario"`` joins."""
+    """Pairs of indices of interacting agents, the neighbors in a topology with ``shape =
+    "scenario"``."""
     horizon: int = 1
-    """Decisions that its predictions look ahead, while nobody changes what it does after the first.
-    By that a check judges how far they are off. Then all are neutral, unless it `repeats`."""
+    """Number of decisions that a prediction covers. After the first decision it assumes that all
+    agents take the neutral action, or the same action again if `repeats` is true."""
     repeats: bool = False
-    """Whether in the decisions after the first all do the same again."""
+    """Whether predictions assume that all agents repeat their first action."""
     recorded: tuple[str, ...] = ()
-    """Names of the measurements that are kept, one array ``(T + 1, ...)`` each."""
+    """Names of the recorded measurements, one array ``(T + 1, ...)`` each."""
 
     @cached_property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The agents by body, consecutive; by default each is a body of its own."""
+        """Indices of the agents of every body, consecutive; by default each agent is a body."""
         return tuple((i,) for i in range(len(self.agents)))
 
     @cached_property
     def roles(self) -> tuple[str, ...]:
-        """The role of every agent; agents of one role may share weights. By default its name."""
+        """Role of every agent, by default its name. Agents of one role can share weights."""
         return tuple(self.agents)
 
     @cached_property
     def perceived(self) -> BoolArray:
-        """Of which other bodies each agent perceives the state, ``(n, G)``: by default of all."""
+        """``(n, G)`` whether an agent perceives the state of another body; by default all do."""
         own = np.zeros((len(self.agents), len(self.groups)), dtype=bool)
         for body, group in enumerate(self.groups):
             own[list(group), body] = True
@@ -202,74 +199,74 @@ class Scenario(ABC):
 
     @property
     def is_private(self) -> bool:
-        """Whether agents perceive it each for itself, see `Prediction.of`."""
+        """Whether every agent has sensors of its own, see `Prediction.of`."""
         return False
 
     @cached_property
     def bounds(self) -> FloatArray:
-        """Between which states lie ``(d, 2)``."""
+        """``(d, 2)`` lower and upper bounds of the states."""
         return self.state_space.bounds
 
     @property
     def lacks_prediction(self) -> str:
-        """Why it predicts nothing, if it does not."""
+        """Reason why a scenario has no prediction."""
         return f"the scenario {type(self).__name__} has no method predict"
 
     @abstractmethod
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode and return states ``(n, d)``.
 
-        Everything random in it follows from `seed`; what is scheduled, from its number `episode`.
+        All random numbers of the episode follow from `seed`, scheduled events from `episode`.
         """
 
     @abstractmethod
     def step(self, joint_action: IntArray) -> Transition:
-        """Carry out a joint action ``(n,)`` for one decision period."""
+        """Execute a joint action ``(n,)`` for one decision period."""
 
     def environments(self, count: int) -> Environments | None:
-        """Return many environments of equal settings, stepped in one call; None: not supported."""
+        """Return `count` environments that step in one call, or None if this is not supported."""
         return None
 
     @property
     def predicts(self) -> bool:
-        """Whether it has a `Prediction` to decide by."""
+        """Whether `predict` returns a prediction."""
         return type(self).predict is not Scenario.predict
 
     def predict(self) -> Prediction | None:
-        """Return the prediction from the present state; None: it predicts nothing."""
+        """Return the prediction from the present state, or None without a predictor."""
         return None
 
     def with_exact_prediction(self) -> Scenario | None:
-        """Return the same with a predictor that makes no errors but those of rounding, or None.
+        """Return the scenario with a predictor that is exact up to rounding, or None.
 
-        Itself, if it has one already. Then it can be checked that sensing and predicting mean the
-        same.
+        Tests use it to compare predicted with sensed states. A scenario that predicts exactly
+        returns itself.
         """
         return None
 
     def partners(self) -> Sequence[int] | None:
-        """Return for every agent the one in whose place it stands in the mirror, None if unknown.
+        """Return the index of every agent's mirror image, or None without mirror symmetry.
 
         Raises
         ------
         ValueError
-            If an agent has none; one line.
+            If an agent has no mirror image; one line.
         """
         return None
 
     def embodiment(self) -> Embodiment | None:
-        """Return its bodies on wheels, if it has such."""
+        """Return the bodies for self-models and calibration, or None."""
         return None
 
     def measure(self) -> Mapping[str, Any]:
         """Return the measurements of the present state, as in `Transition.info`.
 
-        It is asked for between steps, and before the first one, of what is `recorded`.
+        Recordings call it before the first step, for the measurements in `recorded`.
         """
         return {}
 
     def constants_of_episode(self) -> Mapping[str, Any]:
-        """Return what is kept once an episode: numbers, texts, arrays."""
+        """Return recorded constants of the episode: numbers, texts, arrays."""
         return {}
 
     def show_policy(
@@ -277,32 +274,53 @@ class Scenario(ABC):
         choose: Callable[[Prediction], IntArray],
         predict: Callable[[], Prediction | None],
     ) -> PolicyMap | None:
-        """Return what those do who choose and predict so; None: it shows no policies.
+        """Return the actions of a team in many situations, or None if this is not supported.
 
-        The scenario begins another episode.
+        The scenario starts another episode.
 
         Parameters
         ----------
         choose
-            Returns the joint action ``(n,)`` that they choose by a prediction.
+            Returns the joint action ``(n,)`` that the team chooses by a prediction.
         predict
-            Returns what they predict from the scenario's present state.
+            Returns the team's prediction from the present state of the scenario.
 
         Raises
         ------
         ValueError
-            If its predictions cannot begin anywhere; one line.
+            If predictions cannot start in arbitrary states; one line.
         """
         return None
 
     @property
     def draws(self) -> bool:
-        """Whether recordings of its episodes can be drawn."""
+        """Whether recordings can be animated."""
         return bool(self.recorded) and type(self).animate is not Scenario.animate
 
     def animate(self, recording: Mapping[str, Any], path: Path) -> None:
-        """Draw a recording (arrays by name) as GIF or MP4, by the suffix of `path`."""
+        """Write a recording, arrays by name, as GIF or MP4 according to the suffix of `path`."""
         raise ValueError(f"the scenario {type(self).__name__} draws no recordings")
+
+
+def checked_scenario(thing: object) -> Scenario:
+    """Return what a user's class or function has built, if it is a complete scenario.
+
+    Raises
+    ------
+    ValueError
+        If it is no `Scenario`, or lacks a necessary attribute; one line.
+    """
+    name = type(thing).__name__
+    if not isinstance(thing, Scenario):
+        hint = ""
+        if hasattr(thing, "action_space"):
+            kind = "pettingzoo" if hasattr(thing, "possible_agents") else "gymnasium"
+            hint = f"; a spec names it by scenario.id, with scenario.kind = {kind!r}"
+        raise ValueError(f"scenario.kind: {name} must inherit nested_agents.Scenario{hint}")
+    missing = [key for key in ("agents", "state_space", "action_set") if not hasattr(thing, key)]
+    if missing:
+        raise ValueError(f"scenario.kind: {name} lacks {', '.join(missing)}")
+    return thing
 
 
 class Members(NamedTuple):
@@ -310,21 +328,21 @@ class Members(NamedTuple):
 
     scenario: Scenario
     members: IntArray
-    """``(k,)`` who they are, in agent order."""
+    """``(k,)`` indices of the agents, in agent order."""
 
     def owners(self, *, shared: bool) -> list[str]:
-        """Return whose weights there are, in order: those of agents, or of their roles."""
+        """Return the owner of every row of weights: agents, or roles if weights are shared."""
         names = self.scenario.roles if shared else tuple(self.scenario.agents)
         return list(dict.fromkeys(names[i] for i in self.members))
 
     @property
     def text(self) -> str:
-        """How many of them there are over which state space."""
+        """Number of agents and name of their state space."""
         return f"{len(self.members)} agents over {self.scenario.state_space.name!r}"
 
 
 def rows_of(scenario: Scenario, members: IntArray, *, shared: bool) -> IntArray:
-    """Return the row of weights of agents ``(k,)``: its own, or that of its role.
+    """Return the index ``(k,)`` of every agent's row of weights, its own or that of its role.
 
     Examples
     --------
@@ -341,24 +359,24 @@ def rows_of(scenario: Scenario, members: IntArray, *, shared: bool) -> IntArray:
 
 
 def carried_rows(former: Members, successor: Members, *, shared: bool) -> IntArray:
-    """Return the row of weights of some agents that each row of others goes on from.
+    """Return the former row of weights from which each row of other agents starts.
 
     Parameters
     ----------
     former, successor
-        Those who learned, and those who follow.
+        Trained agents, and the agents that start from their weights.
     shared
-        Whether weights are those of roles; if not, the agents must be the same.
+        Whether roles share weights. If not, the agents must be the same.
 
     Returns
     -------
     IntArray
-        ``(n_rows,)`` rows of the weights of `former`.
+        ``(n_rows,)`` indices of rows of `former`.
 
     Raises
     ------
     ValueError
-        If state space, actions, or whose weights there are differ; one line.
+        If state spaces, actions, or the owners of the weights differ; one line.
 
     Examples
     --------

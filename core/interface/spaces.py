@@ -1,9 +1,9 @@
-"""What an agent perceives, and what it can do.
+"""State spaces and action sets of agents.
 
-A state space falls in two blocks. The leading *own* variables of an agent depend on the actions of
-its own group only (the wheels of its robot); the others, the *shared* ones, may depend on every
-agent. Kernels use the split: an own block takes few distinct values while joint actions are
-enumerated, so that its part of a rule base is contracted once.
+A state space has two blocks. The leading *own* variables of an agent depend on the actions of its
+own group only, such as the wheels of its robot. The other variables are *shared*: they may depend
+on every agent. Own variables take few distinct values over all joint actions, so that kernels
+evaluate their part of a rule base once.
 
 Conventions. ``n`` agents, ``d`` state variables, ``A`` actions. A joint action is an integer array
 ``(n,)`` in agent order. Its *joint-action index* is that array read as a number in base ``A``, the
@@ -26,12 +26,12 @@ from ..plugins.words import expect_each
 
 
 def real_copy(values: object, what: str, allowed: str = "real numbers") -> FloatArray:
-    """Return numbers of users' code as a new array, which that code cannot change later.
+    """Return a copy of real numbers as an array of floats.
 
     Raises
     ------
     ValueError
-        If they are complex or no numbers; `what` names them, and `allowed` what they may be.
+        If the values are not real numbers; `what` and `allowed` are parts of the message.
     """
     given = type(values).__name__
     try:
@@ -45,7 +45,7 @@ def real_copy(values: object, what: str, allowed: str = "real numbers") -> Float
 
 
 FARTHEST = 1000.0
-"""Ranges of a variable beyond which its value cannot be meant."""
+"""Distance from the range of a variable, in widths of the range, that is refused as an error."""
 
 
 @dataclass(frozen=True)
@@ -55,28 +55,28 @@ class Variable:
     Raises
     ------
     ValueError
-        If the range is empty or not finite, or the centres do not increase within it.
+        If the range is empty or not finite, or the centers do not increase within it.
     """
 
     name: str
     """Short identifier, unique within its state space."""
     unit: str
-    """Unit in words of the SI, ``"1"`` for a pure number."""
+    """SI unit, ``"1"`` for a pure number."""
     low: float
-    """Lower end of the range over which membership functions are laid; values outside are legal and
+    """Lower end of the range of the membership functions. Values outside the range are allowed and
     belong to the outermost membership functions."""
     high: float
-    """Upper end of that range. For a periodic variable ``high - low`` is the period."""
+    """Upper end of the range. For a periodic variable ``high - low`` is the period."""
     periodic: bool = False
-    """Whether `low` and `high` are the same point (an angle)."""
+    """Whether `low` and `high` are the same point, as for an angle."""
     centres: tuple[float, ...] = ()
-    """Default centres of the membership functions, increasing, within the range. Empty: spread
-    evenly, see `core.values.partitions.Partition.of`."""
+    """Default centers of the membership functions, increasing, within the range. If empty, they are
+    spaced evenly, see `core.values.partitions.Partition.of`."""
     labels: tuple[str, ...] = ()
-    """Words for the membership functions, in the order of `centres`; empty: numbered."""
+    """Words for the membership functions, in the order of `centres`; numbers if empty."""
     mirrored: Literal["same", "opposite"] | None = None
-    """What it is in the mirror image of a world: the ``same``, or of ``opposite`` sign; none: it is
-    not known, see `core.adaptation.predictors`."""
+    """Sign in the mirror image of the environment: the ``same`` or ``opposite``; None if unknown.
+    See `core.models.predictors`."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
@@ -99,7 +99,7 @@ class Variable:
 
 
 def choice(name: str, actions: tuple[str, ...]) -> Variable:
-    """Return a variable that is the index of an action, with a membership centre at each."""
+    """Return a variable for the index of an action, with a center at each action."""
     centres = tuple(map(float, range(len(actions))))
     return Variable(name, "1", 0.0, centres[-1], centres=centres, labels=actions)
 
@@ -116,17 +116,17 @@ class StateSpace:
     """
 
     name: str
-    """The name under which specs know it."""
+    """Name in specs."""
     variables: tuple[Variable, ...]
-    """The variables, the own ones leading."""
+    """The variables, own variables first."""
     n_own: int = 0
-    """How many leading variables depend on the actions of the agent's own group only."""
+    """Number of own variables, which depend on the actions of the agent's own group only."""
     common: tuple[str, ...] = ()
-    """Names of shared variables that are the same for all agents: what they are worth to a team is
-    found once."""
+    """Names of shared variables that are equal for all agents, so that a team evaluates them
+    once."""
     actions: tuple[str, ...] = ()
-    """Names of variables that are actions taken, of the agent or of others, with a membership
-    function at each: what `QLearning` maximises over."""
+    """Names of variables that are actions, of the agent or of others, with one membership function
+    for each action."""
 
     def __post_init__(self) -> None:
         names = [v.name for v in self.variables]
@@ -146,14 +146,13 @@ class StateSpace:
                 raise ValueError(f"state space {self.name!r}: action {name!r} is no variable")
 
     def checked(self, states: FloatArray, agents: Sequence[str]) -> FloatArray:
-        """Return a copy of the states of agents if they can be learned from.
+        """Return a checked copy of the states of agents.
 
         Raises
         ------
         ValueError
-            If they are not finite real numbers of shape ``(n, d)``, or one is farther than
-            `FARTHEST` times the range of its variable from its lower end; the first wrong value is
-            named.
+            If they are not finite real numbers of shape ``(n, d)``, or a value is farther from its
+            range than `FARTHEST` widths of the range; the first wrong value is named.
         """
         wanted = len(agents), self.n_variables
         array = real_copy(states, "states of agents", f"real numbers of shape {wanted}")
@@ -173,13 +172,13 @@ class StateSpace:
 
     @cached_property
     def ranges(self) -> tuple[FloatArray, FloatArray]:
-        """Where the ranges of all variables begin ``(d,)``, and how wide they are ``(d,)``."""
+        """Lower ends ``(d,)`` and widths ``(d,)`` of the ranges of all variables."""
         low, high = np.array([(v.low, v.high) for v in self.variables]).T
         return low, high - low
 
     @property
     def bounds(self) -> FloatArray:
-        """Between which states lie ``(d, 2)``: those of periodic variables within their period."""
+        """``(d, 2)`` bounds of the states: the period of periodic variables, else infinite."""
         any_ = (-np.inf, np.inf)
         return np.array([(v.low, v.high) if v.periodic else any_ for v in self.variables])
 
@@ -190,21 +189,21 @@ class StateSpace:
 
     @property
     def own(self) -> tuple[Variable, ...]:
-        """The variables that depend on the agent's own group only."""
+        """Variables that depend on the agent's own group only."""
         return self.variables[: self.n_own]
 
     @property
     def shared(self) -> tuple[Variable, ...]:
-        """The variables that may depend on every agent."""
+        """Variables that may depend on every agent."""
         return self.variables[self.n_own :]
 
 
 @dataclass(frozen=True)
 class ActionSet:
-    """The actions that every agent chooses from, and their effect on its commanded speed.
+    """Actions of every agent, and their effect on its commanded speed.
 
     Action ``a`` turns the commanded speed ``u`` into
-    ``clip(gain[a] * u + increment[a] * unit, -limit, limit)`` where unit and limit belong to the
+    ``clip(gain[a] * u + increment[a] * unit, -limit, limit)``. Unit and limit belong to the
     scenario. The paper's four (Section V) are increase, decrease, maintain and make zero.
     """
 
@@ -212,7 +211,7 @@ class ActionSet:
     gains: tuple[float, ...] = (1.0, 1.0, 1.0, 0.0)
     increments: tuple[float, ...] = (1.0, -1.0, 0.0, 0.0)
     neutral: int = field(default=2)
-    """The action attributed to agents that the deciding agent cannot see: maintain."""
+    """Action that is assumed of unseen agents, by default maintain."""
 
     def __post_init__(self) -> None:
         if not len(self.names) == len(self.gains) == len(self.increments):
@@ -240,7 +239,7 @@ class ActionSet:
         actions
             Action indices.
         unit, limit
-            ``(n,)`` what an increment changes, and the greatest speed.
+            ``(n,)`` size of an increment, and maximum speed.
 
         Examples
         --------

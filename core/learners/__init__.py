@@ -5,22 +5,11 @@ received on entering them, R(s) of Eq. 7. The first state of an episode has no r
 learned from. A terminal state counts as entered forever: its value is R(s) / (1 - discount).
 """
 
-from pkgutil import resolve_name
-
-from ..interface.plain import decides
 from ..interface.scenario import Scenario
 from ..plugins.registry import SettingsRegistry
 from .learner import CORE, LearnerSettings, TeamSettings
 
 PPO = f"{CORE}.networks.settings"
-FUNCTIONS = f"{CORE}.functions.settings:FunctionSettings"
-
-
-def base_of(thing: object) -> type[TeamSettings]:
-    """Return the settings class of a user's part: a decision function, or a learner."""
-    base: type[TeamSettings] = resolve_name(FUNCTIONS) if decides(thing) else LearnerSettings
-    return base
-
 
 LEARNERS = SettingsRegistry(
     "learner",
@@ -43,7 +32,7 @@ LEARNERS = SettingsRegistry(
     },
     LearnerSettings,
     TeamSettings,
-    base_of=base_of,
+    function_base=f"{CORE}.functions.settings:FunctionSettings",
 )
 """Learners by name."""
 

@@ -23,14 +23,14 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field
 
-from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
-from ..decision.settings import DecisionSettings
-from ..evaluators.evaluator import Deliberation, Evaluator
 from ..interface.agents import Counts
 from ..interface.spaces import ActionSet, StateSpace, choice
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
 from ..plugins.settings import Positive
+from ..search.evaluator import DecisionContext, Evaluator
+from ..search.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
+from ..search.settings import DecisionSettings
 from ..values.partitions import Partition
 from ..values.rule_base import RuleBase
 from .batch import BatchTD, Earlier, Function, add_gram, row_values, solver
@@ -136,12 +136,12 @@ class FittedQ(BatchTD, Evaluator):
         self._weights: list[FloatArray] = [np.zeros(0)] * len(self.theta)
         """Weight of each decision in the sums, by row."""
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action in the agent's present state."""
-        active, strengths = self._known.active(deliberation.present[[deliberation.agent]])
+        active, strengths = self._known.active(context.present[[context.agent]])
         self.counts.joint_actions += self._n_actions
-        self.counts.rule_evaluations += len(deliberation.own_weights)
-        weights = deliberation.own_weights.reshape(-1, self._n_actions)
+        self.counts.rule_evaluations += len(context.own_weights)
+        weights = context.own_weights.reshape(-1, self._n_actions)
         return strengths[0] @ weights[active[0]]
 
     def observe_decision(

@@ -10,23 +10,23 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from ..adaptation.calibration import CalibrationSettings
-from ..adaptation.predictors import GivenPredictor, Predictor
-from ..adaptation.self_model import SelfModelSettings
-from ..decision.exploration import (
+from ..hierarchy.hierarchy import Hierarchy
+from ..interface.agents import AgentContext, Agents
+from ..interface.scenario import Scenario
+from ..interface.spaces import ActionSet, StateSpace
+from ..models.calibration import CalibrationSettings
+from ..models.predictors import GivenPredictor, Predictor
+from ..models.self_model import SelfModelSettings
+from ..numerics import FloatArray, IntArray
+from ..plugins.registry import Plugged
+from ..plugins.settings import PartSettings
+from ..search.exploration import (
     EXPLORATIONS,
     BurstExploration,
     ExplorationSettings,
     no_way_on,
 )
-from ..decision.settings import DecisionSettings
-from ..hierarchy.hierarchy import Hierarchy
-from ..interface.agents import AgentContext, Agents
-from ..interface.scenario import Scenario
-from ..interface.spaces import ActionSet, StateSpace
-from ..numerics import FloatArray, IntArray
-from ..plugins.registry import Plugged
-from ..plugins.settings import PartSettings, unwritten
+from ..search.settings import DecisionSettings
 from ..values.rule_base import RuleBase, RuleBaseSettings
 
 CORE = __name__.rpartition(".learners")[0]
@@ -204,7 +204,7 @@ class LearnerSettings(TeamSettings):
     """Self-model: learned effects of the wheels of every body."""
     calibration: CalibrationSettings = CalibrationSettings()
     """Calibration of the constants of the predictor."""
-    predictor: Annotated[Predictor, unwritten(GivenPredictor())] = GivenPredictor()
+    predictor: Predictor = GivenPredictor()
     """The predictor: that of the scenario, persistence, or a learned model."""
 
     @property

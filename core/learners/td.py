@@ -26,7 +26,7 @@ import numpy as np
 from pydantic import Field
 
 from ..numerics import FloatArray, IntArray
-from ..plugins.settings import Fraction, NonNegative, Positive, unwritten
+from ..plugins.settings import Fraction, NonNegative, Positive
 from ..values.rule_base import RuleBase
 from ..values.updates import td_lambda_update
 from .learner import Learner, LearnerSettings
@@ -166,7 +166,7 @@ class TDLambdaSettings(LearnerSettings):
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
     """Number of updates over which the agents average the learned weights to decide; 1: none."""
-    reward_of: Annotated[Literal["left", "entered"], unwritten("left")] = "left"
+    reward_of: Literal["left", "entered"] = "left"
     """Reward R in Eq. 7: that of the state left, s_previous, as printed; or that of the state
     entered, as in Section V, where rewards are computed after the move."""
 

@@ -1,6 +1,6 @@
 """Settings of PPO, as in the ``[learner]`` table of a spec.
 
-Defaults are those of stable-baselines3, except for the ones that docs/peers.md lists.
+Defaults are those of stable-baselines3, except for the ones that research/notebooks/ppo.md lists.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from ..learners.learner import CORE, TeamSettings
-from ..plugins.settings import Fraction, NonNegative, Positive, unwritten
+from ..plugins.settings import Fraction, NonNegative, Positive
 
 Count = Annotated[int, Field(ge=1)]
 Width = Annotated[int, Field(ge=1, le=4096)]
@@ -36,14 +36,14 @@ class NetworkSettings(TeamSettings):
     """Clipping range of the probability ratio."""
     entropy: NonNegative = 0.01
     """Weight of the entropy bonus."""
-    environments: Annotated[int, Field(ge=1, le=4096), unwritten(1)] = 1
+    environments: Annotated[int, Field(ge=1, le=4096)] = 1
     """Number of environments that are stepped at once; 2 or more need a budget in decisions."""
-    normalised: Annotated[Literal["rewards", "values"], unwritten("rewards")] = "rewards"
+    normalised: Literal["rewards", "values"] = "rewards"
     """What is divided by the standard deviation of returns: rewards, or targets of critics."""
-    learning_rate_decisions: Annotated[Count | None, unwritten(None)] = None
+    learning_rate_decisions: Count | None = None
     """Decisions, of all environments, over which `learning_rate` falls linearly to 0. Without a
     number it stays constant."""
-    entropy_decisions: Annotated[Count | None, unwritten(None)] = None
+    entropy_decisions: Count | None = None
     """Decisions, of all environments, over which `entropy` falls linearly to 0. Without a number
     it stays constant."""
 
@@ -67,14 +67,14 @@ class PPOSettings(NetworkSettings):
 class MultiAgentPPOSettings(NetworkSettings):
     """Settings that PPO with a policy for every agent shares."""
 
-    weights: Annotated[Literal["all", "role", "own"], unwritten("all")] = "all"
+    weights: Literal["all", "role", "own"] = "all"
     """Agents that share the weights of one policy and one critic: all agents, those of a role, or
     none."""
-    numbered: Annotated[bool, unwritten(True)] = True
+    numbered: bool = True
     """Whether the inputs of an agent contain its number, one-hot."""
-    critic: Annotated[Literal["central", "own"], unwritten("central")] = "central"
+    critic: Literal["central", "own"] = "central"
     """Whether critics see the states of all agents, or that of their own agent alone."""
-    value_of: Annotated[Literal["own", "team"], unwritten("own")] = "own"
+    value_of: Literal["own", "team"] = "own"
     """Whether an agent maximizes its own reward, or the mean reward of all agents."""
 
 
@@ -83,7 +83,7 @@ class HierarchyPPOSettings(MultiAgentPPOSettings):
 
     kind: Literal["hierarchy-ppo"] = "hierarchy-ppo"
     uses_hierarchy: ClassVar[bool] = True
-    value_of: Annotated[Literal["own", "team"], unwritten("team")] = "team"
+    value_of: Literal["own", "team"] = "team"
     """Whether an agent maximizes its own reward, or the mean reward of all agents."""
 
 
@@ -97,5 +97,5 @@ class IPPOSettings(MultiAgentPPOSettings):
     """Independent PPO (de Witt et al. 2020): no communication, critics see their agent's state."""
 
     kind: Literal["ippo"] = "ippo"
-    critic: Annotated[Literal["central", "own"], unwritten("own")] = "own"
+    critic: Literal["central", "own"] = "own"
     """Whether critics see the states of all agents, or that of their own agent alone."""

@@ -1,4 +1,4 @@
-"""The numerical ground: arrays, random numbers, kernels, libraries that take their time."""
+"""Numerical basis: arrays, random numbers, compiled kernels and deferred imports."""
 
 from .arrays import (
     SAME,
@@ -9,10 +9,9 @@ from .arrays import (
     greatest,
     quadrature,
     wrap,
-    wrap_each,
     wrap_one,
 )
-from .compiler import INNER, LOCK, Kernel, interpreted, njit, serve, stamp
+from .compiler import INNER, LOCK, Kernel, njit, serve, stamp
 from .libraries import Deferred, nx, optimize, pd, special, stats
 from .random import set_words, stream_of, words_of
 
@@ -27,7 +26,6 @@ __all__ = [
     "IntArray",
     "Kernel",
     "greatest",
-    "interpreted",
     "njit",
     "nx",
     "optimize",
@@ -41,6 +39,5 @@ __all__ = [
     "stream_of",
     "words_of",
     "wrap",
-    "wrap_each",
     "wrap_one",
 ]

@@ -12,36 +12,36 @@ from .compiler import njit
 FloatArray = NDArray[np.floating[Any]]
 """Array of floating-point numbers of any precision."""
 IntArray = NDArray[np.integer[Any]]
-"""Array of whole numbers of any precision."""
+"""Array of integers of any precision."""
 AnyArray = NDArray[Any]
-"""Array of anything."""
+"""Array of any data type."""
 BoolArray = NDArray[np.bool_]
-"""Mask."""
+"""Array of Booleans."""
 
 SAME = 1e-12
-"""Values that differ by less, times their size if that is above 1, are equal."""
+"""Tolerance below which values count as equal: absolute below 1, else relative."""
 
 
 def greatest(values: FloatArray, rng: np.random.Generator) -> int:
-    """Return the index of the greatest value, ties (see `SAME`) broken at random.
+    """Return the index of the greatest value; ties within `SAME` are broken at random.
 
     Raises
     ------
     ArithmeticError
         If the first value is not a number, or the greatest is infinite.
     """
-    listed = values.tolist()  # four numbers: plain Python is faster
+    listed = values.tolist()  # faster than NumPy for a few values
     top = max(listed)
     least = top - SAME * max(1.0, abs(top))
     best = [action for action, value in enumerate(listed) if value >= least]
     if not best:
-        raise ArithmeticError(f"none of {len(listed)} actions is worth most: not all are numbers")
+        raise ArithmeticError(f"{len(listed)} action values have no maximum: not all are finite")
     return int(best[0] if len(best) == 1 else best[rng.integers(len(best))])
 
 
 _TURN = 2.0 * pi
 _TURN_HIGH = 6.283185243606567
-"""The leading 26 bits of a turn: products with a few thousand turns are exact."""
+"""The leading 26 bits of a turn, whose products with a few thousand turns are exact."""
 _TURN_LOW = _TURN - _TURN_HIGH
 
 
@@ -53,20 +53,11 @@ def wrap(angle: Any) -> Any:
 
 
 wrap_one = njit(cache=True)(wrap)
-"""The same for kernels, in the same bits."""
-
-
-@njit(cache=True)
-def wrap_each(angles: FloatArray) -> FloatArray:
-    """Return `wrap` of angles ``(k,)`` in the same bits, of few in a fifth of the time."""
-    out = np.empty(len(angles))
-    for k in range(len(angles)):
-        out[k] = wrap_one(angles[k])
-    return out
+"""Compiled `wrap`, with equal results."""
 
 
 @cache
 def quadrature(n: int) -> tuple[FloatArray, FloatArray]:
-    """Return the n nodes and weights of Gauss and Legendre on [-1, 1]; not to be modified."""
+    """Return n nodes and weights of Gauss-Legendre quadrature on [-1, 1]; do not modify them."""
     nodes, weights = np.polynomial.legendre.leggauss(n)
     return nodes, weights

@@ -1,22 +1,19 @@
-"""Kernels: compiled at their first call, by one process at a time, and cached on disk.
+"""Compiled kernels: compiled on first call, by one process at a time, and cached on disk.
 
-numba takes a second to import and a kernel seconds to compile, so that neither is done before a
-kernel is called: commands that only read never do. Of several processes that need the same kernel
-one compiles it and the others take it from the cache.
+Importing numba takes a second and compiling a kernel takes seconds. Both happen only when a kernel
+is called, so that commands that only read results stay fast. If several processes need the same
+kernel, one compiles it and the others load it from the cache.
 
-Without a lock numba's cache is not safe: it numbers a file of code by an index that it has read
-before, so that of two processes that compile one kernel for different types each may leave the
-other's code under its own type. That lock is held while code is read or written, and not while it
-is compiled: who takes a kernel from the cache does not wait for who compiles another one.
+The cache needs a lock. numba names a file of code by an index that it has read earlier, so that two
+processes that compile one kernel for different types may store their code under each other's types.
+The lock is held while code is read or written, but not during compilation.
 
-A kernel is compiled by a process that does nothing else, and then taken from the cache. A process
-that compiles a kernel itself holds several versions of the kernels that it calls, each rounded in
-its own way, and runs others than a process that takes the code from the cache: the last bits of the
-first run would differ from those of later ones.
+A separate process compiles kernels, and the calling process loads them from the cache. A process
+that compiled kernels itself would hold several versions of inner kernels with different rounding,
+so that the first run would differ from later runs in the last bits.
 
-numba takes a cached kernel for good as long as the file of the kernel is what it was. A kernel is
-also made of the kernels that it calls and of the constants that it reads, wherever they come from:
-here the files that its own file imports, and those that these import, count as well.
+numba considers a cached kernel valid if the kernel's own file has not changed. Kernels also depend
+on inner kernels and constants of other modules, so that here all imported files count as well.
 """
 
 import atexit
@@ -41,13 +38,13 @@ from ..isolation import python_command
 F = TypeVar("F", bound=Callable[..., Any])
 
 IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
-"""An import inside the package; the house rules know no other."""
+"""Relative import, the only kind of import within the package."""
 
 LOCK = "compiling.lock"
-"""The file beside cached kernels that a process holds while it compiles."""
+"""Lock file in the cache folder that a process holds while it compiles."""
 
 INNER = "-inner"
-"""What tells cached kernels for kernels from those for Python."""
+"""Suffix of the names of cached kernels that only kernels call."""
 
 _threads = threading.RLock()
 
@@ -58,12 +55,12 @@ class Kernel:
     Parameters
     ----------
     function
-        What to compile.
+        Function to compile.
     options
-        Of `numba.njit`.
+        Options of `numba.njit`.
     names_of
-        A module beside the function's own whose names it uses, too. It is imported when the
-        function is compiled: what it is for numba to generate needs numba.
+        Module of the same package with further global names of the function. It is imported at
+        compilation, because generating its functions requires numba.
     """
 
     def __init__(
@@ -71,33 +68,33 @@ class Kernel:
     ) -> None:
         update_wrapper(self, function)
         self._names_of = names_of
-        # Division by zero gives what it gives in NumPy: that compiles sooner than an exception.
+        # Division by zero follows NumPy, which compiles faster than an exception.
         self.py_func = function
         self._options = {"error_model": "numpy", **options}
         self._ready: Callable[..., Any] | None = None
 
-    # What nobody calls is not compiled: a third to a half of a small kernel is its wrappers.
+    # Unused wrappers are not compiled; they take up to half of the time for a small kernel.
 
     @cached_property
     def compiled(self) -> Any:
-        """What numba makes of the function for Python to call."""
+        """Compiled function with a wrapper for Python."""
         return self._compile("", no_cfunc_wrapper=True)
 
     @cached_property
     def inner(self) -> Any:
-        """What numba makes of the function for other kernels to call, by far the less code."""
+        """Compiled function without wrappers, for calls by other kernels."""
         return self._compile(INNER, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
     @property
     def signatures(self) -> list[object]:
-        """The types of arguments for which it has been compiled; nothing is compiled for this."""
+        """Argument types for which the kernel has been compiled so far."""
         if "compiled" not in vars(self) or isinstance(self.compiled, FunctionType):
             return []
         return list(self.compiled.overloads)
 
     @property
     def _numba_type_(self) -> Any:
-        """What numba takes this for in kernels that name it as an attribute of its module."""
+        """Numba type, for kernels that call this kernel as an attribute of its module."""
         return self.compiled._numba_type_
 
     def _compile(self, suffix: str, **options: bool) -> Any:
@@ -150,8 +147,8 @@ class Kernel:
         return result
 
     def _compile_apart(self, compiled: Any, types: tuple[object, ...]) -> None:
-        """See to it that the cache has the function for arguments of these types, if it can be."""
-        if not _is_cached(compiled, types):  # by who held the lock before
+        """Compile the function for argument types in the child process, if possible."""
+        if not _is_cached(compiled, types):  # by the previous holder of the lock
             with contextlib.suppress(OSError, pickle.PicklingError, AttributeError, TypeError):
                 requests, answers = _child(os.getpid())
                 place = self.py_func.__module__, self.py_func.__name__
@@ -162,9 +159,9 @@ class Kernel:
 
 @cache
 def _child(parent: int) -> tuple[IO[bytes], IO[bytes]]:
-    """Return where a process asks the one that compiles for it, and where that one answers.
+    """Start the compiling process; return its standard input and output.
 
-    It ends when the process does.
+    It ends with the process that started it.
     """
     child = subprocess.Popen(
         python_command(f"from {__name__} import serve; serve()"),
@@ -174,22 +171,22 @@ def _child(parent: int) -> tuple[IO[bytes], IO[bytes]]:
         start_new_session=True,
     )
     atexit.register(child.__exit__, None, None, None)
-    assert child.stdin is not None  # it is a pipe
+    assert child.stdin is not None  # a pipe
     assert child.stdout is not None
     return child.stdin, child.stdout
 
 
 def serve() -> None:
-    """Compile kernels into the cache as standard input asks for them, and answer with a byte each.
+    """Compile the kernels that standard input requests, and answer each request with one byte.
 
-    What cannot be compiled here is left to who asked.
+    Errors are ignored: the requesting process then compiles the kernel itself.
     """
     while True:
         try:
             sys.path[:], module, name, types = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
-        gc.disable()  # that takes a tenth of a compilation
+        gc.disable()  # collecting garbage takes a tenth of the time
         with contextlib.suppress(Exception):
             kernel = vars(importlib.import_module(module))[name]
             kernel.compiled.compile(pickle.loads(types))
@@ -199,17 +196,12 @@ def serve() -> None:
 
 
 def njit(*, names_of: str = "", **options: object) -> Callable[[F], F]:
-    """Return a decorator like `numba.njit` that compiles at the first call, see `Kernel`."""
+    """Return a decorator like `numba.njit` that compiles on first call, see `Kernel`."""
 
     def decorate(function: F) -> F:
         return cast(F, Kernel(function, options, names_of))
 
     return decorate
-
-
-def interpreted(kernel: F) -> F:
-    """Return the function that a kernel compiles: where it is called once it is not worth that."""
-    return cast(F, kernel.py_func) if isinstance(kernel, Kernel) else kernel
 
 
 def _names(code: CodeType) -> Iterator[str]:
@@ -220,7 +212,7 @@ def _names(code: CodeType) -> Iterator[str]:
 
 
 def _cache_file(compiled: Any) -> Any:
-    """Return numba's index of cached versions; interpreted and uncached functions have none."""
+    """Return numba's cache index, or None for interpreted and uncached functions."""
     return None if isinstance(compiled, FunctionType) else vars(compiled._cache).get("_cache_file")
 
 
@@ -244,7 +236,7 @@ def stamp(path: Path) -> str:
 
 @cache
 def _imported(path: Path) -> set[Path]:
-    """Return the files that a file imports; of a package from which modules may come, all."""
+    """Return the files that a file imports; for a package, all of its modules."""
     files: set[Path] = set()
     for dots, name in IMPORT.findall(_text(path)):
         place = path.parents[len(dots) - 1].joinpath(*filter(None, name.split(".")))

@@ -19,7 +19,7 @@ from numba.core.caching import IndexDataCacheFile
 from .. import locks
 
 LOCK = "cache.lock"
-"""File beside cached kernels that a process holds while it reads or writes one."""
+"""Lock file in the cache folder that a process holds while it reads or writes a kernel."""
 
 DIGEST_BYTES = 32
 """Size of the checksum at the start of a file."""
@@ -42,7 +42,7 @@ class CheckedCacheFile(IndexDataCacheFile):
         self._version = (file._version, stamp)
 
     def load(self, key: object) -> Any:
-        """Return what is cached under a key; None if nothing is, or it is damaged."""
+        """Return the cached data of a key, or None if it is missing or damaged."""
         with lock_beside(self, LOCK):
             return super().load(key)
 
@@ -61,7 +61,7 @@ class CheckedCacheFile(IndexDataCacheFile):
         if content is None:
             return {}
         stream = BytesIO(content)
-        # Of another version, the rest may name classes that do not exist any more.
+        # The rest of another version may name classes that no longer exist.
         if pickle.load(stream) != self._version:
             return {}
         stamp, overloads = pickle.loads(stream.read())
@@ -91,7 +91,7 @@ class CheckedCacheFile(IndexDataCacheFile):
 
 @contextmanager
 def lock_beside(file: IndexDataCacheFile, name: str) -> Iterator[None]:
-    """Hold a lock beside a cached kernel; do without if the folder cannot be written."""
+    """Hold a lock in the cache folder, or none if the folder cannot be written."""
     stream: IO[str] | None = None
     try:
         with suppress(OSError):

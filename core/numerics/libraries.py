@@ -1,16 +1,16 @@
-"""Libraries that take their time: each is imported when something of it is first asked for."""
+"""Large libraries, imported on first use."""
 
 import importlib
 from typing import TYPE_CHECKING, Any
 
 
 class Deferred:
-    """A module that is imported when something of it is first asked for.
+    """A module that is imported on first use.
 
     Parameters
     ----------
     name
-        Its full name.
+        Full name of the module.
 
     Examples
     --------
@@ -23,8 +23,8 @@ class Deferred:
         self._name = name
 
     def __getattr__(self, attribute: str) -> Any:
-        """Return what the module has by this name."""
-        if attribute.startswith("__"):  # asked by who inspects the object, not by who uses it
+        """Return an attribute of the module."""
+        if attribute.startswith("__"):  # inspection must not import the module
             raise AttributeError(attribute)
         return getattr(importlib.import_module(self._name), attribute)
 

@@ -1,4 +1,4 @@
-"""Random numbers: streams that follow from a seed and a key, and generators as arrays."""
+"""Random streams that follow from a seed and a key, and states of generators as arrays."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from .arrays import FloatArray, IntArray
 
 
 def stream_of(seed: int | np.random.SeedSequence, key: int) -> np.random.Generator:
-    """Return the stream of a seed that has a key, whatever else is drawn from that seed.
+    """Return the random stream of a key, independent of other streams of the seed.
 
     Examples
     --------
@@ -20,7 +20,7 @@ def stream_of(seed: int | np.random.SeedSequence, key: int) -> np.random.Generat
 
 
 def words_of(rng: np.random.Generator) -> IntArray:
-    """Return the state of a generator of the kind PCG64 as six whole numbers, see `set_words`."""
+    """Return the state of a PCG64 generator as six integers, see `set_words`."""
     state = rng.bit_generator.state
     numbers = state["state"]["state"], state["state"]["inc"]
     words = [number >> shift & (2**64 - 1) for number in numbers for shift in (64, 0)]
@@ -28,7 +28,7 @@ def words_of(rng: np.random.Generator) -> IntArray:
 
 
 def set_words(rng: np.random.Generator, words: IntArray | FloatArray) -> None:
-    """Set a generator, which is modified, to the state that `words_of` returned."""
+    """Set the state of a generator to the result of `words_of`."""
     high, low, high_step, low_step, has_half, half = map(int, words)
     rng.bit_generator.state = {
         "bit_generator": "PCG64",

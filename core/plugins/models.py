@@ -61,6 +61,10 @@ def kinds_at(slot: Slot) -> Kinds | None:
 def model_at(slot: Slot, table: object) -> type[BaseModel] | None:
     """Return the model of a table; None if its kind is unknown or missing."""
     kind = table.get("kind") if isinstance(table, Mapping) else None
+    if kind is None and isinstance(slot, FieldInfo) and not slot.is_required():
+        default = slot.get_default(call_default_factory=True)
+        if isinstance(default, BaseModel):
+            return type(default)
     kinds = kinds_at(slot)
     if kinds is not None:
         try:

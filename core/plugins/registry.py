@@ -8,7 +8,7 @@ Each kind of thing has one registry. A thing is registered
 4. as the object itself, from Python, which is converted to the name of its definition.
 
 Things with settings are in a registry of *settings models*; the method `build` of a model makes the
-thing. A class with a nested ``Settings`` is built from these settings. A function is called with
+thing. A user's class has a nested ``Settings`` and is built from them. A function is called with
 the settings as its annotated keyword-only parameters; its docstring documents them.
 """
 
@@ -18,8 +18,9 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from contextvars import ContextVar
 from functools import cache
-from inspect import getdoc, isfunction, signature
+from inspect import getdoc, signature
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
@@ -27,16 +28,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 from pydantic import (
     Field,
     GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     SerializationInfo,
     ValidationInfo,
     create_model,
 )
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
 from .models import Kinds
 from .origin import checked_origin
-from .settings import Settings, tuples
+from .settings import PartSettings, Settings, tuples
 from .trust import module_named
 from .words import closest
 
@@ -181,24 +184,23 @@ class SettingsRegistry(Registry):
     kind, built_in, moved
         As of `Registry`.
     base
-        Base class of the settings.
+        Base class of the settings of users' classes.
     root
-        Base class of further settings that are allowed. By default, `base`.
-    base_of
-        Returns the base class of settings for a user's thing without settings. By default, `base`.
+        Base class of all settings of this kind. By default, `base`.
+    function_base
+        Place of the base class of the settings of users' functions. By default, `base`.
 
     Examples
     --------
-    A user's class needs a nested model and gets an instance of it:
+    A user's class has nested settings and is built from them:
 
     >>> class Cart:
-    ...     class Settings(Settings):
+    ...     class Settings(PartSettings):
     ...         wheels: int = 2
     ...     def __init__(self, settings):
     ...         self.wheels = settings.wheels
-    >>> carts = SettingsRegistry("cart", {}, Settings)
-    >>> model = carts.adapted("cart", Cart)
-    >>> model(wheels=4).build().wheels
+    >>> carts = SettingsRegistry("cart", {}, PartSettings)
+    >>> carts.model_of("cart", Cart)(wheels=4).build().wheels
     4
     """
 
@@ -206,18 +208,18 @@ class SettingsRegistry(Registry):
         self,
         kind: str,
         built_in: Mapping[str, str],
-        base: type[Settings],
-        root: type[Settings] | None = None,
+        base: type[PartSettings],
+        root: type[PartSettings] | None = None,
         moved: Mapping[str, str] | None = None,
-        base_of: Callable[[object], type[Settings]] | None = None,
+        function_base: str = "",
     ) -> None:
         super().__init__(kind, built_in, moved)
         self.base = base
-        self._base_of = base_of or (lambda thing: base)
+        self.function_base = function_base
         self.root = root or base
-        self._adapted: dict[tuple[str, int], tuple[object, type[Settings]]] = {}
+        self._models: dict[tuple[str, int], tuple[object, type[PartSettings]]] = {}
 
-    def model(self, name: str) -> type[Settings]:
+    def model(self, name: str) -> type[PartSettings]:
         """Return the settings model of a thing by its name or place.
 
         Raises
@@ -225,83 +227,69 @@ class SettingsRegistry(Registry):
         ValueError
             If there is none, or it is not of this kind; one line.
         """
-        return self.adapted(name, self.find(name))
+        return self.model_of(name, self.find(name))
 
-    def adapted(self, name: str, thing: object) -> type[Settings]:
+    def model_of(self, name: str, thing: object) -> type[PartSettings]:
         """Return the settings model of a thing, with the ``kind`` `name`.
 
         Raises
         ------
         ValueError
-            If its settings are not of this kind, or it cannot be called.
+            If it is neither settings of this kind, nor a class with such settings, nor a function.
         """
-        if name in self.built_in and isinstance(thing, type) and issubclass(thing, Settings):
+        if name in self.built_in and isinstance(thing, type) and issubclass(thing, PartSettings):
             return thing
         key = name, id(thing)
-        if key not in self._adapted:
-            self._adapted[key] = thing, self._derived(name, thing)
-        return self._adapted[key][1]
+        if key not in self._models:
+            self._models[key] = thing, self._new_model(name, thing)
+        return self._models[key][1]
 
-    def _derived(self, name: str, thing: object) -> type[Settings]:
-        is_model = isinstance(thing, type) and issubclass(thing, Settings)
-        own = thing if is_model else getattr(thing, "Settings", self._base_of(thing))
-        if not (isinstance(own, type) and issubclass(own, self.root)):
-            base = f"{self.base.__module__}.{self.base.__qualname__}"
-            raise ValueError(f"is no {self.kind}: its Settings must inherit {base}")
+    def _new_model(self, name: str, thing: object) -> type[PartSettings]:
         thing = checked_origin(name, thing, self.kind, self.root)
-        has_own = hasattr(thing, "Settings")
-        made_by: object = thing
-        if isinstance(thing, type) and own is not self.base:
-            made_by = vars(thing).get("__init__")
-        fields = {} if is_model or has_own else _parameters(made_by)
+        is_class = isinstance(thing, type)
+        settings: object = resolve_name(self.function_base) if self.function_base else self.base
+        if isinstance(thing, type):
+            settings = thing if issubclass(thing, self.root) else getattr(thing, "Settings", None)
+        if not (isinstance(settings, type) and issubclass(settings, self.root)):
+            base = f"{self.base.__module__}.{self.base.__qualname__}"
+            raise ValueError(f"is no {self.kind}: it needs a class Settings that inherits {base}")
         derived = create_model(
-            own.__qualname__,
-            __base__=own,
-            __module__=own.__module__,
-            __doc__=own.__doc__ if is_model or has_own else thing.__doc__,
+            settings.__qualname__,
+            __base__=settings,
+            __module__=settings.__module__,
+            __doc__=settings.__doc__ if is_class else thing.__doc__,
             kind=(cast(Any, Literal[name]), name),
-            **fields,
+            **({} if is_class else _parameters(thing)),
         )
-        model = cast(type[Settings], derived)
-        if is_model:
-            return model
+        model = cast(Any, derived)
+        if settings is not thing:
+            model.factory = staticmethod(self._factory(name, thing))
+            model.build = PartSettings.build  # evaluators have their own
+        return cast(type[PartSettings], model)
+
+    def _factory(self, name: str, thing: Callable[..., Any]) -> Callable[..., object]:
+        """Return a function that builds a thing of a user from its settings."""
 
         def build(settings: Settings, *given: object) -> object:
-            if has_own:
-                given = (settings, *given)
-            named = {field: value for field, value in settings if field in fields}
-            if not isinstance(thing, type):  # a function says it itself
-                return thing(*given, **named)
-            return self._instance(name, thing, given, named)
+            if not isinstance(thing, type):
+                values = dict(settings)
+                return thing(*given, **{key: values[key] for key in _parameters(thing)})
+            try:
+                signature(thing).bind(settings, *given)
+            except TypeError as error:
+                raise ValueError(f"{self.kind} {name!r}: {error}") from None
+            try:
+                return thing(settings, *given)
+            except OSError:
+                raise
+            except Exception as error:
+                where = sources.place(error)
+                raised = f"{self.kind} {name!r} raises {sources.format_error(error)}"
+                if isinstance(error, ValueError):  # its own words
+                    raised = f"{sources.message(error)}{',' if where else ''}"
+                raise ValueError(f"{raised}{where}") from error
 
-        model.build = build  # type: ignore[attr-defined]
-        return model
-
-    def _instance(
-        self, name: str, cls: type, given: tuple[object, ...], named: Mapping[str, object]
-    ) -> object:
-        """Return an instance of a user's class.
-
-        Raises
-        ------
-        ValueError
-            If the class takes other arguments, or raises; one line with the place.
-        """
-        try:
-            signature(cls).bind(*given, **named)
-        except TypeError as error:
-            lacks = "" if hasattr(cls, "Settings") else "; it has no nested class Settings"
-            raise ValueError(f"{self.kind} {name!r}: {error}{lacks}") from None
-        try:
-            return cls(*given, **named)
-        except OSError:
-            raise
-        except Exception as error:
-            where = sources.place(error)
-            raised = f"{self.kind} {name!r} raises {sources.format_error(error)}"
-            if isinstance(error, ValueError):  # its own words
-                raised = f"{sources.message(error)}{',' if where else ''}"
-            raise ValueError(f"{raised}{where}") from error
+        return build
 
     def parsed(self, text: str, /, **table: Any) -> Any:
         """Return the settings of a name with the other keys of its table.
@@ -314,13 +302,11 @@ class SettingsRegistry(Registry):
         return self.model(text)(**table)
 
 
-def _parameters(thing: object) -> dict[str, Any]:
+def _parameters(thing: Callable[..., Any]) -> dict[str, Any]:
     """Return type and default of each annotated keyword-only parameter of a function, by name.
 
     The descriptions come from the section "Parameters" of its numpydoc docstring.
     """
-    if not isfunction(thing):
-        return {}
     section = getdoc(thing) or ""
     meanings = dict(MEANING.findall(section.partition("Parameters\n----------\n")[2]))
     fields: dict[str, Any] = {}
@@ -331,6 +317,10 @@ def _parameters(thing: object) -> dict[str, Any]:
             of_type = cast(Any, Annotated)[type_, Field(description=meanings.get(p.name))]
             fields[p.name] = of_type, ... if p.default is p.empty else p.default
     return fields
+
+
+_described: ContextVar[tuple[Registry, ...]] = ContextVar("registries", default=())
+"""Registries whose JSON schema is being written."""
 
 
 def _dump(value: Settings, info: SerializationInfo) -> dict[str, object]:
@@ -374,6 +364,22 @@ class Plugged(Kinds):
             self._validate,
             serialization=core_schema.plain_serializer_function_ser_schema(_dump, info_arg=True),
         )
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Return the JSON schema: a table of a built-in kind, any other table, or a text."""
+        names = list(self.registry.built_in)
+        other = {"type": "object", "properties": {"kind": {"not": {"enum": names}}}}
+        tables: list[JsonSchemaValue] = [other, {"type": "string"}]
+        if self.registry not in _described.get():  # a team inside a team is not described again
+            token = _described.set((*_described.get(), self.registry))
+            for name in reversed(names):
+                model = self.registry.model(name)
+                model.model_rebuild()
+                tables.insert(0, handler(model.__pydantic_core_schema__))
+            _described.reset(token)
+        return {"title": self.registry.kind, "anyOf": tables}
 
     def _validate(self, value: object, info: ValidationInfo) -> Settings:
         if isinstance(value, Settings):

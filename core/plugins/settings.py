@@ -7,7 +7,7 @@ messages about mistakes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from fnmatch import fnmatchcase
 from pkgutil import resolve_name
@@ -21,7 +21,9 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    model_validator,
 )
+from pydantic.fields import FieldInfo
 
 from ..numerics import BoolArray
 from .problems import explain
@@ -37,7 +39,12 @@ def names(value: object) -> object:
     return tuple(str(one) if isinstance(one, int | np.integer) else one for one in several)
 
 
-Names = Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(names)]
+Name = str | int
+Names = Annotated[
+    tuple[str, ...],
+    Field(min_length=1),
+    BeforeValidator(names, json_schema_input_type=Name | tuple[Name, ...]),
+]
 """One or several names, patterns or numbers."""
 
 
@@ -110,14 +117,6 @@ def check_team(agents: int, seconds_per_pair: float) -> None:
         )
 
 
-def unwritten(default: Any) -> Any:
-    """Return the field of a key that is not written if it has its default.
-
-    The identity of a trial therefore does not depend on such a key.
-    """
-    return Field(exclude_if=lambda value: value == default)
-
-
 FailureSpan: TypeAlias = tuple[int, int | None]
 """Episodes in which a failure begins and ends; None if it lasts."""
 
@@ -167,18 +166,66 @@ class Settings(BaseModel, metaclass=_Made):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_tables(cls, table: object) -> object:
+        """Add the default's keys to each inner table that names no kind of its own."""
+        if not isinstance(table, Mapping):
+            return table
+        return {key: _fill(cls.model_fields.get(key), value) for key, value in table.items()}
+
     @classmethod
     def made(cls, **table: Any) -> Any:
         """Return the settings for keywords."""
         return type(BaseModel).__call__(cls, **table)
 
 
+def changed_values(settings: Settings) -> dict[str, object]:
+    """Return the kind of settings and their values that differ from the defaults, fit for JSON.
+
+    Examples
+    --------
+    >>> class Cart(Settings):
+    ...     wheels: int = 2
+    ...     mass: float = 1.0
+    >>> changed_values(Cart(wheels=4, mass=1.0))
+    {'wheels': 4}
+    """
+    table = settings.model_dump(mode="json")
+    values = dict(settings)
+    changed = {}
+    for name, field in type(settings).model_fields.items():
+        value = values[name]
+        default = None if field.is_required() else field.get_default(call_default_factory=True)
+        if name == "kind" or field.is_required() or value != default:
+            changed[name] = _changed(value, table[name])
+    return changed
+
+
+def _changed(value: object, dumped: object) -> object:
+    """Return a value fit for JSON, its settings without their defaults."""
+    if isinstance(value, Settings):
+        return changed_values(value)
+    if isinstance(value, tuple) and isinstance(dumped, list):
+        return [_changed(item, own) for item, own in zip(value, dumped, strict=True)]
+    return dumped
+
+
+def _fill(field: FieldInfo | None, value: object) -> object:
+    """Return a table over the default of its field; other values are unchanged."""
+    if field is None or not isinstance(value, Mapping) or "kind" in value:
+        return value
+    default = None if field.is_required() else field.get_default(call_default_factory=True)
+    return {**default.model_dump(), **value} if isinstance(default, Settings) else value
+
+
 class PartSettings(Settings):
     """Base class of the settings of registered things."""
 
     kind: str = ""
-    factory: ClassVar[str] = ""
-    """Place of the class that is built from the settings, imported on first use."""
+    factory: ClassVar[str | Callable[..., Any]] = ""
+    """Class or function that builds the thing from the settings, or its place, which is imported
+    on first use."""
     player: ClassVar[str] = ""
     """Module that replays recordings in a report, see `studies.report.replays`; empty if recordings
     are drawn as films."""
@@ -193,7 +240,8 @@ class PartSettings(Settings):
         """
         if not self.factory:
             raise TypeError(f"{type(self).__name__} {self.kind!r} has no factory")
-        return resolve_name(self.factory)(self, *given)
+        factory = self.factory
+        return (resolve_name(factory) if isinstance(factory, str) else factory)(self, *given)
 
 
 class PerceptionSettings(Settings):
@@ -212,14 +260,16 @@ class PerceptionSettings(Settings):
     reach: Annotated[int, Field(ge=0)] | None = None
     """Maximum distance in links of perceived bodies, see
     `nested_agents.scenarios.faults.perception.distances_of`. By default, all bodies."""
-    lost: Annotated[tuple[str, ...], BeforeValidator(names)] = ()
+    lost: Annotated[
+        tuple[str, ...], BeforeValidator(names, json_schema_input_type=Name | tuple[Name, ...])
+    ] = ()
     """Agents, by name, pattern or number, with bodies that are not perceived."""
 
 
 class ScenarioSettings(PartSettings):
     """Base class of the settings of scenarios."""
 
-    perception: Annotated[tuple[PerceptionSettings, ...], unwritten(())] = ()
+    perception: tuple[PerceptionSettings, ...] = ()
     """Perception of single agents. By default, all agents know all states and predict alike."""
 
     def warnings(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ LEVERS = ("left", "middle", "right")
 PLACES = (0.0, 1.0, 2.0)
 
 
-class Levers:
+class Levers(na.Scenario, na.Prediction):
     """Agents who pull levers, play after play."""
 
     class Settings(na.ScenarioSettings):
@@ -38,11 +38,11 @@ class Levers:
         """Light a lever; nobody has pulled one yet, which counts as the first."""
         self.rng = np.random.default_rng(seed)
         self.lit = self.rng.integers(len(LEVERS))
-        return self.after(np.zeros((1, len(self.agents))))[:, 0]
+        return self.moved(np.zeros((1, len(self.agents))))[:, 0]
 
     def step(self, joint_action):
         """Pull; another lever is lit afterwards."""
-        states = self.after(np.asarray(joint_action)[None])[:, 0]
+        states = self.moved(np.asarray(joint_action)[None])[:, 0]
         reward = float((np.asarray(joint_action) == self.lit).mean())
         self.lit = self.rng.integers(len(LEVERS))
         return na.Transition(states, reward, False, False, {"reward": reward})
@@ -53,9 +53,9 @@ class Levers:
 
     def states(self, agent, joint_actions):
         """Return the next states ``(m, 2)`` of an agent: what it does, where it does it."""
-        return self.after(joint_actions)[agent]
+        return self.moved(joint_actions)[agent]
 
-    def after(self, joint_actions):
+    def moved(self, joint_actions):
         """Return the states ``(n, m, 2)`` of all agents after joint actions ``(m, n)``."""
         pulled = np.asarray(joint_actions, dtype=float).T
         return np.stack([pulled, np.full_like(pulled, self.lit)], axis=2)

@@ -218,7 +218,14 @@ class PushingPoints(na.Scenario, Prediction):
                     "kind": "q-learning",
                     "discount": 0.8,
                     "weights": "own",
-                    "exploration": {"kind": "burst", "rate": 0.6, "decay": 0.85, "length": 1.0},
+                    "exploration": {
+                        "kind": "burst",
+                        "rate": 0.6,
+                        "decay": 0.85,
+                        "floor": 0.0,
+                        "length": 1.0,
+                        "team_limit": 1.0,
+                    },
                     "decision": {"value_of": "own"},
                 }
             return {"topology": {"kind": topology}, "learner": learner}

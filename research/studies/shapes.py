@@ -3,7 +3,7 @@
 A team is trained with one box, and then acts greedily, without any further learning, with every box
 that the spec lists under ``[evaluations]``, on the same worlds. What is reported of each box is its
 success rate, and the ratio to the rate with the box of training. The agents' state holds nothing of
-the shape; the predictor by which they look ahead is given it (see docs/predictors.md).
+the shape; the predictor by which they look ahead is given it (see docs/dynamics_models.md).
 """
 
 import numpy as np

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from ...core.interface.measures import NO_SUCCESS, SUCCESS, Measure
 from ...core.interface.prediction import Prediction
@@ -21,7 +22,7 @@ from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import StateSpace
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.sources import format_error, message
-from ..movies import film
+from ..movies import film, save_picture
 from .actions import ActionMap
 from .copies import SimulatorCopies, copy_simulator, find_copy_fault
 from .loading import Maker, find_maker
@@ -188,6 +189,18 @@ class EnvironmentScenario(Scenario):
     def draws(self) -> bool:
         """Whether the environment renders pictures."""
         return "rgb_array" in (self._simulator.env.metadata or {}).get("render_modes", ())
+
+    def draw(self, path: Path) -> None:
+        """Draw the start of the episode, as the environment renders it, to a picture file."""
+        if not self.draws:
+            raise ValueError(f"{self.settings.id}: renders no pictures")
+        simulator = self._make(self.settings, "rgb_array")
+        simulator.reset(self._seed)
+        figure = Figure(layout="constrained")
+        axes = figure.subplots()
+        axes.imshow(simulator.env.render())
+        axes.axis("off")
+        save_picture(figure, path)
 
     def animate(self, recording: Mapping[str, Any], path: Path) -> None:
         """Replay a recorded episode and write it as an animation."""

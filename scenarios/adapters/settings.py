@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from ...core.plugins.settings import ScenarioSettings, Settings, unwritten
+from ...core.plugins.settings import ScenarioSettings, Settings
 
 Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends))]
 Centres = Annotated[tuple[float, ...], Field(min_length=2)]
@@ -84,7 +84,7 @@ class EnvironmentSettings(ScenarioSettings):
     ranges: dict[str, Range] = Field(default_factory=dict)
     """Ranges of state variables. By default the bounds of the observation space, or what random
     episodes reach where it has none."""
-    centres: Annotated[dict[str, Centres], unwritten({})] = Field(default_factory=dict)
+    centres: dict[str, Centres] = Field(default_factory=dict)
     """Increasing centers of the membership functions of state variables, evenly spaced by default.
     ``learner.rule_base.memberships`` spaces all of them evenly."""
     rewards: Literal["joint", "own"] = "joint"

@@ -23,9 +23,9 @@ from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES, Measurements
-from .prediction.prediction import BoxPrediction, Premises, PresentState, mean_twists
+from .prediction.prediction import BoxPrediction, Premises, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
-from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap
+from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap, mean_twists
 from .prediction.settings import BeliefSettings
 from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for

@@ -12,9 +12,8 @@ from itertools import zip_longest
 import numpy as np
 
 from ...core.interface.measures import Measure
-from ...core.interface.plain import as_scenario
 from ...core.interface.prediction import Prediction
-from ...core.interface.scenario import Scenario
+from ...core.interface.scenario import Scenario, checked_scenario
 from .episodes import CheckPlan, StepRecord, bits, differences, start, transition_fields, when
 from .predictions import faults_of_prediction, faults_of_sharing, too_many_joint_actions
 from .sensing import faults_of_sensing, predicted_steps
@@ -28,7 +27,7 @@ FURTHER_SEEDS = 30
 def check_form(plan: CheckPlan) -> Iterator[str]:
     """Check names, groups, shapes and types."""
     try:
-        scenario = as_scenario(plan.factory())
+        scenario = checked_scenario(plan.factory())
     except ValueError as error:
         yield str(error).removeprefix("scenario.kind: ")
         return

@@ -7,8 +7,7 @@ from itertools import product, zip_longest
 import numpy as np
 
 from ...core.agents.loop import world_seed
-from ...core.interface.plain import as_scenario
-from ...core.interface.scenario import Scenario, Transition
+from ...core.interface.scenario import Scenario, Transition, checked_scenario
 from ...core.numerics import IntArray
 
 StepRecord = dict[str, object]
@@ -39,7 +38,7 @@ class CheckPlan:
 
     def make(self) -> Scenario:
         """Return a new instance of the scenario."""
-        return as_scenario(self.factory())
+        return checked_scenario(self.factory())
 
     def actions(self, scenario: Scenario, seed: int) -> IntArray:
         """Return random joint actions ``(steps, n)``, most of which are held for some steps."""

@@ -1,4 +1,4 @@
-"""Animations of the kinematic chain from recordings.
+"""Pictures and animations of the kinematic chain from recordings.
 
 A recording is a mapping of arrays: ``angles (T + 1, n)`` [rad], ``speeds (T + 1, n)`` [rad/s],
 ``failed (T + 1, n)``, ``goal (2,)`` [m], and scalars ``reach`` and ``tolerance`` [m], ``top_speed``
@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.patches import Circle
 
 from ...core.numerics import FloatArray
-from ..movies import Scene, film
+from ..movies import Scene, film, save_picture
 from .variables import forward_kinematics
 
 Recording = Mapping[str, FloatArray]
@@ -97,3 +97,10 @@ def animate(recording: Recording, path: Path) -> None:
         If the suffix is neither ``.gif`` nor ``.mp4``.
     """
     film(_ChainScene(recording).pixels, len(recording["angles"]) - 1, float(recording["dt"]), path)
+
+
+def snapshot(recording: Recording, path: Path) -> None:
+    """Draw the last step of a recording to a picture file."""
+    scene = _ChainScene(recording)
+    scene.draw(len(recording["angles"]) - 1)
+    save_picture(scene.figure, path)

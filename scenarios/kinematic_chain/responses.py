@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.evaluators.drawing import draw, explored
 from ...core.interface.prediction import Exploring
 from ...core.numerics import FloatArray, IntArray, njit
+from ...core.search.drawing import draw, explored
 from ..angles import angle_of
 
 

@@ -14,7 +14,6 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core.evaluators.best_response import RespondingPrediction, Responses, Search
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import EmbodiedPrediction, first_alike
@@ -23,6 +22,7 @@ from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.words import expect
+from ...core.search.best_response import RespondingPrediction, Responses, Search
 from ...core.values.rule_base import RuleBase
 from ..faults.settings import Failures
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
@@ -195,6 +195,15 @@ class KinematicChain(Scenario, Embodiment):
         from .drawing import animate
 
         animate(recording, path)
+
+    def draw(self, path: Path) -> None:
+        """Draw the present posture and the goal to a picture file."""
+        from .drawing import snapshot
+
+        state = self.measure()
+        recording = {name: np.asarray(state[name])[None] for name in self.recorded}
+        constants = {name: np.asarray(it) for name, it in self.constants_of_episode().items()}
+        snapshot(recording | constants, path)
 
     def _reward(self, distance: FloatArray, approach: FloatArray) -> FloatArray:
         """Return the reward ``(m,)`` for distance and approach [m]."""

@@ -22,10 +22,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from ...core.evaluators import EvaluatorSettings
-from ...core.evaluators.evaluator import DecisionProblem, Deliberation
 from ...core.interface.agents import Counts
 from ...core.numerics import FloatArray
+from ...core.search import EvaluatorSettings
+from ...core.search.evaluator import DecisionContext, DecisionProblem
 from .scenario import ChainPrediction
 from .variables import forward_kinematics, jacobian
 
@@ -38,7 +38,7 @@ class _Scripted(ABC):
         self.problem = problem
         self.counts = Counts()
 
-    def values(self, deliberation: Deliberation) -> FloatArray:
+    def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action, the negative distance from the desired turn.
 
         Raises
@@ -46,15 +46,15 @@ class _Scripted(ABC):
         ValueError
             If the scenario is not a kinematic chain.
         """
-        prediction = deliberation.prediction
-        agent = deliberation.agent
+        prediction = context.prediction
+        agent = context.agent
         if not isinstance(prediction, ChainPrediction):
             raise ValueError(
                 f"learner.decision.evaluator: {type(self).__name__} needs a kinematic-chain"
             )
         above = list(self.problem.hierarchy.senders(agent))
         turns = np.zeros(len(prediction.angles))
-        turns[above] = prediction.turns[above, deliberation.joint_action[above]]
+        turns[above] = prediction.turns[above, context.joint_action[above]]
         places = forward_kinematics(prediction.angles + turns, prediction.arm.length)
         return -np.abs(prediction.turns[agent] - self._desired_turn(prediction, agent, places))
 

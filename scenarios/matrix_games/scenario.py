@@ -27,6 +27,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import combinations
 from math import isfinite
+from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -235,6 +236,15 @@ class MatrixGame(Scenario, Prediction):
     def environments(self, count: int) -> MatrixGameEnvironments:
         """Return many environments that are stepped in one call."""
         return MatrixGameEnvironments(self, count)
+
+    def draw(self, path: Path) -> None:
+        """Draw the payoffs to a picture file, in a panel for each action of a third agent."""
+        from .drawing import draw_tables
+
+        tables = self.payoffs.mean(axis=0)
+        panels = tables[None] if tables.ndim == 2 else np.moveaxis(tables, 2, 0)
+        names = [f"agent3 plays {name}" for name in self.action_set.names]
+        draw_tables(panels, names if tables.ndim > 2 else ["payoff"], self.action_set.names, path)
 
     def states_after(self, joint_actions: IntArray) -> FloatArray:
         """Return the states ``(..., n, d)`` of all agents after joint actions ``(..., n)``."""

@@ -16,12 +16,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ...core.coordination.graphs import Elimination, Shape, build_shape
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario, Transition
@@ -29,6 +29,7 @@ from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, nx, optimize
 from ...core.plugins.settings import NonNegative, ScenarioSettings
+from ...core.search.coordination_graphs import Elimination, Shape, build_shape
 from .scenario import OPTIMALITY
 
 SHARE_OF_BEST = Measure(
@@ -243,6 +244,22 @@ class TeamGame(Scenario):
         }
         self.game.advance(self._rng)
         return Transition(self._states(), payoff, False, False, info)
+
+    def draw(self, path: Path) -> None:
+        """Draw the agents and the pairs whose actions the payoff joins to a picture file."""
+        from matplotlib.figure import Figure
+
+        from ..movies import save_picture
+
+        figure = Figure(figsize=(4.0, 4.0), layout="constrained")
+        axes = figure.subplots()
+        graph = nx.Graph(self._edges)
+        nx.draw_networkx(
+            graph, nx.circular_layout(graph), ax=axes, labels=dict(enumerate(self.agents))
+        )
+        axes.set(title=f"{self.settings.game}, {len(self.action_set)} actions each")
+        axes.axis("off")
+        save_picture(figure, path)
 
     def environments(self, count: int) -> TeamGameEnvironments:
         """Return many environments that are stepped in one call."""

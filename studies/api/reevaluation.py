@@ -1,29 +1,16 @@
 """Teams that a study keeps, evaluated under other hierarchies and ways to decide."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from itertools import product
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from ...core.numerics import pd
-from ...core.plugins.sources import Sources
 from ...core.plugins.words import show
 from ..errors import SpecError
-from ..presentation.progress import Terminal
-from ..results.results import DONE, read
 from ..spec.objects import plain
-from ..spec.spec import Spec
 from ..spec.tables import TomlTable, label
 from ..store.database import EVALUATION
-from ..store.durable import TEAM
-from ..store.store import Store
-from ..trials.arrangement import check_conditions
-from ..trials.keeping import check_teams, open_to_run
-from ..trials.session import Session
-from ..trials.trial import Trial, TrialResult, trials_of
-from ..workers.runner import Observer, Outcome, run_trials
-from ..workers.workers import start_workers
+from ..workers.runner import Observer
+from .kept_teams import KeptTeams
 from .loading import load
 from .study import Place, StudyResults
 
@@ -69,40 +56,13 @@ def reevaluate(
         If there are no such teams, or they cannot act so; one line.
     """
     study = study if isinstance(study, StudyResults) else load(study)
-    done = study.trials[study.trials["state"] == DONE]
-    identities = {(row.condition, row.seed): str(row.identity) for row in done.itertuples()}
-    directory = study.directory.resolve()
-    with Store.open(directory) as store:
-        check_teams(store, {*identities.values()})
-        table = {**store.spec(), "evaluations": _entries(topology, decision), "keep_teams": False}
-        sources = Sources(Path(), store.sources(), brought_by=str(directory))
-    spec = Spec.of(table, sources)
-    if spec.evaluation < 1:
-        raise SpecError("evaluation = 0: reevaluate needs a study of 1 or more")
-    measures = check_conditions(spec, {condition for condition, _ in identities})
-    trials = [t for t in trials_of(spec) if (t.condition, t.seed) in identities]
-    with (
-        TemporaryDirectory() as folder,
-        start_workers("loky", jobs, None, len(trials)) as workers,
-        open_to_run(Path(folder), spec, trials, measures) as store,
-    ):
-        evaluate = partial(_evaluate, directory, identities)
-        outcomes = _succeeding(run_trials(trials, store, evaluate, workers))
-        (observer or Terminal()).follow(outcomes, len(trials), 0)
-        frame = read(store).episodes
+    changes = {"evaluations": _entries(topology, decision)}
+    kept = KeptTeams.of(study.directory, study.trials, changes)
+    frame = kept.evaluate(kept.trials, jobs, observer).episodes
     frame.insert(0, "entry", frame["phase"].str.removeprefix(EVALUATION))
     meaning = "topology and decision by which the trained team acts"
     frame.attrs["columns"]["entry"] = {"unit": "", "meaning": meaning}
     return frame
-
-
-def _succeeding(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
-    """Yield outcomes until one is a failure."""
-    for outcome in outcomes:
-        if outcome.error is not None:
-            where = f"{outcome.trial.condition}, seed {outcome.trial.seed}"
-            raise SpecError(f"{where}: {outcome.error.splitlines()[-1]}")
-        yield outcome
 
 
 def _entries(topology: Sequence[object], decision: Sequence[object]) -> dict[str, TomlTable]:
@@ -120,14 +80,3 @@ def _entries(topology: Sequence[object], decision: Sequence[object]) -> dict[str
             entry["learner"] = {"decision": entry.pop("decision")}
         entries[name] = entry
     return entries
-
-
-def _evaluate(
-    directory: Path, identities: Mapping[tuple[str, int], str], trial: Trial
-) -> TrialResult:
-    """Evaluate the kept team of a trial in its `evaluations`; imported by name in workers."""
-    with Store.open(directory) as store:
-        arrays = store.recording(identities[trial.condition, trial.seed], TEAM)
-    session = Session.restored(trial, arrays)
-    session.run_other_evaluations()
-    return session.result()

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from html import escape
 from itertools import chain
 from os import PathLike
@@ -53,8 +53,11 @@ if TYPE_CHECKING:
 
     from ...core.agents.team import Team
     from ...core.interface.scenario import Scenario
+    from ..resilience.report import ResilienceReport
     from ..scalability.laws import Scaling
+    from ..scalability.prediction import PredictionCheck
     from ..scalability.report import ScalabilityReport
+    from ..workers.runner import Observer
     from .explaining import TeamExplanation
 
 Place = str | PathLike[str]
@@ -318,6 +321,103 @@ class StudyResults:
         results = self.results_by_size(size)
         settings = self.condition_settings()
         return analyze(results, settings, measure, size, scaling, criterion, budget)
+
+    def predict_sizes(
+        self,
+        sizes: Sequence[int],
+        path: Place,
+        measure: str | None = None,
+        *,
+        size: str | None = None,
+    ) -> tuple[str, ...]:
+        """Write predictions for team sizes that were not run to a file; return remarks.
+
+        Parameters
+        ----------
+        sizes
+            Sizes to predict.
+        path
+            JSON file to write.
+        measure
+            Measure of performance, which is predicted along with the time of the task and costs.
+        size
+            The swept key that is the size; by default the only one of numbers.
+
+        Raises
+        ------
+        SpecError
+            If a size was run, or nothing can be predicted; one line.
+        """
+        from ..scalability.prediction import predict
+
+        results = self.results_by_size(size)
+        name = results.main.name if measure is None else measure
+        file, remarks = predict(results, self.outline.table, name, size, sizes)
+        file.write(Path(path))
+        count = f"{path}: {len(file.predictions)} predictions, sha256 {file.digest}"
+        return (count, *remarks)
+
+    def check_prediction(self, path: Place) -> PredictionCheck:
+        """Compare the predictions of a file with these results.
+
+        Raises
+        ------
+        SpecError
+            If the file was changed, or these results are those of another spec; one line.
+        """
+        from ..scalability.prediction import PredictionFile, check
+
+        return check(PredictionFile.read(Path(path)), self.results, self.outline.table)
+
+    def resilience(
+        self,
+        fault: str = "absent",
+        measure: str | None = None,
+        *,
+        max_sets: int = 20,
+        tolerance: float = 0.1,
+        jobs: int | None = None,
+        observer: Observer | None = None,
+    ) -> ResilienceReport:
+        """Measure what the loss of one, two or more agents costs the kept teams.
+
+        Teams are not trained again. The number of losses grows until performance is at most half.
+
+        Parameters
+        ----------
+        fault
+            ``absent``, ``left`` or ``lost``, as in ``[[topology.failures]]``, or a kind of
+            ``[[scenario.failures]]``, which takes an actuator, such as a wheel.
+        measure
+            Measure of episodes, higher being better; by default the first.
+        max_sets
+            Maximum number of sets of two or more that are lost; of more sets, random ones are.
+        tolerance
+            Share of the intact performance that a tolerated loss may cost.
+        jobs
+            Processes; None: one for every core.
+        observer
+            Is notified of the progress; None: it is shown on standard error.
+
+        Raises
+        ------
+        SpecError
+            If the study keeps no teams, a team has one agent only, or the scenario has no such
+            fault; one line.
+        """
+        from .kept_teams import KeptTeams
+        from .resilience import measure_resilience
+
+        kept = KeptTeams.of(self.directory, self.trials, {"evaluations": {}})
+        return measure_resilience(
+            self.results,
+            kept,
+            partial(kept.evaluate, jobs=jobs, observer=observer),
+            fault=fault,
+            measure=measure,
+            max_sets=max_sets,
+            tolerance=tolerance,
+        )
 
     def replay(
         self,

@@ -24,10 +24,9 @@ from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..results.results import Results, read
 from ..spec.conditions import Condition
-from ..spec.controls import WITH_REWARDS
-from ..spec.layers import without_learning
+from ..spec.controls import WITH_REWARDS, without_learning
 from ..spec.spec import Spec
-from ..spec.tables import TomlTable, dumps, nested, overlay
+from ..spec.tables import TomlTable, dumps, nested, override
 from ..store import durable
 from ..trials.arrangement import check_conditions
 from ..trials.trial import Trial, trials_of
@@ -244,7 +243,7 @@ def _check_request(spec: Spec, trials: int, seeds: int, first_seed: int, draw: i
 
 def _lay_over(table: TomlTable, point: Point) -> TomlTable:
     """Return a table overridden by values."""
-    return reduce(overlay, starmap(nested, point.items()), table)
+    return reduce(override, starmap(nested, point.items()), table)
 
 
 def _lay_over_spec(spec: Spec, point: Point) -> Spec:
@@ -326,7 +325,7 @@ def _plans(condition: Condition) -> bool:
 def _frozen_as(name: str, point: Point) -> TomlTable:
     """Return the override that differs from a configuration in learning alone."""
     control = _lay_over({"name": f"{AS}{name}"}, without_learning(point))
-    return overlay(control, {"learner": {"kind": "frozen"}})
+    return override(control, {"learner": {"kind": "frozen"}})
 
 
 def _control_of(name: str, study: Spec) -> str:

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ...core.interface.plain import MISSING, offered
 from ..errors import SpecError, refused
 from ..results.analysis import Analysis, Figures, identity_lines
 from ..results.results import Results
@@ -98,18 +97,18 @@ def load_study(name: str) -> LoadedStudy:
     """
     with refused(f"study = {name!r}: "):
         entry = STUDIES.find(name)
-    missing = [part for part in PARTS if not callable(offered(entry, part))]
+    missing = [part for part in PARTS if not callable(getattr(entry, part, None))]
     if missing:
         raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
     source = entry() if isinstance(entry, type) else entry
     names = OPTIONS | {part: part for part in PARTS}
-    known = {own: offered(source, part, MISSING) for part, own in names.items()}
-    return LoadedStudy(**{own: part for own, part in known.items() if part is not MISSING})
+    known = {own: getattr(source, part) for part, own in names.items() if hasattr(source, part)}
+    return LoadedStudy(**known)
 
 
 def notes_of(analysis: Any) -> tuple[str, ...]:
     """Return the remarks of an analysis, which those of users may lack."""
-    return tuple(offered(analysis, "notes", ()))
+    return tuple(getattr(analysis, "notes", ()))
 
 
 def measure(trial: Trial) -> TrialResult:

@@ -25,13 +25,13 @@ from ...core.agents.cost import Problem, below_counts
 from ...core.agents.joint import join_agents
 from ...core.agents.loop import control_loop, policy_seed
 from ...core.agents.team import Team
-from ...core.decision.settings import DecisionSettings
-from ...core.evaluators.best_response import CUTS
-from ...core.evaluators.coordination import MaxPlusSettings
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.agents import Counts
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
+from ...core.search.best_response import CUTS
+from ...core.search.coordination import MaxPlusSettings
+from ...core.search.settings import DecisionSettings
 from ...core.values.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse

@@ -12,8 +12,8 @@ from fractions import Fraction
 from textwrap import wrap
 from typing import Literal
 
-from ...core.evaluators.enumeration import AutoSettings
 from ...core.numerics import pd
+from ...core.search.enumeration import AutoSettings
 from ...topologies.view import align, format_count
 from ..errors import WIDTH
 from ..presentation.tables import in_csv, in_latex

@@ -27,9 +27,9 @@ from typing import NamedTuple, Self
 from ...core.agents.fuzzy import FuzzyAgents
 from ...core.agents.loop import control_loop
 from ...core.agents.team import Team
-from ...core.evaluators.enumeration import AutoSettings
-from ...core.evaluators.evaluator import Aggregation
 from ...core.numerics import pd
+from ...core.search.enumeration import AutoSettings
+from ...core.search.evaluator import Aggregation
 from ...topologies.view import align, format_count
 from ..errors import WIDTH, SpecError
 from ..results.notation import format_number
@@ -54,15 +54,13 @@ DECIDING = ("predict", "value", "search", "messages")
 PARTS = (*DECIDING, "learn", "world", "sense")
 """All parts: those of a decision, learning, the step of the environment, and sensing."""
 ROOMS = {
-    "core/adaptation": "predict",
+    "core/models": "predict",
     "core/interface": "predict",
     "scenarios": "predict",
     "core/values": "value",
     "core/networks": "value",
     "core/learners": "value",
-    "core/evaluators": "search",
-    "core/coordination": "search",
-    "core/decision": "search",
+    "core/search": "search",
     "core/agents": "messages",
     "core/hierarchy": "messages",
 }

@@ -29,8 +29,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import track
 
-from ...core.adaptation.learned_predictor import LearnedPredictor
-from ...core.adaptation.self_model import SelfModel
 from ...core.agents.fuzzy import FuzzyAgents
 from ...core.agents.loop import world_seed
 from ...core.agents.team import Team
@@ -38,6 +36,8 @@ from ...core.interface.experience import Observation
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import PolicyMap, Scenario
 from ...core.interface.spaces import Variable
+from ...core.models.learned_predictor import LearnedPredictor
+from ...core.models.self_model import SelfModel
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.printing import printable
 from ...core.values.partitions import Partition
@@ -285,7 +285,7 @@ def _policy(session: Session) -> PolicyMap | str:
         return session.team.act(seen, explore=False).joint_action
 
     def predict() -> Prediction | None:
-        return agents.foresight.predict(Observation(nowhere, scenario))
+        return agents.model.predict(Observation(nowhere, scenario))
 
     try:
         policy = scenario.show_policy(choose, predict)
@@ -302,7 +302,7 @@ def _load_team(store: Store, trial: Trial) -> tuple[Session, BodyEffects | None]
         if not all(isinstance(part, FuzzyAgents) for part in session.team.parts):
             kind = trial.settings.learner.kind
             raise ValueError(f"learner.kind = {kind!r}: explain needs agents with rule bases")
-        model = session.team.only(FuzzyAgents).foresight.self_model
+        model = session.team.only(FuzzyAgents).model.self_model
     bodies = BodyEffects({}, ())
     if model:
         bodies.note("built", model)
@@ -317,7 +317,7 @@ def _load_team(store: Store, trial: Trial) -> tuple[Session, BodyEffects | None]
 
 def _train(store: Store, session: Session, bodies: BodyEffects) -> None:
     trial = session.trial
-    model = session.team.only(FuzzyAgents).foresight.self_model
+    model = session.team.only(FuzzyAgents).model.self_model
     if trial.decisions is not None:
         session.train_until(trial.decisions)
     episodes = track(
@@ -383,7 +383,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         Of the trial.
     """
     agents = team.parts[0]
-    predictor = agents.foresight.predictor if isinstance(agents, FuzzyAgents) else None
+    predictor = agents.model.predictor if isinstance(agents, FuzzyAgents) else None
     if not isinstance(predictor, LearnedPredictor):
         return None
     horizon = predictor.horizon

@@ -19,7 +19,7 @@ from ..presentation.growth import growth_figures
 from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.analysis import identity_lines
+from ..results.analysis import Analysis, identity_lines
 from ..results.comparison import compare_conditions, missing_reference
 from ..results.notation import whole
 from ..results.results import Results, read
@@ -73,12 +73,8 @@ def page(directory: Path) -> str:
         analysis = analyse_as(outline.study, results)
         figures = dict(draw_figures(load_study(outline.study), analysis))
         scalability = _scalability(results, settings)
-    if outline.study == "scaling":
-        figures |= growth_figures(results)
-    notes = notes_of(analysis)
-    if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
-        notes = compare_conditions(results, results.main.name).notes  # with the identity lines
-    notes = (*missing_reference(results), *notes)
+    figures |= growth_figures(results) if outline.study == "scaling" else {}
+    notes = _notes(results, analysis)
     if older is not None:
         notes = (older, *notes)
     there = {label: own for label, own in settings.items() if label in results.conditions}
@@ -99,8 +95,7 @@ def page(directory: Path) -> str:
         notes=unfolded((*notes, *control_lines(there), *below_random(results, there))),
         table=table,
         pictures=pictures(dict(sorted(figures.items(), key=is_secondary))),
-        scalability=scalability,
-        panels=pictures({"scalability": scalability.figure()}, "panels") if scalability else [],
+        **scalability,
         replays=packed,
         topologies=topologies(outline),
         hierarchies=drawn,
@@ -115,7 +110,24 @@ def page(directory: Path) -> str:
     )
 
 
-def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> ScalabilityReport | None:
+def _notes(results: Results, analysis: Analysis) -> tuple[str, ...]:
+    """Return the notes of a study, or those of a comparison if it has none of its own."""
+    notes = notes_of(analysis)
+    if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
+        notes = compare_conditions(results, results.main.name).notes  # with the identity lines
+    return (*missing_reference(results), *notes)
+
+
+def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> dict[str, object]:
+    """Return what the page's section on scalability shows; nothing for a study of one team size."""
+    report = _scalability_report(results, settings)
+    panels = pictures({"scalability": report.figure()}, "panels") if report else []
+    return {"scalability": report, "panels": panels}
+
+
+def _scalability_report(
+    results: Results, settings: Mapping[str, SpecTable]
+) -> ScalabilityReport | None:
     """Return the scalability of a study with two or more team sizes; None of another study."""
     keys = {key for columns in columns_of(results).values() for key in columns}
     size = next((key for key in sorted(keys) if key.rpartition(".")[2] in SIZES), None)

@@ -282,7 +282,7 @@ def _place(law: UniversalLaw, largest: float, size: str) -> str:
     value, low, high = map(float, law.best_size)
     if not law.is_plausible:
         return "the universal scalability law does not describe these times"
-    if value > largest and low <= 1.0:
+    if (value > largest or math.isinf(high)) and low <= 1.0:
         return "no best team size can be determined from these seeds"
     if low >= largest:
         return (
@@ -295,9 +295,7 @@ def _place(law: UniversalLaw, largest: float, size: str) -> str:
             f"{math.floor(low)} {size}"
         )
     if math.isinf(high):
-        return (
-            f"the throughput is at its maximum from {format_number(low)} {size} on, no upper bound"
-        )
+        return f"the throughput is at its maximum from {math.floor(low)} {size} on, no upper bound"
     return f"the throughput is at its maximum with {format_estimate(law.best_size)} {size}"
 
 

@@ -205,11 +205,6 @@ class Condition(NamedTuple):
     """Names and settings of further evaluations of its trained teams."""
     curriculum: tuple[Stage, ...] = ()
     """Stages in which its teams are trained first."""
-    left_out: tuple[str, ...] = ()
-    """Keys of its preset, or of the scenario's changes of the preset, that its kinds do not have or
-    refuse."""
-    other_kinds: tuple[str, ...] = ()
-    """These kinds, as ``learner.kind = 'fitted-q'``."""
     same: tuple[str, ...] = ()
     """Labels of equal controls, which are left out."""
 
@@ -219,3 +214,10 @@ class Condition(NamedTuple):
         others = [other.model_dump(mode="json") for _, other in self.evaluations]
         stages = [stage.table() for stage in self.curriculum]
         return [self.settings.model_dump(mode="json"), *others, *stages]
+
+    @property
+    def content(self) -> str:
+        """JSON text that is the same for conditions with equal settings and stages."""
+        return json.dumps(
+            [self.settings.canonical(), *(stage.table() for stage in self.curriculum)]
+        )

@@ -1,7 +1,7 @@
 """Controls: conditions that learn nothing and show the effect of learning by comparison.
 
 A control differs from the team that it controls in learning alone. Under the tables of a spec (see
-`layers.for_control`) it keeps the keys that say how agents decide and predict: the rule, the value,
+`for_control`) it keeps the keys that say how agents decide and predict: the rule, the value,
 the evaluator, the predictor and the horizon.
 
 Where predicted rewards count, *zero weights plan*: success of a team that has learned is then no
@@ -9,13 +9,14 @@ sign of learning. Where they do not count, zero weights make all values equal, a
 random, frozen weights and random actions are one control.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from textwrap import wrap
 
+from ...core.learners import LEARNERS, LearnerSettings
 from ...core.plugins.words import show
 from ...topologies.builders import join_names
 from ..errors import WIDTH
-from .tables import SpecTable
+from .tables import SpecTable, TomlTable
 
 LEARN_NOTHING = ("frozen", "written")
 """Kinds of learners that do not learn."""
@@ -49,7 +50,7 @@ def control_of(condition: str, settings: Mapping[str, Settings]) -> str | None:
     return None
 
 
-TROUBLESHOOTING = "docs/not_learned.md"
+TROUBLESHOOTING = "docs/troubleshooting.md"
 """Page that says what to try if a team does not learn."""
 
 
@@ -137,3 +138,45 @@ def _same_remark(settings: Mapping[str, Settings]) -> str | None:
         return None
     names = f"{join_names(frozen, MOST_NAMES)} and {join_names(drawn, MOST_NAMES)}"
     return f"{names} are one control: frozen weights make all values equal, and ties are random"
+
+
+def for_control(control: SpecTable, user: SpecTable) -> SpecTable:
+    """Return tables of a user without the keys that tune learning, if a learner is a control.
+
+    A control that is defined by its rule of decision, as ``random`` and ``planner`` are, keeps it.
+
+    Parameters
+    ----------
+    control
+        The table of the learner; tables are unchanged if its kind learns.
+    user
+        The tables below, which were written for learners, too.
+    """
+    if control.get("kind") not in LEARN_NOTHING or "learner" not in user:
+        return user
+    fields = LEARNERS.model(control["kind"]).model_fields.keys() - {"kind"}
+    kept: TomlTable = {key: value for key, value in user["learner"].items() if key in fields}
+    if "rule" in control.get("decision", {}) and isinstance(kept.get("decision"), Mapping):
+        kept["decision"] = {k: v for k, v in kept["decision"].items() if k != "rule"}
+    return {**user, "learner": kept}
+
+
+def without_learning(point: Mapping[str, object]) -> dict[str, object]:
+    """Return values by dotted key without those that tune learning.
+
+    Examples
+    --------
+    >>> without_learning({"learner.ridge": 3.0, "learner.decision.rule": "reward-and-value"})
+    {'learner.decision.rule': 'reward-and-value'}
+    """
+    return {key: value for key, value in point.items() if not _tunes_learning(key)}
+
+
+def tuning_keys(keys: Iterable[str]) -> list[str]:
+    """Return the dotted keys that tune learning, sorted."""
+    return sorted({key for key in keys if _tunes_learning(key)})
+
+
+def _tunes_learning(key: str) -> bool:
+    section, _, rest = key.partition(".")
+    return section == "learner" and rest.partition(".")[0] not in LearnerSettings.model_fields

@@ -4,20 +4,14 @@ Types, defaults and allowed values come from the models that validate a spec, de
 from the docstrings of their fields. Registered scenarios, learners and so on are included.
 """
 
-import ast
 import inspect
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from itertools import pairwise
-from textwrap import dedent
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, NamedTuple, TypeGuard, Union, get_args, get_origin
+from typing import Any, NamedTuple
 
-from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
-from typing_extensions import TypeAliasType
 
 from ...core.functions.settings import FunctionSettings
 from ...core.plugins.models import kinds_at, models_of
@@ -25,16 +19,28 @@ from ...core.plugins.registry import Plugged, SettingsRegistry
 from ...core.plugins.settings import Settings
 from ...core.plugins.words import expect, near
 from .conditions import ConditionSettings, Override, StageSettings
+from .docstrings import field_docstring
 from .presets import PRESETS
+from .schema import Schema, SpecSchema
 from .spec import Spec
 from .tables import SpecTable
 
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 """Unit in the docstring of a field."""
-TYPES = {bool: "true or false", int: "whole number", float: "number", str: "text", Any: "any"}
+TYPES = {
+    "boolean": "true or false",
+    "integer": "whole number",
+    "number": "number",
+    "string": "text",
+    "object": "table",
+    "": "any",
+}
+"""Types of JSON schemas in words."""
+BOUNDS = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
+"""Bounds of JSON schemas in words."""
 OWN_FUNCTION = "file.py:decide"
 """Placeholder for functions of users; their keyword-only parameters are further keys."""
-GREATEST_BOUND = 10**9
+MAX_BOUND = 10**9
 """Bounds beyond it are those of machine integers and are not shown."""
 
 
@@ -228,7 +234,7 @@ def _table(
 ) -> Table:
     laid = _laid_by_preset(name, kinds[0])
     keys = tuple(
-        _key(field, info, meaning(model, field), laid.get(field))
+        _key(model, field, laid.get(field))
         for field, info in model.model_fields.items()
         if field != "kind" and not (field in base and base[field].default == info.default)
     )
@@ -264,35 +270,10 @@ def nearest(prefix: str) -> str:
     return near(prefix, names) or f"known: {', '.join(tops)}"
 
 
-def meaning(model: type[Settings], field: str) -> str:
-    """Return the docstring of a field, in one line."""
-    declaring = (cls for cls in model.__mro__ if field in inspect.get_annotations(cls))
-    written = _docstrings(next(declaring, model)).get(field)
-    return " ".join((model.model_fields[field].description or written or "").split())
-
-
-@cache
-def _docstrings(cls: type) -> Mapping[str, str]:
-    """Return the docstrings of the fields that a class declares.
-
-    pydantic would read them at every import of the class, which makes the import slower by a fifth.
-    """
-    try:
-        source = inspect.getsource(cls)
-    except (OSError, TypeError):
-        return {}
-    (definition,) = ast.parse(dedent(source)).body
-    body = definition.body if isinstance(definition, ast.ClassDef) else []
-    return {
-        field.target.id: str(text.value.value)
-        for field, text in pairwise(body)
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
-    }
-
-
-def _key(name: str, info: FieldInfo, meaning: str, laid: object) -> Key:
-    """Return a key; `laid` is the value in the preset, or None."""
+def _key(model: type[Settings], name: str, laid: object) -> Key:
+    """Return a key of a model; `laid` is its value in the preset, or None."""
+    info = model.model_fields[name]
+    meaning = field_docstring(model, name)
     registry = registry_of(info)
     default = _default(info)
     unit = UNIT.search(meaning)
@@ -300,13 +281,23 @@ def _key(name: str, info: FieldInfo, meaning: str, laid: object) -> Key:
         type_ = "table"
         allowed = f"kind: {', '.join(registry.built_in)}"
     else:
-        type_ = _type(info.annotation)
-        allowed = ", ".join(dict.fromkeys([*_bounds(info.metadata), *_allowed(info.annotation)]))
+        own = _properties(model)[name]
+        type_ = _type(own)
+        allowed = ", ".join(dict.fromkeys(_allowed(own)))
     if isinstance(laid, Mapping):
         laid = laid.get("kind")  # its other keys stand in a table of their own
     preset = "" if laid is None else json.dumps(laid)
     preset = "" if preset == default else preset
     return Key(name, type_, default, allowed, unit[1] if unit else "", meaning, preset)
+
+
+@cache
+def _properties(model: type[Settings]) -> Schema:
+    """Return the JSON schema of each key of a model."""
+    schema = model.model_json_schema(schema_generator=SpecSchema)
+    name = schema.get("$ref", "").rpartition("/")[2]  # a model that may hold itself is a reference
+    properties: Schema = (schema["$defs"][name] if name else schema)["properties"]
+    return properties
 
 
 def _default(info: FieldInfo) -> str:
@@ -323,51 +314,33 @@ def _default(info: FieldInfo) -> str:
     return json.dumps(value)
 
 
-def _type(annotation: Any) -> str:
-    """Return the type of a field in words, without None and annotations."""
-    origin = get_origin(annotation)
-    given = get_args(annotation)
-    if isinstance(annotation, TypeAliasType):
-        return "nested lists of text"
-    if origin is Annotated:
-        return _type(given[0])
-    if origin is tuple:
-        return f"{'list' if given[-1] is Ellipsis else 'pair'} of {_type(given[0])}"
-    if origin is Literal:
-        given = tuple(map(type, given))
-    if origin in (Union, UnionType, Literal):
-        return " or ".join(dict.fromkeys(_type(one) for one in given if one is not NoneType))
-    return TYPES.get(annotation, "table")
+def _type(schema: Schema) -> str:
+    """Return the type of a JSON schema in words, without null."""
+    if "anyOf" in schema:
+        names = [_type(one) for one in schema["anyOf"] if one != {"type": "null"}]
+        return " or ".join(dict.fromkeys(names))
+    if "$ref" in schema:
+        return "nested lists of text" if schema["$ref"].endswith("/Members") else "table"
+    if "prefixItems" in schema:
+        return f"pair of {_type(schema['prefixItems'][0])}"
+    if schema.get("type") == "array":
+        return f"list of {_type(schema['items'])}"
+    return TYPES[schema.get("type", "")]
 
 
-def _allowed(annotation: Any) -> Iterator[str]:
-    """Yield further restrictions of a type: literals and bounds, at any depth."""
-    origin = get_origin(annotation)
-    given = get_args(annotation)
-    if origin is Literal:
-        yield from (json.dumps(value) for value in given if value is not False)
-    elif origin is Annotated:
-        yield from _allowed(given[0])
-        fields = (one for one in given[1:] if isinstance(one, FieldInfo))
-        yield from _bounds(item for field in fields for item in field.metadata)
-    elif origin in (Union, UnionType, tuple):
-        for one in given:
-            yield from _allowed(one)
-
-
-def _bounds(metadata: Iterable[object]) -> Iterator[str]:
-    for item in metadata:
-        if isinstance(item, Ge) and _is_short(item.ge):
-            yield f">= {item.ge:,}"
-        if isinstance(item, Gt) and _is_short(item.gt):
-            yield f"> {item.gt:,}"
-        if isinstance(item, Le) and _is_short(item.le):
-            yield f"<= {item.le:,}"
-        if isinstance(item, Lt) and _is_short(item.lt):
-            yield f"< {item.lt:,}"
-        if isinstance(item, MinLen):
-            yield f"at least {item.min_length} of them"
-
-
-def _is_short(bound: object) -> TypeGuard[float]:
-    return isinstance(bound, int | float) and bound <= GREATEST_BOUND
+def _allowed(schema: Schema) -> Iterator[str]:
+    """Yield the bounds and the allowed values in a JSON schema, at any depth."""
+    for word, sign in BOUNDS.items():
+        if word in schema and abs(schema[word]) <= MAX_BOUND:
+            yield f"{sign} {schema[word]:,}"
+    for value in [schema["const"]] if "const" in schema else schema.get("enum", []):
+        if value is not False:
+            yield json.dumps(value)
+    if "prefixItems" in schema:
+        yield from _allowed(schema["prefixItems"][0])
+    elif "items" in schema:
+        if "minItems" in schema:
+            yield f"at least {schema['minItems']} of them"
+        yield from _allowed(schema["items"])
+    for one in schema.get("anyOf", []):
+        yield from _allowed(one)

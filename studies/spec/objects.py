@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from pkgutil import resolve_name
 from typing import Any
 
-from ...core.decision.exploration import EXPLORATIONS
-from ...core.evaluators import EVALUATORS
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.learners import LEARNERS
 from ...core.numerics import nx
 from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings
+from ...core.search import EVALUATORS
+from ...core.search.exploration import EXPLORATIONS
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ..errors import SpecError, refused

@@ -30,20 +30,25 @@ from ...topologies.builders import join_names
 from ..errors import SpecError, refused
 from ..store.database import DATABASE, SPEC_FILE
 from .conditions import Condition, Curriculum, Length, Name, Override
-from .controls import LEARN_NOTHING, planning_remark
-from .layers import below, expand, grid, section, tuning_keys
+from .controls import LEARN_NOTHING, planning_remark, tuning_keys
 from .objects import plain
 from .presets import PRESETS
+from .resolution import (
+    UserTables,
+    conditions_of,
+    expand,
+    expand_section,
+    known_tables,
+    sections_of,
+)
 from .studies import STUDIES
-from .tables import SWEEP, SpecTable, TomlTable, assignment, overlay, spec_text
+from .tables import SWEEP, SpecTable, TomlTable, assignment, override, spec_text
 
 MOST_TRIALS = 100_000
 """Maximum number of trials of a study."""
 
 MOST_KEYS = 6
 """Maximum number of keys in a remark."""
-FEW_KEYS = 2
-"""Maximum number of ignored keys in a remark."""
 
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 
@@ -123,7 +128,7 @@ class Spec(Settings):
             raise ValueError(moved or closest(value, known))
         return value
 
-    @field_validator("seeds", mode="before")
+    @field_validator("seeds", mode="before", json_schema_input_type=int | tuple[Seed, ...])
     @classmethod
     def _count(cls, value: object) -> object:
         if isinstance(value, int) and not isinstance(value, bool):
@@ -181,14 +186,21 @@ class Spec(Settings):
         try:
             spec = cls.model_validate(tuples(table), strict=True)
         except ValidationError as error:
-            raise SpecError(explain(error, cls, table, below(table), SWEEP)) from None
+            raise SpecError(explain(error, cls, table, known_tables(table), SWEEP)) from None
         own = [override.sweep for override in spec.overrides] or [{}]
         points = sum(math.prod(map(len, {**swept, **spec.sweep}.values())) for swept in own)
         if points * len(spec.seeds) > MOST_TRIALS:
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
-        spec._conditions = grid(
-            spec.preset, spec, spec.sweep, spec.overrides, spec.evaluations, spec.curriculum
+        spec._conditions = conditions_of(
+            UserTables(
+                spec.preset,
+                sections_of(spec),
+                spec.sweep,
+                spec.overrides,
+                spec.evaluations,
+                spec.curriculum,
+            )
         )
         if spec.decisions is not None and [c.label for c in spec._conditions] == ["default"]:
             (only,) = spec._conditions
@@ -204,7 +216,8 @@ class Spec(Settings):
         for module, key in dict(modules_in(tables)).items():
             with refused(f"{key}: "):
                 sources.permit(module)
-        spec._sources = sources.only(set(names))
+        data_files = {name for name in sources.texts if name.endswith(".csv")}
+        spec._sources = sources.only({*names, *data_files})
         spec._check_decisions()
         return spec
 
@@ -292,16 +305,10 @@ class Spec(Settings):
     def warnings(self) -> tuple[str, ...]:
         """Return a line for each suspicious value and each ignored key.
 
-        Ignored are keys of the learner in controls, of the topology for learners without hierarchy,
-        and of the preset for kinds that do not have them.
+        Ignored are keys of the learner in controls, and of the topology for learners without
+        hierarchy.
         """
-        lines = []
-        left_out = dict.fromkeys(key for c in self.conditions() for key in c.left_out)
-        if left_out:
-            kinds = dict.fromkeys(kind for c in self.conditions() for kind in c.other_kinds)
-            keys = join_names(left_out, FEW_KEYS)
-            lines.append(f"{keys}: set by default, left out for {join_names(kinds, FEW_KEYS)}")
-        lines += self._of_controls()
+        lines = [*self._of_controls()]
         for condition in self.conditions():
             lines += condition.settings.warnings()
             lines += condition.settings.remarks()
@@ -359,11 +366,11 @@ def first_sentence(text: str) -> str:
 
 
 def _changed(table: TomlTable, change: TomlTable) -> TomlTable:
-    """Lay a change over a table; a topology written as a string is a table from then on."""
-    below = table.get("topology")
-    if isinstance(below, str) and isinstance(change.get("topology"), Mapping):
-        table = {**table, "topology": section("topology", below)}
-    return overlay(table, change)
+    """Return a changed table; a topology written as text becomes a table if a key of it changes."""
+    topology = table.get("topology")
+    if isinstance(topology, str) and isinstance(change.get("topology"), Mapping):
+        table = {**table, "topology": expand_section("topology", topology)}
+    return override(table, change)
 
 
 def _filled(table: TomlTable) -> TomlTable:

@@ -1,10 +1,7 @@
 """Tables of a spec: merging, dotted keys, and labels of conditions.
 
-A *table* is a nested dictionary as TOML reads it. Merging one over another replaces values and
-descends into tables. Where the two name a different `kind`, the lower one keeps only what both
-kinds inherit in common: a trace decay says nothing to a learner that has no trace.
-
-Conditions are called by the point of the sweeps that they are.
+A *table* is a nested dictionary as TOML reads it. The label of a condition names its point of the
+sweeps.
 """
 
 import hashlib
@@ -15,9 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
-from pydantic import BaseModel
 
-from ...core.plugins.models import Slot, field_of, kinds_at, model_at
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..store.database import SPEC_FILE
@@ -31,43 +26,42 @@ SpecTable = Mapping[str, Any]
 """A table of a spec, or a part of one, that is only read: its values are what TOML has."""
 
 
-def overlay(base: SpecTable, table: SpecTable, slot: Slot = None) -> TomlTable:
-    """Return `base` overridden by `table`; neither is modified.
-
-    Parameters
-    ----------
-    base, table
-        The lower and the upper table.
-    slot
-        What the result is for. None: plain tables without kinds.
+def merge(base: SpecTable, table: SpecTable) -> TomlTable:
+    """Return `base` updated with `table` at any depth; neither is modified.
 
     Examples
     --------
-    >>> overlay({"a": 1, "b": {"c": 2, "d": 3}}, {"b": {"c": 4}})
+    >>> merge({"a": 1, "b": {"c": 2, "d": 3}}, {"b": {"c": 4}})
     {'a': 1, 'b': {'c': 4, 'd': 3}}
     """
-    result = dict(base)
-    if "kind" in base and "kind" in table and base["kind"] != table["kind"]:
-        kept = _common_fields(model_at(slot, base), model_at(slot, table))
-        result = {key: value for key, value in base.items() if key in kept}
-    model = model_at(slot, {**result, **table})
-    for key, value in table.items():
-        below = result.get(key)
-        if isinstance(value, Mapping) and isinstance(below, Mapping):
-            result[key] = overlay(below, value, field_of(model, key))
-        elif isinstance(value, str) and isinstance(below, Mapping) and "kind" in below:
-            # A name stands for a table that says its kind and no more.
-            result[key] = {"kind": value} if kinds_at(field_of(model, key)) else value
-        else:
-            result[key] = value
-    return result
+    merged = {**base, **table}
+    for key in base.keys() & table.keys():
+        if isinstance(base[key], Mapping) and isinstance(table[key], Mapping):
+            merged[key] = merge(base[key], table[key])
+    return merged
 
 
-def _common_fields(first: type[BaseModel] | None, second: type[BaseModel] | None) -> set[str]:
-    if first is None or second is None:
-        return set()
-    shared = next(c for c in first.__mro__ if issubclass(second, c) and issubclass(c, BaseModel))
-    return set(shared.model_fields)
+def override(base: SpecTable, table: SpecTable) -> TomlTable:
+    """Return `base` updated with `table`, where a table of another ``kind`` replaces the one below.
+
+    Examples
+    --------
+    >>> override({"kind": "tree", "branching": 3}, {"kind": "star"})
+    {'kind': 'star'}
+    """
+    return merge(_without_other_kinds(base, table), table)
+
+
+def _without_other_kinds(base: SpecTable, table: SpecTable) -> TomlTable:
+    if "kind" in base and base["kind"] != table.get("kind", base["kind"]):
+        return {}
+    pairs = ((key, value, table.get(key)) for key, value in base.items())
+    return {
+        key: _without_other_kinds(value, other)
+        if isinstance(value, Mapping) and isinstance(other, Mapping)
+        else value
+        for key, value, other in pairs
+    }
 
 
 def nested(key: str, value: object) -> TomlTable:
@@ -96,21 +90,6 @@ def flat(table: SpecTable, prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield from flat(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
-
-
-def without(table: SpecTable, keys: Collection[str], prefix: str = "") -> TomlTable:
-    """Return a table without what stands at some dotted keys; it is not modified.
-
-    Examples
-    --------
-    >>> without({"a": {"b": 1, "c": 2}}, {"a.c"})
-    {'a': {'b': 1}}
-    """
-    return {
-        key: without(value, keys, f"{prefix}{key}.") if isinstance(value, Mapping) else value
-        for key, value in table.items()
-        if f"{prefix}{key}" not in keys
-    }
 
 
 def assignment(text: str) -> TomlTable:

@@ -16,8 +16,7 @@ from ...core.agents.loop import policy_seed
 from ...core.agents.team import Team
 from ...core.interface.experience import Observation
 from ...core.interface.measures import Measure, measures_of
-from ...core.interface.plain import as_scenario
-from ...core.interface.scenario import Scenario
+from ...core.interface.scenario import Scenario, checked_scenario
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings, Stage
@@ -52,7 +51,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     ValueError
         If the settings do not fit together, in one line.
     """
-    world = as_scenario(settings.scenario.build())
+    world = checked_scenario(settings.scenario.build())
     scenario, hierarchy = settings.arrange(world)
     failures = settings.topology.failures
     team = Team(settings.learner, scenario, hierarchy, policy_seed(seed), failures)

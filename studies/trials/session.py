@@ -15,8 +15,8 @@ from typing import Any
 from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.many_environments import ManyEnvironmentsLoop
 from ...core.agents.team import Team
-from ...core.interface.plain import as_scenario
 from ...core.interface.recording import EpisodeRecorder
+from ...core.interface.scenario import checked_scenario
 from ...core.interface.stacked import LoopedEnvironments
 from ...core.plugins.words import expect
 from ..spec.controls import LEARN_NOTHING
@@ -258,7 +258,7 @@ class Session:
         if name is None:
             return
         if record.step == 0:  # no transition contains the initial state
-            scenario = as_scenario(self.trial.settings.scenario.build())
+            scenario = checked_scenario(self.trial.settings.scenario.build())
             scenario.reset(world_seed(self.trial.seed, record.episode), record.episode)
             self._recorder = EpisodeRecorder(scenario)
         self._recorder.add(record.transition)

@@ -13,9 +13,8 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from ...core.interface.measures import Measure
-from ...core.interface.plain import as_scenario
-from ...core.interface.scenario import Scenario
-from ...core.plugins.settings import Settings
+from ...core.interface.scenario import Scenario, checked_scenario
+from ...core.plugins.settings import Settings, changed_values
 from ...core.plugins.sources import Sources, files_in
 from ..spec.conditions import ConditionSettings, Stage
 from ..spec.outline import lengths
@@ -78,7 +77,7 @@ class Trial:
 
     @cached_property
     def identity(self) -> str:
-        """Hash of the content, the seed and the results version."""
+        """Hash of the seed, of all settings that differ from their defaults, and of the version."""
         content = {**self._content, "seed": self.seed}
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()[:32]
@@ -86,28 +85,25 @@ class Trial:
     @cached_property
     def _content(self) -> dict[str, Any]:
         """Hashed content except the seed."""
+        evaluations = {name: self._own_part(other) for name, other in self.evaluations}
         content: dict[str, Any] = {
             "version": RESULTS_VERSION,
             "study": self.study,
-            "settings": self.settings.model_dump(mode="json"),
+            "settings": changed_values(self.settings),
             "episodes": self.episodes,
             "steps": self.steps,
             "evaluation": self.evaluation,
+            "evaluation_steps": self.evaluation_steps,
+            "decisions": self.decisions,
+            "evaluations": [[name, changed_values(own)] for name, own in evaluations.items()],
+            "curriculum": [
+                [stage.name, stage.episodes, changed_values(stage.scenario)]
+                for stage in self.curriculum
+            ],
         }
-        if self.evaluation_steps is not None:
-            content["evaluation_steps"] = self.evaluation_steps
-        if self.decisions is not None:
-            content["decisions"] = self.decisions
-        if self.evaluations:
-            content["evaluations"] = [
-                [name, self._own_part(other).model_dump(mode="json")]
-                for name, other in self.evaluations
-            ]
-        if self.curriculum:
-            content["curriculum"] = [stage.table() for stage in self.curriculum]
-        if files := sorted(files_in([self.study, content])):
-            content["sources"] = {name: self.sources.digest(name) for name in files}
-        return content
+        everything = [self.settings, *evaluations.values(), *(s.scenario for s in self.curriculum)]
+        files = sorted(files_in([self.study, *(own.model_dump() for own in everything)]))
+        return content | {"sources": {name: self.sources.digest(name) for name in files}}
 
     def _own_part(self, other: ConditionSettings) -> Settings:
         """Return the scenario of an evaluation, or all settings if the team acts differently."""
@@ -122,7 +118,7 @@ class Trial:
     def world(self) -> Scenario:
         """Build the scenario that the settings describe."""
         with self.sources.active():
-            return as_scenario(self.settings.scenario.build())
+            return checked_scenario(self.settings.scenario.build())
 
     @property
     def planned(self) -> Planned:

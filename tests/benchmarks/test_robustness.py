@@ -1,4 +1,4 @@
-"""The proofs of robustness run, on a small scale; their figures are in docs/studies.md."""
+"""The proofs of robustness run, on a small scale; their figures are in docs/benchmarks.md."""
 
 import re
 import subprocess

@@ -88,7 +88,9 @@ def test_contact_sheet(
     monkeypatch.setattr("sys.argv", ["contact_sheet.py", str(path)])
     runpy.run_path(str(EXAMPLES / "contact_sheet.py"), run_name="__main__")
     assert path.stat().st_size > 50_000
-    documented = (EXAMPLES.parent / "docs" / "worlds.md").read_text(encoding="utf-8")
+    documented = (EXAMPLES.parent / "docs" / "environments" / "box_pushing.md").read_text(
+        encoding="utf-8"
+    )
     assert capsys.readouterr().out.strip() in documented
 
 

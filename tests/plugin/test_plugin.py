@@ -104,8 +104,8 @@ def test_settings_of_a_package_are_checked_like_built_in_ones(
 
 def test_every_kind_of_thing_is_offered(installed: Path, tmp_path: Path) -> None:
     code = """
-from nested_agents.core.evaluators import EVALUATORS
-from nested_agents.core.decision.exploration import EXPLORATIONS
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.exploration import EXPLORATIONS
 from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES

@@ -110,7 +110,7 @@ def test_bad_input(
 
 def test_the_command_prints_what_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["atlas"]) == 0
-    page = Path(__file__).resolve().parents[2] / "docs" / "atlas.md"
+    page = Path(__file__).resolve().parents[2] / "research" / "notebooks" / "atlas.md"
     out = capsys.readouterr().out.strip()
     text = page.read_text(encoding="utf-8")
     assert out in text
@@ -132,7 +132,7 @@ def test_the_page_has_the_law_of_decisions_to_success(capsys: pytest.CaptureFixt
         "32",
     ]
     assert main(arguments) == 0
-    page = Path(__file__).resolve().parents[2] / "docs" / "atlas.md"
+    page = Path(__file__).resolve().parents[2] / "research" / "notebooks" / "atlas.md"
     shown = capsys.readouterr().out.splitlines()
     text = page.read_text(encoding="utf-8")
     assert all(line.rstrip() in text for line in shown)

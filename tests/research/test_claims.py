@@ -45,7 +45,7 @@ from research.claims import (
 )
 
 POINTS = Path(__file__).resolve().parents[2] / "examples" / "worlds" / "pushing_points.py"
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "claims.md"
+PAGE = Path(__file__).resolve().parents[2] / "research" / "notebooks" / "claims.md"
 
 
 def found(value: float, low: float, high: float, p: float | None = None) -> Measured:
@@ -371,7 +371,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
     table = capsys.readouterr().out.strip()
     page = PAGE.read_text(encoding="utf-8")
     assert table in page, (
-        "docs/claims.md: put in the table of python -m research.claims --format markdown"
+        "claims.md: put in the table of python -m research.claims --format markdown"
     )
 
 

@@ -5,12 +5,12 @@ import pytest
 
 from research import RESULTS, disagreement
 
-DOCS = RESULTS.parents[1] / "docs"
+NOTEBOOKS = RESULTS.parent / "notebooks"
 
 
 def test_the_page_has_the_table_that_the_rows_give(tmp_path) -> None:
     every = disagreement.rows()
-    page = (DOCS / "edges.md").read_text(encoding="utf-8")
+    page = (NOTEBOOKS / "edges.md").read_text(encoding="utf-8")
     lines = disagreement.lines(every)
     thresholds = lines[-len(every) :]
     assert all(line in page for line in lines[: -len(every) - 1])

@@ -1,4 +1,4 @@
-"""docs/environments_results.md holds the tables that the committed results give."""
+"""research/notebooks/environments.md holds the tables that the committed results give."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from nested_agents.studies.trials.trial import trials_of
 from research import RESULTS, SPECS
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "environments_results.md"
+PAGE = ROOT / "research" / "notebooks" / "environments.md"
 COLUMNS = ("success last 5", "evaluation success", "total reward")
 
 
@@ -33,7 +33,7 @@ COLUMNS = ("success last 5", "evaluation success", "total reward")
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
     assert table in PAGE.read_text(encoding="utf-8"), (
-        f"docs/environments_results.md: put in\n{table}"
+        f"research/notebooks/environments.md: put in\n{table}"
     )
 
 
@@ -68,7 +68,7 @@ def test_speeds_of_swimmers(name: str, phases: dict[str, str]) -> None:
         lines.append(Summary(condition, len(results.seeds(condition)), speeds))
     table = tabulate(lines).markdown
     assert table in PAGE.read_text(encoding="utf-8"), (
-        f"docs/environments_results.md: put in\n{table}"
+        f"research/notebooks/environments.md: put in\n{table}"
     )
 
 
@@ -88,7 +88,7 @@ def test_evaluated_rewards(name: str, reference: str, capsys: pytest.CaptureFixt
     rows = capsys.readouterr().out.splitlines()  # the page does not show effect sizes
     table = "".join(f"{'|'.join(row.split('|')[:5])}|\n" for row in rows)
     assert table in PAGE.read_text(encoding="utf-8"), (
-        f"docs/environments_results.md: put in\n{table}"
+        f"research/notebooks/environments.md: put in\n{table}"
     )
 
 

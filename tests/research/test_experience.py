@@ -18,7 +18,8 @@ from research.claims import Benefit
 from research.measures import Measured
 
 DOCS = RESULTS.parents[1] / "docs"
-PEERS = (DOCS / "peers.md").read_text(encoding="utf-8")
+NOTEBOOKS = RESULTS.parent / "notebooks"
+PEERS = (NOTEBOOKS / "ppo.md").read_text(encoding="utf-8")
 CHAIN = experience.CHAIN
 NETWORKS = (CHAIN, "hierarchy-ppo, no edges")
 

@@ -1,4 +1,4 @@
-"""docs/kinematic_chain.md holds the tables that the committed results give, and specs that are."""
+"""The pages on arms hold the tables that the committed results give, and specs that are."""
 
 import re
 from pathlib import Path
@@ -10,7 +10,8 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = (ROOT / "docs" / "kinematic_chain.md").read_text(encoding="utf-8")
+PAGES = (ROOT / "docs" / "environments" / "arms.md", ROOT / "research" / "notebooks" / "arms.md")
+TEXT = "\n".join(path.read_text(encoding="utf-8") for path in PAGES)
 REACHED = ("success last 5", "evaluation success")
 
 
@@ -29,7 +30,7 @@ REACHED = ("success last 5", "evaluation success")
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
-    assert table in TEXT, f"docs/kinematic_chain.md: put in\n{table}"
+    assert table in TEXT, f"research/notebooks/arms.md: put in\n{table}"
 
 
 @pytest.mark.parametrize("spec", re.findall(r"```toml\n(.*?)```", TEXT, flags=re.DOTALL))

@@ -37,7 +37,7 @@ def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
     assert said.startswith("3 robots, scripted: 1.00 [0.34, 1.00], ")
     lines = [line for line in said.splitlines() if "3, scripted" not in line]
     rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in lines]
-    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    page = (ROOT / "research" / "notebooks" / "box_pushing.md").read_text(encoding="utf-8")
     told = [f"| {' | '.join(row)} |" for row in rows if row]
     assert len(told) == 14
     assert [row for row in told if row not in page] == []

@@ -1,4 +1,4 @@
-"""docs/learning.md holds the tables that the committed results give."""
+"""research/notebooks/box_pushing.md holds the tables that the committed results give."""
 
 import csv
 from pathlib import Path
@@ -14,7 +14,7 @@ from nested_agents.studies.results.statistics import bootstrap
 from research import RESULTS
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "learning.md"
+PAGE = ROOT / "research" / "notebooks" / "box_pushing.md"
 LARGE_TEAM = (
     "training success", "training success, difference",
     "evaluation success", "evaluation success, difference",
@@ -44,7 +44,9 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
-    assert table in PAGE.read_text(encoding="utf-8"), f"docs/learning.md: put in\n{table}"
+    assert table in PAGE.read_text(encoding="utf-8"), (
+        f"research/notebooks/box_pushing.md: put in\n{table}"
+    )
 
 
 def test_the_planner(capsys: pytest.CaptureFixture[str]) -> None:
@@ -93,7 +95,7 @@ def test_failures_of_large_teams(capsys: pytest.CaptureFixture[str]) -> None:
     page = PAGE.read_text(encoding="utf-8")
     for fault, cells in rows.items():
         line = f"| {fault.replace(' seized', '')} | {' | '.join(cells)} |"
-        assert line in page, f"docs/learning.md: put in\n{line}"
+        assert line in page, f"research/notebooks/box_pushing.md: put in\n{line}"
 
 
 def _rounded(rate: str) -> str:

@@ -1,4 +1,4 @@
-"""docs/no_predictor.md says what the committed results say."""
+"""research/notebooks/model_free.md says what the committed results say."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,7 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = (ROOT / "docs" / "no_predictor.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "research" / "notebooks" / "model_free.md").read_text(encoding="utf-8")
 COLUMNS = ("evaluation success", "messages")
 
 
@@ -23,7 +23,7 @@ def test_specs_can_be_run() -> None:
 @pytest.mark.parametrize("name", ["fit", "fit-landmarks", "fit-arms", "fit-games"])
 def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, COLUMNS, capsys)
-    assert table in TEXT, f"docs/no_predictor.md: put in\n{table}"
+    assert table in TEXT, f"research/notebooks/model_free.md: put in\n{table}"
 
 
 def test_the_claims_of_action_dependency_graphs(capsys: pytest.CaptureFixture[str]) -> None:

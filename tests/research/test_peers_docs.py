@@ -1,4 +1,4 @@
-"""docs/peers.md holds the tables that the committed results give, and names specs that are."""
+"""research/notebooks/ppo.md holds the tables of committed results, and names specs that exist."""
 
 import re
 from pathlib import Path
@@ -10,7 +10,7 @@ from nested_agents.studies.spec.spec import Spec
 from research import RESULTS
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "research" / "notebooks" / "ppo.md").read_text(encoding="utf-8")
 COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions")
 PREDICTORS = ("success, 2", "success, 6", "evaluation success", "decisions")
 SAMPLED = "success, sampled actions"
@@ -38,7 +38,7 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
     path = RESULTS / f"{name}.json"
     assert main(["table", str(path), "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
-    assert table in TEXT, f"docs/peers.md: put in\n{table}"
+    assert table in TEXT, f"research/notebooks/ppo.md: put in\n{table}"
 
 
 @pytest.mark.parametrize("path", re.findall(r"nested-agents run (\S+\.toml)", TEXT))

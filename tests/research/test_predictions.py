@@ -13,7 +13,9 @@ def test_the_documented_prediction_errors_are_those_of_the_benchmark() -> None:
     benchmark = runpy.run_module("research.prediction_errors")
     count, means = benchmark["errors"](box="square")
     row = "| ".join(f"{mean:.1f} " for mean in means)
-    documented = (DOCS / "predictors.md").read_text(encoding="utf-8")
+    documented = (DOCS.parent / "research" / "notebooks" / "dynamics_models.md").read_text(
+        encoding="utf-8"
+    )
     assert f"| square | {count} | {row}|" in documented
 
 
@@ -31,7 +33,8 @@ def test_free_motion_agrees_with_the_theory_as_well_as_is_documented(
     runpy.run_module("research.free_motion", run_name="__main__")
     said = capsys.readouterr().out
     (ahead, yaw) = re.findall(
-        r"within (\S+) mm/s and (\S+) rad/s", (DOCS / "worlds.md").read_text(encoding="utf-8")
+        r"within (\S+) mm/s and (\S+) rad/s",
+        (DOCS / "environments" / "box_pushing.md").read_text(encoding="utf-8"),
     )[0]
     rows = re.findall(r"^\| [\w-]+ \| (\S+) \| (\S+) \| (\S+) \| (\S+) \|$", said, re.MULTILINE)
     assert len(rows) == 12

@@ -1,11 +1,11 @@
-"""docs/predictors.md holds the tables that the committed results give."""
+"""research/notebooks/dynamics_models.md holds the tables that the committed results give."""
 
 from pathlib import Path
 
 import pytest
 from published_tables import print_table
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "predictors.md"
+PAGE = Path(__file__).resolve().parents[2] / "research" / "notebooks" / "dynamics_models.md"
 
 
 TRAINED = "training success", "evaluation success"
@@ -26,4 +26,6 @@ LAST = "success last 5", "evaluation success"
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
-    assert table in PAGE.read_text(encoding="utf-8"), f"docs/predictors.md: put in\n{table}"
+    assert table in PAGE.read_text(encoding="utf-8"), (
+        f"research/notebooks/dynamics_models.md: put in\n{table}"
+    )

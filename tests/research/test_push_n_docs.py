@@ -1,4 +1,4 @@
-"""docs/push_n.md says what the committed entries say."""
+"""research/notebooks/push_n.md says what the committed entries say."""
 
 import re
 from pathlib import Path
@@ -10,14 +10,16 @@ from programs import main
 from research import push_n
 
 pytestmark = pytest.mark.usefixtures("entries_read_once")
-TEXT = (Path(__file__).resolve().parents[2] / "docs" / "push_n.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).resolve().parents[2] / "research" / "notebooks" / "push_n.md").read_text(
+    encoding="utf-8"
+)
 
 
 @pytest.mark.parametrize("measure", ["success", "decisions"])
 def test_tables(measure: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["push_n", "table", "--measure", measure, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
-    assert table in TEXT, f"docs/push_n.md: put in\n{table}"
+    assert table in TEXT, f"research/notebooks/push_n.md: put in\n{table}"
 
 
 def test_rules_are_those_of_the_code() -> None:

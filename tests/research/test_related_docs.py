@@ -1,4 +1,4 @@
-"""docs/related.md says what is so."""
+"""research/notebooks/related.md says what is so."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ from research import RESULTS, SPECS
 from research.claims import CATALOG
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = (ROOT / "docs" / "related.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "research" / "notebooks" / "related.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("spec", re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL))
@@ -45,4 +45,4 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
     path = str(RESULTS / f"{name}.json")
     assert main(["table", path, "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
-    assert table in TEXT, f"docs/related.md: put in\n{table}"
+    assert table in TEXT, f"research/notebooks/related.md: put in\n{table}"

@@ -1,4 +1,4 @@
-"""docs/signals.md holds what the committed results and theory give."""
+"""research/notebooks/signals.md holds what the committed results and theory give."""
 
 from pathlib import Path
 
@@ -8,7 +8,9 @@ from published_tables import print_table
 
 from nested_agents.studies.results.notation import format_number
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "signals.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parents[2] / "research" / "notebooks" / "signals.md").read_text(
+    encoding="utf-8"
+)
 
 
 def test_the_table_of_results(capsys: pytest.CaptureFixture[str]) -> None:
@@ -16,7 +18,7 @@ def test_the_table_of_results(capsys: pytest.CaptureFixture[str]) -> None:
     rows = print_table("signals", columns, capsys).splitlines()[2:]
     for row in rows:
         if row.startswith(("| 4 ", "| 16 ")):
-            assert row in PAGE, f"docs/signals.md: put in\n{row}"
+            assert row in PAGE, f"research/notebooks/signals.md: put in\n{row}"
 
 
 @pytest.mark.parametrize("agents", [2, 4, 16, 1024])

@@ -1,4 +1,4 @@
-"""docs/edges.md holds the tables that the committed results give, topologies.md what is run."""
+"""research/notebooks/edges.md holds the tables of committed results, topologies.md what is run."""
 
 import re
 from itertools import pairwise
@@ -19,7 +19,9 @@ from research import RESULTS, equal_treatment
 from research.studies.chain_order import equivalence
 from research.studies.edges import TRAINED, analyse, effects
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "edges.md"
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGE = ROOT / "research" / "notebooks" / "edges.md"
 
 
 @pytest.mark.parametrize(
@@ -32,7 +34,9 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "edges.md"
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
-    assert table in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: put in\n{table}"
+    assert table in PAGE.read_text(encoding="utf-8"), (
+        f"research/notebooks/edges.md: put in\n{table}"
+    )
 
 
 SETTINGS = {
@@ -48,7 +52,7 @@ def test_what_telling_is_worth_over_all_settings() -> None:
     for name, whose in SETTINGS.items():
         lost, slower = pooled(results, whose, "considered only")
         line = f"| {name} | {shown(lost)} | {p_of(lost)} | {times(slower)} | {p_of(slower)} |"
-        assert line in page, f"docs/edges.md: put in\n{line}"
+        assert line in page, f"research/notebooks/edges.md: put in\n{line}"
     lost, _ = pooled(results, ("own",), "considered only")
     assert f"{shown(-lost)}, which does not decide" in " ".join(
         (PAGE.parent / "claims.md").read_text().split()
@@ -91,13 +95,13 @@ def test_what_is_equal_to_the_chain() -> None:
         gained = format_estimate(success.estimate)
         longer = f"{format_estimate(decisions.estimate)} times"
         line = f"| {other} | {gained} | {success.verdict} | {longer} | {decisions.verdict} |"
-        assert line in page, f"docs/edges.md: put in\n{line}"
+        assert line in page, f"research/notebooks/edges.md: put in\n{line}"
 
 
 def test_the_tables_of_equal_treatment() -> None:
     page = PAGE.read_text(encoding="utf-8")
     for line in equal_treatment.lines():
-        assert line in page, f"docs/edges.md: put in\n{line}"
+        assert line in page, f"research/notebooks/edges.md: put in\n{line}"
 
 
 EVALUATED_AS = (
@@ -113,7 +117,9 @@ def test_tables_with_a_column_for_each_evaluation(name: str, capsys) -> None:
     rows = [label.removesuffix(", neither") for label in success if label.endswith(", neither")]
     for row in rows:
         line = " | ".join([row, *(success[f"{row}, {how}"] for how in EVALUATED_AS)])
-        assert f"| {line} |" in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
+        assert f"| {line} |" in PAGE.read_text(encoding="utf-8"), (
+            f"research/notebooks/edges.md: {line}"
+        )
 
 
 def test_the_table_of_classes_of_edges(capsys) -> None:
@@ -121,7 +127,9 @@ def test_the_table_of_classes_of_edges(capsys) -> None:
     for line in print_table("edges-classes", columns, capsys).splitlines()[2:]:
         label, _, *values = line[2:-2].split(" | ")
         row = " | ".join([label.removeprefix("default, "), *values])
-        assert f"| {row} |" in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {row}"
+        assert f"| {row} |" in PAGE.read_text(encoding="utf-8"), (
+            f"research/notebooks/edges.md: {row}"
+        )
 
 
 def test_the_tables_of_broken_hierarchies(capsys) -> None:
@@ -138,7 +146,7 @@ def test_the_tables_of_broken_hierarchies(capsys) -> None:
             rows.append([f"{trained}, {read}", *lost])
         for row in rows:
             line = f"| {' | '.join(row)} |"
-            assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
+            assert line in PAGE.read_text(encoding="utf-8"), f"research/notebooks/edges.md: {line}"
 
 
 @pytest.mark.parametrize(
@@ -162,7 +170,7 @@ def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
             rates = f"{format_number(min(rates))} to {format_number(max(rates))}"
             cells = task, learner, orders, str(group.table[0].seeds), rates, ends, verdict
             line = f"| {' | '.join(cells)} |"
-            assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
+            assert line in PAGE.read_text(encoding="utf-8"), f"research/notebooks/edges.md: {line}"
 
 
 def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
@@ -176,15 +184,15 @@ def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
         heard = sum(abs(int(a) - int(b)) == 1 for a, b in pairwise(order))
         rates = [format_estimate(line.estimates["evaluation success"]) for line in (own, other)]
         line = f"| {' '.join(order)} | {heard} | {' | '.join(rates)} |"
-        assert line in PAGE.read_text(encoding="utf-8"), f"docs/edges.md: {line}"
+        assert line in PAGE.read_text(encoding="utf-8"), f"research/notebooks/edges.md: {line}"
 
 
 @pytest.mark.slow
 def test_kept_teams_are_evaluated_again_as_it_says(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
-    studies = PAGE.with_name("studies.md").read_text(encoding="utf-8")
-    topologies = PAGE.with_name("topologies.md").read_text(encoding="utf-8")
-    pages = topologies + studies.replace("out/mine", "out/kept")
+    running = (DOCS / "running.md").read_text(encoding="utf-8")
+    communication = (DOCS / "communication.md").read_text(encoding="utf-8")
+    pages = communication + running.replace("out/mine", "out/kept")
     blocks = re.findall(r"```python\n(.*?)```", pages, re.DOTALL)
     (again,) = [block for block in blocks if "na.reevaluate" in block]
     (acting,) = [block for block in blocks if "study.team" in block]

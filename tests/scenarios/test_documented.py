@@ -13,8 +13,8 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-TEXT = (DOCS / "worlds.md").read_text(encoding="utf-8")
-PAGES = TEXT + (DOCS / "environments.md").read_text(encoding="utf-8")
+TEXT = (DOCS / "environments" / "box_pushing.md").read_text(encoding="utf-8")
+PAGES = TEXT + (DOCS / "environments" / "gymnasium_pettingzoo.md").read_text(encoding="utf-8")
 TUTORIAL = (DOCS / "tutorials" / "scenario.md").read_text(encoding="utf-8")
 
 

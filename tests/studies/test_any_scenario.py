@@ -234,10 +234,10 @@ def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
 
 
 HALVES = {
-    "Plain": "Plain lacks step",
+    "Plain": "Plain must inherit nested_agents.Scenario",
     "Empty": "Empty lacks agents, state_space, action_set",
-    "Gym": "step; a spec names it by scenario.id, with scenario.kind = 'gymnasium'",
-    "Zoo": "step; a spec names it by scenario.id, with scenario.kind = 'pettingzoo'",
+    "Gym": "Scenario; a spec names it by scenario.id, with scenario.kind = 'gymnasium'",
+    "Zoo": "Scenario; a spec names it by scenario.id, with scenario.kind = 'pettingzoo'",
     "Hollow": "raises AttributeError: 'int' object has no attribute",
 }
 """What is said of scenarios that lack something."""

@@ -1,4 +1,4 @@
-"""docs/faults.md holds what the committed returns of the broken joint give."""
+"""research/notebooks/faults.md holds what the committed returns of the broken joint give."""
 
 import json
 import re
@@ -11,7 +11,7 @@ JOINTS = ("back foot", "back thigh", "fore foot", "fore thigh")
 
 
 def test_a_broken_joint() -> None:
-    page = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
+    page = (ROOT / "research" / "notebooks" / "faults.md").read_text(encoding="utf-8")
     rows = json.loads((ROOT / "examples" / "broken_joint.json").read_text(encoding="utf-8"))
     returns = {
         row["name"]: {way: np.array(row[way]) / 1000 for way in row if way[-1] == "y"}

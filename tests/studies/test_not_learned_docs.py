@@ -1,4 +1,4 @@
-"""docs/not_learned.md: its tables are of committed results, its example and specs run."""
+"""docs/troubleshooting.md: its tables are of committed results, its example and specs run."""
 
 import csv
 import re
@@ -14,7 +14,7 @@ from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
-PAGE = (ROOT / "docs" / "not_learned.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
 COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
 RESULTS = ("pursuit_steps", "pursuit_frozen", "pursuit_tuned", "pursuit_tuned_as_written")
 
@@ -24,7 +24,7 @@ def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(EXAMPLES / f"{name}.json")
     assert main(["table", path, "--columns", *COLUMNS, "--format", "markdown"]) == 0
     rows = capsys.readouterr().out.splitlines()
-    assert all(row in PAGE for row in rows[2:]), f"docs/not_learned.md: put in\n{rows}"
+    assert all(row in PAGE for row in rows[2:]), f"docs/troubleshooting.md: put in\n{rows}"
 
 
 def test_the_results_are_of_the_specs() -> None:

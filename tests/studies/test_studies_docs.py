@@ -1,4 +1,4 @@
-"""docs/studies.md says what is so."""
+"""docs/specs.md says what is so."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ from nested_agents.studies.spec.studies import STUDIES
 from nested_agents.studies.trials.arrangement import check_conditions
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "specs.md").read_text(encoding="utf-8")
 
 
 def blocks(language: str) -> list[str]:

@@ -23,7 +23,13 @@ MUTE = """
 import numpy as np
 import nested_agents as na
 
-class Mute:
+class Mute(na.Scenario):
+    class Settings(na.ScenarioSettings):
+        pass
+
+    def __init__(self, settings):
+        pass
+
     measures = (na.SUCCESS,)
     agents = ("one", "two")
     action_set = na.ActionSet()

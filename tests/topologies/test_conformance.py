@@ -15,10 +15,10 @@ from pydantic import TypeAdapter
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import DecisionSettings
-from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.td import TDLambdaSettings
+from nested_agents.core.search.evaluator import DecisionContext
+from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.core.values.rule_base import RuleBaseSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.topologies import TOPOLOGIES, Topology, build
@@ -131,7 +131,7 @@ def decided_values(team: Team, theta: np.ndarray, prediction) -> np.ndarray:
     neutral = np.full(n, team.action_set.neutral)
     known = prediction, theta, np.full((n, 4), 0.25), np.random.default_rng(0)
     return np.array(
-        [fuzzy(team).evaluator.values(Deliberation(i, neutral, *known)) for i in range(n)]
+        [fuzzy(team).evaluator.values(DecisionContext(i, neutral, *known)) for i in range(n)]
     )
 
 

@@ -16,7 +16,7 @@ import nested_agents as na
 ANSWERS = ("yes", "no")
 
 
-class Debate:
+class Debate(na.Scenario):
     """A question, drafts of its answer that may be wrong, and rounds of answers.
 
     An agent is paid 1 in every round in which it is right.

@@ -36,7 +36,7 @@ from matplotlib.path import Path as Curve
 from matplotlib.transforms import Affine2D
 
 from ....core.numerics import BoolArray, FloatArray
-from ...movies import DPI, Pixels, Scene, film
+from ...movies import Pixels, Scene, film, save_picture
 from ..world.boxes import BoxSpec, box_for
 from ..world.geometry import infrared_readings
 from ..world.robots import robot_for, sensor_directions
@@ -232,7 +232,7 @@ def snapshot(recording: Recording, step: int, path: Path, *, sensors: bool = Fal
     """Draw the moment after `step` steps (negative: from the end) to a picture file."""
     scene = _BoxScene(recording, sensors=sensors)
     scene.draw(range(len(recording["box_pose"]))[step])
-    scene.figure.savefig(path, dpi=DPI)
+    save_picture(scene.figure, path)
 
 
 def animate(recording: Recording, path: Path, speed: float = 4.0, *, sensors: bool = False) -> None:

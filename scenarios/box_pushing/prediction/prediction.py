@@ -9,22 +9,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from math import pi
 from typing import ClassVar
 
 import numpy as np
 
-from ....core.evaluators.best_response import RespondingPrediction, Responses, Search
 from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
+from ....core.search.best_response import RespondingPrediction, Responses, Search
 from ....core.values.rule_base import RuleBase
 from ..states.situations import SituationBatch
 from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
 from ..world.geometry import BoxShape
 from ..world.settings import InfraredSettings, Task, reward
-from .push import PushBelief, PushModel, outcomes, push
+from .push import PushBelief, PushModel, mean_twists, outcomes, push
 from .responses import Outlook, respond
 from .wheel_commands import (
     WheelCommands,
@@ -331,19 +330,3 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         distance, approach, turn = progress_of(batch)
         gained = reward(self.premises.task, distance, -approach, turn, contact, readings)
         return gained.mean(axis=1)
-
-
-def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:
-    """Return the constant twists ``(M, 3)``, own frame, between poses ``(M, 3)``.
-
-    Headings count whole turns. Of arcs beyond half a turn the speed is too small, as their chords
-    tell ever less of it.
-    """
-    turn = after[:, 2] - before[:, 2]
-    heading = before[:, 2] + 0.5 * turn
-    # The chord of an arc is shorter than the arc by the sinc of half its angle.
-    shorter = np.maximum(np.sinc(0.5 * turn / pi), 2.0 / pi)
-    x, y = ((after - before)[:, :2] / shorter[:, None]).T
-    cos = np.cos(heading)
-    sin = np.sin(heading)
-    return np.stack([cos * x + sin * y, cos * y - sin * x, turn], axis=1) / seconds

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.evaluators.drawing import draw, explored
 from ....core.interface.prediction import Exploring
 from ....core.numerics import FloatArray, IntArray, njit
+from ....core.search.drawing import draw, explored
 from ....core.values.triangular import summed_values
 from ..states.situations import SituationBatch
 from ..states.variables import evaluate

@@ -1,199 +1,37 @@
-"""Boxes, which are pushed over the ground.
+"""Boxes that robots push over the ground.
 
-Box2D takes convex polygons of at most 8 vertices and silently gets others wrong, so that any simple
-polygon, concave or with holes, goes through here first: it is checked, centred on its centre of
-mass and cut into convex pieces. The frame of a box has its centre of mass at the origin and its
-back, where robots start in the easier start distributions, towards -x. Its weight rests on the
-ground as a distributed friction, stood for by four points, so that sliding and turning share one
-friction budget as they do for a real box. A further box, concave or with holes, is one `BoxSpec`
-and one line in `BOXES`; a spec may also describe one by its vertices.
+A box is a polygon, see `polygons`, or a disc. The frame of a box has its center of mass at the
+origin and its back, where robots start in the easier start distributions, towards -x. Its weight
+rests on the ground as a distributed friction, represented by four points, so that sliding and
+turning share one friction budget as they do for a real box. A further box is one `BoxSpec` and one
+line in `BOXES`; a spec may also describe one by its vertices.
 
 Units are those of the caller as long as they are consistent.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from heapq import heapify, heappop, heappush
-from itertools import combinations
 from math import cos, pi, sin, sqrt
 
 import numpy as np
-import shapely
 from shapely.affinity import translate
-from shapely.geometry import Polygon
-from shapely.geometry.polygon import orient
-from shapely.validation import explain_validity
+from shapely.geometry import Point, Polygon
 
-from ....core.numerics import FloatArray, nx
+from ....core.numerics import FloatArray
 from ....core.plugins.words import closest
-from .geometry import BoxShape, Moments, Outline, moments, ring_edges
+from .geometry import BoxShape, Moments, Outline, moments
+from .polygons import (
+    LEAST_PIECE,
+    Vertices,
+    box2d_area,
+    centred_polygon,
+    convex_pieces,
+    nearby_origin,
+    polygon_edges,
+)
 from .settings import GRAVITY, BoxSettings
-
-Vertices = Sequence[tuple[float, float]]
-
-UNIT = 10.0
-"""Box2D units per metre."""
-MAX_VERTICES = 8
-"""Maximum number of vertices of a convex piece in Box2D, b2_maxPolygonVertices."""
-MOST_VERTICES = 1000
-"""Maximum number of vertices of an outline and its holes."""
-LEAST_EDGE = 1e-6
-"""Shortest edge [m]."""
-LEAST_PIECE = 1.1921e-9
-"""Smallest area of a convex piece [m2]: Box2D takes none below the epsilon of single precision."""
-LARGEST = 100.0
-"""Maximum distance between two vertices [m]."""
-FAR = 10.0
-"""Distance from the origin, in lengths of a polygon, beyond which its vertices are taken relative
-to its first one: moments about a far origin lose all digits."""
-RESOLUTION = 1e-7
-"""Coarsest spacing of floating-point coordinates, in lengths of a polygon."""
-STRAIGHT = 1e-9
-"""Sine of the angle between edges that counts as straight on."""
-
-
-def polygon_edges(polygon: Polygon) -> FloatArray:
-    """Return the edges ``(n, 4)`` of an oriented polygon and its holes, material on the left."""
-    rings = [polygon.exterior, *polygon.interiors]
-    return np.vstack([ring_edges(np.asarray(ring.coords)[:-1]) for ring in rings])
-
-
-def centre(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Polygon:
-    """Return a checked polygon, counter-clockwise, with its centre of mass at the origin.
-
-    A clockwise outline is turned around with a warning.
-
-    Raises
-    ------
-    ValueError
-        If the polygon has more than `MOST_VERTICES`, is too large, has two vertices at one place,
-        crosses or touches itself, has no area, or a vertex is not finite or too far away for its
-        floating-point coordinates. Fewer than 3 vertices are refused by `BoxSettings`.
-    """
-    for ring in (vertices, *holes):
-        _check_ring(f"box {name!r}", ring)
-    if (count := sum(map(len, (vertices, *holes)))) > MOST_VERTICES:
-        raise ValueError(f"box {name!r}: {count} vertices, allowed: {MOST_VERTICES} or fewer")
-    polygon = Polygon(vertices, holes)
-    if not polygon.is_valid:
-        raise ValueError(f"box {name!r}: not a simple polygon: {explain_validity(polygon)}")
-    polygon = translate(polygon, *-nearby_origin(vertices))
-    if not polygon.area > 1e-6 * polygon.length**2:
-        raise ValueError(
-            f"box {name!r}: area {polygon.area:.3g} m2 within {polygon.length:.3g} m of outline, "
-            "degenerate"
-        )
-    if not polygon.exterior.is_ccw:
-        warnings.warn(f"box {name!r}: clockwise outline turned around", stacklevel=2)
-    polygon = orient(polygon)
-    whole = moments(polygon_edges(polygon))
-    return translate(polygon, *(-whole.first / whole.area))
-
-
-def nearby_origin(vertices: Vertices) -> FloatArray:
-    """Return the point ``(2,)`` that vertices are taken relative to: the first if all are far."""
-    ring = np.asarray(vertices, dtype=float)
-    is_far = np.abs(ring).max() > FAR * np.ptp(ring, axis=0).max()
-    return ring[0] if is_far else np.zeros(2)
-
-
-def _check_ring(box: str, vertices: Vertices) -> None:
-    """Refuse an outline that no body can have."""
-    ring = np.asarray(vertices, dtype=float)
-    if not np.isfinite(ring).all():
-        raise ValueError(f"{box}: a vertex that is not finite, allowed: numbers in metres")
-    # Halved before they are subtracted: the difference of two numbers may overflow.
-    extent = 2 * float(np.ptp(ring / 2, axis=0).max())
-    if extent > LARGEST:
-        raise ValueError(f"{box}: is {extent:.3g} m long, allowed: up to {LARGEST:g} m")
-    spacing = float(np.spacing(np.abs(ring).max()))
-    if spacing > RESOLUTION * extent > 0:
-        raise ValueError(
-            f"{box}: coordinates of {np.abs(ring).max():.3g} m are {spacing:.2g} m apart, too "
-            f"coarse for {extent:.3g} m of outline, allowed: coordinates from a point nearby"
-        )
-    edges = np.roll(ring, -1, axis=0) - ring
-    short = np.flatnonzero(np.hypot(edges[:, 0], edges[:, 1]) < LEAST_EDGE)
-    if len(short):
-        first = short[0] + 1
-        second = (short[0] + 1) % len(ring) + 1
-        raise ValueError(
-            f"{box}: vertices {first} and {second} are at the same place {vertices[short[0]]}, "
-            "allowed: each once, the first not again at the end"
-        )
-
-
-def _merge(first: FloatArray, second: FloatArray) -> FloatArray | None:
-    """Return the union of two convex rings that share an edge, or None unless it is convex."""
-    union = shapely.union(Polygon(first), Polygon(second))
-    if not isinstance(union, Polygon) or union.interiors:
-        return None
-    ring = np.asarray(orient(union).exterior.coords)[:-1]
-    ring = ring[np.abs(_turns(ring)) > STRAIGHT]
-    return ring if len(ring) <= MAX_VERTICES and (_turns(ring) > 0).all() else None
-
-
-def _turns(ring: FloatArray) -> FloatArray:
-    """Return the sine of the turn at every vertex of a ring ``(n, 2)``."""
-    into = ring - np.roll(ring, 1, axis=0)
-    out = np.roll(ring, -1, axis=0) - ring
-    cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
-    return cross / (np.linalg.norm(into, axis=1) * np.linalg.norm(out, axis=1))
-
-
-def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
-    """Return convex counter-clockwise pieces ``(<= 8, 2)`` that together are the polygon.
-
-    Constrained Delaunay triangles, merged greedily as long as the union of two is convex: always
-    the first two in their order. A graph of neighbors keeps the time nearly linear in
-    the number of vertices.
-    """
-    ring = np.asarray(polygon.exterior.coords)[:-1]
-    if not polygon.interiors and len(ring) <= MAX_VERTICES and (_turns(ring) > 0).all():
-        return (ring,)
-    triangles = shapely.constrained_delaunay_triangles(polygon).geoms
-    rings = [np.asarray(orient(t).exterior.coords)[:-1] for t in triangles if t.area > 0]
-    pieces = dict(enumerate(rings))
-    graph = _neighbours(rings)
-    pairs = [(min(edge), max(edge)) for edge in graph.edges]
-    heapify(pairs)
-    while pairs:
-        i, j = heappop(pairs)
-        if not graph.has_edge(i, j):  # one of the two was merged
-            continue
-        shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
-        union = _merge(pieces[i], pieces[j]) if len(shared) >= 2 else None
-        if union is None:
-            continue
-        pieces[i] = union
-        del pieces[j]
-        nx.contracted_nodes(graph, i, j, self_loops=False, copy=False)
-        for other in graph[i]:
-            heappush(pairs, (min(i, other), max(i, other)))
-    return tuple(pieces.values())
-
-
-def box2d_area(piece: FloatArray) -> float:
-    """Return the area of a piece ``(n, 2)`` as Box2D computes it, in single precision [m2]."""
-    x, y = (piece * UNIT).astype(np.float32).T
-    return float(sum(x * np.roll(y, -1) - y * np.roll(x, -1), np.float32(0))) / 2 / UNIT**2
-
-
-def _neighbours(rings: Sequence[FloatArray]) -> nx.Graph:
-    """Return the graph that joins rings, by index, which have an edge in common."""
-    by_edge: dict[frozenset[tuple[float, ...]], list[int]] = {}
-    for index, ring in enumerate(rings):
-        points = [tuple(point) for point in ring.tolist()]
-        for edge in zip(points, [*points[1:], points[0]], strict=True):
-            by_edge.setdefault(frozenset(edge), []).append(index)
-    graph = nx.empty_graph(len(rings))
-    graph.add_edges_from(pair for both in by_edge.values() for pair in combinations(both, 2))
-    return graph
-
 
 AREA = 0.04
 """Area of every named box: that of a square of 20 cm [m2]."""
@@ -225,6 +63,9 @@ class BoxSpec:
     """Outlines of holes [m]."""
     radius: float = 0.0
     """Radius of a disc [m]; 0 for a polygon."""
+    center_of_mass: tuple[float, float] | None = None
+    """Center of mass of a polygon in the coordinates of its vertices [m]; None for its centroid.
+    Mass and ground friction are distributed around it as in a uniform box around its centroid."""
     mass: float = 0.4
     """Mass [kg]."""
     friction: float = 0.2
@@ -240,9 +81,26 @@ class BoxSpec:
         _ = self.polygon  # what cannot be one is refused at once
 
     @cached_property
+    def _centred(self) -> tuple[Polygon, FloatArray]:
+        """The polygon around its centroid, and the center of mass ``(2,)`` in its frame."""
+        polygon, centroid = centred_polygon(self.name, self.vertices, self.holes)
+        if self.center_of_mass is None:
+            return polygon, np.zeros(2)
+        center = np.array(self.center_of_mass) - centroid
+        if not polygon.convex_hull.contains(Point(center)):
+            raise ValueError(
+                f"box {self.name!r}: center_of_mass = {self.center_of_mass}, must be within its "
+                "outline, or the box would tip over"
+            )
+        return polygon, center
+
+    @cached_property
     def polygon(self) -> Polygon | None:
-        """The centred polygon; None for a disc."""
-        return centre(self.name, self.vertices, self.holes) if self.vertices else None
+        """The polygon in the frame of the box; None for a disc."""
+        if not self.vertices:
+            return None
+        polygon, center = self._centred
+        return translate(polygon, *-center)
 
     @cached_property
     def rings(self) -> list[FloatArray]:
@@ -279,12 +137,12 @@ class BoxSpec:
 
     @cached_property
     def moments(self) -> Moments:
-        """Moments of the area."""
+        """Moments of the area about its centroid."""
         if self.polygon is None:
             area = pi * self.radius**2
             quarter = pi * self.radius**4 / 4
             return Moments(area, np.zeros(2), quarter * np.eye(2), area * self.radius * 2 / 3)
-        return moments(self.outline.edges)
+        return moments(polygon_edges(self._centred[0]))
 
     @property
     def area(self) -> float:
@@ -293,7 +151,7 @@ class BoxSpec:
 
     @property
     def inertia(self) -> float:
-        """Moment of inertia about the centre of mass [kg m2]."""
+        """Moment of inertia about the center of mass [kg m2]."""
         return float(self.mass * np.trace(self.moments.second) / self.area)
 
     @cached_property
@@ -342,14 +200,16 @@ class BoxSpec:
         """Return the box with mass and lengths, or those that grow, multiplied by `factor`."""
         along = 1.0 if self.grows == "width" else factor
         x0, y0 = nearby_origin(self.vertices) if self.vertices else (0.0, 0.0)
-        outline, *holes = [
-            tuple((along * (x - x0), factor * (y - y0)) for x, y in ring)
-            for ring in (self.vertices, *self.holes)
+        centers: Vertices = () if self.center_of_mass is None else (self.center_of_mass,)
+        outline, centers, *holes = [
+            tuple((along * (x - x0), factor * (y - y0)) for x, y in points)
+            for points in (self.vertices, centers, *self.holes)
         ]
         return replace(
             self,
             vertices=outline,
             holes=tuple(holes),
+            center_of_mass=centers[0] if centers else None,
             radius=along * self.radius,
             mass=factor * self.mass,
         )

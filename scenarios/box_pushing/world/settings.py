@@ -17,10 +17,11 @@ c1, the value of R1 there (`RewardSettings.pays_at_goal`).
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, Self, Union, get_args
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ....core.numerics import BoolArray, FloatArray, njit
-from ....core.plugins.settings import Names, NonNegative, Positive, Settings, unwritten
+from ....core.plugins.settings import Names, NonNegative, Positive, Settings
+from ....core.plugins.sources import active
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
 
 GRAVITY = 9.81
@@ -85,15 +86,47 @@ else:
 """Any failure's settings, distinguished by `kind`."""
 
 
-Vertices = Annotated[tuple[tuple[float, float], ...], Field(min_length=3)]
+def read_points(value: object) -> object:
+    """Return the points ``((x, y), ...)`` [m] of a CSV file if the value is its path.
+
+    The path is relative to the spec. The first line may name the columns.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, or a line is not two numbers; one line with file and line.
+    """
+    if not isinstance(value, str):
+        return value
+    points = []
+    for number, line in enumerate(active().text(value).splitlines(), 1):
+        cells = [cell.strip() for cell in line.split(",")]
+        is_header = number == 1 and not any(map(_is_number, cells))
+        if not line.strip() or is_header:
+            continue
+        if len(cells) != 2 or not all(map(_is_number, cells)):
+            raise ValueError(f"{value}:{number}: {line!r}, must be two numbers x,y in meters")
+        points.append((float(cells[0]), float(cells[1])))
+    return tuple(points)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+Vertices = Annotated[
+    tuple[tuple[float, float], ...], Field(min_length=3), BeforeValidator(read_points)
+]
 
 
 class Described(Settings):
     """User-defined object, described by a table that may give it a name."""
 
-    name: Annotated[
-        Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None, unwritten(None)
-    ] = None
+    name: Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = None
     """Name in labels; nothing else depends on it."""
 
 
@@ -101,9 +134,13 @@ class BoxSettings(Described):
     """User-defined box: ``box = { vertices = [[0, 0], [0.2, 0], [0.2, 0.1]] }``."""
 
     vertices: Vertices
-    """Outline, counter-clockwise [m]; concave outlines are allowed."""
+    """Outline, counter-clockwise [m]: a list of points, or the path of a CSV file with columns x
+    and y, relative to the spec. Concave outlines are allowed."""
     holes: tuple[Vertices, ...] = ()
-    """Outlines of holes [m]."""
+    """Outlines of holes [m], as `vertices`."""
+    center_of_mass: tuple[float, float] | None = None
+    """Center of mass in the coordinates of the vertices [m]; none: that of a uniform box. Mass and
+    ground friction are spread around it as in a uniform box around its center."""
     mass: Quantity = 0.4
     """Mass of the box [kg]."""
     friction: Coefficient = 0.2

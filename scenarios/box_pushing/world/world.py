@@ -3,9 +3,7 @@
 The rest of the package speaks SI; Box2D wants bodies of 0.1 to 10 units, so that this module and
 `stepping`, and nothing else, talk to it in decimetres. A control period is a whole number of
 physics steps: forces of all wheels, and one step of Box2D. All steps of a decision are one compiled
-call, see `stepping`. Where that cannot be, the same is done from Python, by the functions of SWIG's
-flat interface on the bare handles (`.this`), which is more than 10 times faster than the same
-methods of the Python classes.
+call, see `stepping`. Where that is not possible, the same is done from Python.
 
 Box2D keeps impulses from step to step to start its solver from ("warm starting"); that is switched
 off, so that the future depends on poses and velocities alone and a saved world can be restored.
@@ -20,16 +18,16 @@ failure are described in `nested_agents.scenarios.faults.settings`.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, SupportsInt
+from typing import NamedTuple
 
 import Box2D
 import numpy as np
-from Box2D import _Box2D
 
 from ....core.numerics import BoolArray, FloatArray, IntArray
 from ...faults.settings import Failures, FailureSettings, Free
-from .boxes import UNIT, BoxSpec
+from .boxes import BoxSpec
 from .geometry import gaps, infrared_readings
+from .polygons import UNIT
 from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
 from .stepping import (
@@ -47,15 +45,6 @@ SKIN = 0.005
 """Rounding of polygons in Box2D [dm]; its default is twice that."""
 SUBSTEPS = 4
 """Physics steps of a control period."""
-
-# SWIG's flat interface.
-get_x = _Box2D.b2Vec2_x_get
-get_y = _Box2D.b2Vec2_y_get
-get_angle = _Box2D.b2Body___GetAngle
-get_omega = _Box2D.b2Body___GetAngularVelocity
-push = _Box2D.b2Body_ApplyForceToCenter
-twist = _Box2D.b2Body_ApplyTorque
-step = _Box2D.b2World_Step
 
 
 class WorldState(NamedTuple):
@@ -191,12 +180,10 @@ class World:
             # Box2D frees bodies with their world, and access to a freed body crashes Python.
             # Therefore each body keeps its world alive.
             body.world_kept = self._world
-        self._handles = [_handles(body) for body in (self._box, *self._bodies)]
-        self._addresses: IntArray = np.array([int(body) for body, _, _ in self._handles])
+        everything = (self._box, *self._bodies)
+        self._addresses: IntArray = np.array([int(body.this) for body in everything])
         self._last = state.last.copy()
         self._wrenches = state.wrenches.copy()
-        self._motion: FloatArray = np.empty((len(self.robots), 4))
-        self._motion_flat = self._motion.reshape(-1)
         self._observe()
         self.contact_time = state.contact_time.copy()
 
@@ -295,9 +282,9 @@ class World:
     @property
     def twists(self) -> FloatArray:
         """Velocities (vx, vy, omega) of the box and the robots ``(M + 1, 3)``, world frame."""
-        return np.array(
-            [(get_x(v) / UNIT, get_y(v) / UNIT, get_omega(body)) for body, _, v in self._handles]
-        )
+        bodies = (self._box, *self._bodies)
+        velocities = [(*body.linearVelocity, body.angularVelocity) for body in bodies]
+        return np.array(velocities) / (UNIT, UNIT, 1.0)
 
     def infrared(self) -> FloatArray:
         """Return the noise-free readings of the infrared sensors ``(2, M, S)``.
@@ -319,27 +306,21 @@ class World:
         )
 
     def _step(self, speeds: FloatArray) -> None:
-        """Advance by one physics step; the inner loop."""
-        motion: list[float] = []
-        for body, _, velocity in self._handles[1:]:
-            motion += (get_angle(body), get_x(velocity), get_y(velocity), get_omega(body))
-        self._motion_flat[:] = motion
-        wheel_wrenches(self._motion, speeds, self.dt, self._wheels, self._last, self._wrenches)
-        wrenches = self._wrenches.tolist()
-        for (body, _, _), (fx, fy, torque) in zip(self._handles[1:], wrenches, strict=True):
-            push(body, (fx, fy), True)
-            twist(body, torque, True)
-        step(self._world.this, self.dt, VELOCITY_ITERATIONS, POSITION_ITERATIONS)
+        """Advance by one physics step."""
+        motion = np.array(
+            [(body.angle, *body.linearVelocity, body.angularVelocity) for body in self._bodies]
+        )
+        wheel_wrenches(motion, speeds, self.dt, self._wheels, self._last, self._wrenches)
+        for body, (fx, fy, torque) in zip(self._bodies, self._wrenches.tolist(), strict=True):
+            body.ApplyForceToCenter((fx, fy), True)
+            body.ApplyTorque(torque, True)
+        self._world.Step(self.dt, VELOCITY_ITERATIONS, POSITION_ITERATIONS)
 
     def _observe(self) -> None:
         """Read poses and find contacts."""
         outline = self.box.outline
-        poses = np.array(
-            [
-                (get_x(position) / UNIT, get_y(position) / UNIT, get_angle(body))
-                for body, position, _ in self._handles
-            ]
-        )
+        poses = np.array([(*body.position, body.angle) for body in (self._box, *self._bodies)])
+        poses /= UNIT, UNIT, 1.0
         self.gaps = gaps(poses[1:], poses[:1], outline.edges, outline.rounding, self._radii)
         self._know(poses)
 
@@ -370,11 +351,6 @@ class World:
                 maxTorque=0.0,
                 collideConnected=True,
             )
-
-
-def _handles(body: Box2D.b2Body) -> tuple[SupportsInt, object, object]:
-    """Return the bare handles of a body, its position and its velocity; all show the present."""
-    return body.this, body.position.this, body.linearVelocity.this
 
 
 class WheelFailures(Failures[FailureSettings]):

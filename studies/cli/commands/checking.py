@@ -16,7 +16,7 @@ from ..display import print_text, print_wrapped
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from ....core.adaptation.predictors import LearnedPredictorSettings
+    from ....core.models.predictors import LearnedPredictorSettings
     from ....core.plugins.settings import ScenarioSettings
     from ...trials.trial import Trial
 
@@ -116,8 +116,8 @@ def _learned_errors(
 
 def _learned_predictor(trial: Trial) -> LearnedPredictorSettings | None:
     """Return the settings of the learned predictor of a trial; None without one."""
-    from ....core.adaptation.predictors import LearnedPredictorSettings
     from ....core.learners import LearnerSettings
+    from ....core.models.predictors import LearnedPredictorSettings
 
     learner = trial.settings.learner
     if not isinstance(learner, LearnerSettings):
@@ -154,7 +154,7 @@ def _factory_of(source: str) -> Callable[[], object]:
 
 def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCase]:
     """Yield the distinct scenarios of the conditions of a spec."""
-    from ....core.interface.plain import as_scenario
+    from ....core.interface.scenario import checked_scenario
     from ....core.learners import check_prediction
     from ...spec.spec import Spec
 
@@ -162,7 +162,7 @@ def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCa
     for condition in Spec.load(Path(source), changes).conditions():
         settings = condition.settings.scenario
         with refused():
-            check_prediction(condition.settings.learner, as_scenario(settings.build()))
+            check_prediction(condition.settings.learner, checked_scenario(settings.build()))
         if settings not in checked:
             checked.add(settings)
             episodes = sorted({0, *(begin for begin, _ in settings.failure_spans)})

@@ -36,10 +36,10 @@ def presets(name: str | None) -> int:
         for key, preset in PRESETS.items():
             print_wrapped(preset.summary, f"{key:<{left}}", left)
         return 0
-    from ...spec.layers import resolve
+    from ...spec.resolution import resolve
     from ...spec.tables import dumps
 
-    settings = resolve(name, {}, {}).settings
+    settings = resolve(name, {})
     if defaults := settings.scenario.scenario_defaults(name):
         print_text("# Changes of the preset by this scenario:")
         print_text(*(f"# {line}" for line in dumps(defaults).splitlines() if line), "")
@@ -79,20 +79,18 @@ def keys(prefix: str | None) -> int:
 
 
 @click.command()
-@click.argument("kind", metavar="[KIND]", default="spec")
-@options.out("Where to write; by default it is printed.", "FILE.json")
-def schema(kind: str, out: Path | None) -> int:
-    """Write the JSON schema of specs: what editors complete and check, with its meaning.
+@options.out("File to write; by default the schema is printed.", "FILE.json")
+def schema(out: Path | None) -> int:
+    """Write the JSON schema of specs, with which editors complete and check keys.
 
-    KIND is spec, a table such as learner, or one kind of it, such as scenario.box-pushing. An
-    editor that knows TOML reads it if a spec begins with the line #:schema FILE.json.
+    An editor that knows TOML reads the schema if a spec begins with the line #:schema FILE.json.
     """
     import json
 
     from ...spec.schema import schema as schema_of
     from ...store import durable
 
-    text = json.dumps(schema_of(kind), indent=1) + "\n"
+    text = json.dumps(schema_of(), indent=1) + "\n"
     if out is None:
         print_data(text)
         return 0

@@ -1,13 +1,20 @@
 """The command that answers which hierarchy scales, how far, and at which cost."""
 
+from __future__ import annotations
+
+import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ...errors import refused
 from .. import options
-from ..display import Form, in_form, print_data, print_table, print_text
+from ..display import Form, in_form, print_data, print_lines, print_table, print_text
 from ..loading import read_results, say_remarks
+
+if TYPE_CHECKING:
+    from ...api.study import StudyResults
 
 
 @click.command()
@@ -37,6 +44,20 @@ from ..loading import read_results, say_remarks
     metavar="LIMITS",
     help='Find the best hierarchy within limits, as "messages <= 50, decision_ms <= 100".',
 )
+@click.option(
+    "--predict",
+    type=click.IntRange(1),
+    multiple=True,
+    metavar="N...",
+    help="Write predictions for sizes that were not run to the file of --out, with 90% intervals.",
+)
+@options.out("Prediction file to write.", metavar="FILE.json")
+@click.option(
+    "--check",
+    type=options.PATH,
+    metavar="FILE.json",
+    help="Compare the predictions of a file with these results: which of them held.",
+)
 @options.columns
 @options.plot
 @options.where
@@ -45,6 +66,9 @@ from ..loading import read_results, say_remarks
 def scalability(
     sources: tuple[Path, ...],
     measure: str | None,
+    predict: tuple[int, ...],
+    out: Path | None,
+    check: Path | None,
     columns: tuple[str, ...],
     plot: Path | None,
     where: str | None,
@@ -61,6 +85,13 @@ def scalability(
     """
     loaded = read_results(sources, where=where, trust=trust, columns=columns)
     say_remarks(loaded)
+    if predict or check is not None:
+        if check is not None:
+            return _check(loaded, check, form)
+        if out is None:
+            raise click.UsageError("--predict: needs --out FILE.json")
+        print_text(*loaded.predict_sizes(predict, out, measure, size=choices["size"]))  # type: ignore[arg-type]
+        return 0
     report = loaded.scalability(measure, **choices)  # type: ignore[arg-type]
     if plot is not None:
         from ...presentation.figures import write
@@ -78,4 +109,17 @@ def scalability(
         if report.analysis.laws:
             print_table(report.laws, ())
         print_text(*report.notes)
+    return 0
+
+
+def _check(loaded: StudyResults, file: Path, form: Form) -> int:
+    """Print which predictions of a file held."""
+    checked = loaded.check_prediction(file)
+    if form == "json":
+        print_data(json.dumps(checked.to_dict(), indent=1))
+    elif form != "table":
+        print_data(in_form(checked.table, form))
+    else:
+        print_table(checked.table, ())
+        print_lines(checked.sentences)
     return 0

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 from acting import fuzzy
 
-from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.joint import Granularity, JointPrediction, join_agents
 from nested_agents.core.agents.loop import StepRecord, control_loop, policy_seed, world_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.exploration import BurstExploration
-from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.plain import as_prediction
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
+from nested_agents.core.models.self_model import SelfModelSettings
+from nested_agents.core.search.exploration import BurstExploration
+from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.core.values.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -372,10 +372,10 @@ def test_both_evaluators_and_a_self_model_work_on_it() -> None:
         hierarchy = build("chain", scenario.agents)
         assert hierarchy.edges == ((0, 1),)
         team = Team(learner, scenario, hierarchy, policy_seed(0))
-        nominal = fuzzy(team).foresight.self_model.effects[0].copy()
+        nominal = fuzzy(team).model.self_model.effects[0].copy()
         for record in control_loop(scenario, team, episodes=2, steps=8, seed=0):
             assert record.joint_action.shape == (2,)
-        assert (fuzzy(team).foresight.self_model.effects[0] != nominal).any()
+        assert (fuzzy(team).model.self_model.effects[0] != nominal).any()
         weights.append(fuzzy(team).learner.theta)
     assert all(np.abs(theta).sum() > 0.0 for theta in weights)
 

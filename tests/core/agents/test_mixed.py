@@ -9,8 +9,6 @@ from acting import fuzzy, look
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import DecisionSettings
-from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
 from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.hierarchy.stages import communication_levels, decision_stages
@@ -19,6 +17,8 @@ from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.fitted_q import FittedQSettings
 from nested_agents.core.learners.td import TDLambdaSettings
+from nested_agents.core.search.enumeration import ExactEnumeration, Sampling
+from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
 TD = {"kind": "td-lambda", "step_size": 0.1}
@@ -61,15 +61,15 @@ def test_parts_by_role(world) -> None:
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        ((("cart0", TD),), r"learner\.parts: nobody decides for agent 'cart1\.wheel0'"),
-        ((("*", TD), ("cart1", TD)), r"learner\.parts\[1\]\.agents = \['cart1'\]: nobody is"),
+        ((("cart0", TD),), r"learner\.parts: agent 'cart1\.wheel0' belongs to no part"),
+        ((("*", TD), ("cart1", TD)), r"learner\.parts\[1\]\.agents = \['cart1'\]: lists no agent"),
         (
             (("cart0", TD), (["cart1", "cart0.wheel1"], TD)),
-            r"learner\.parts\[1\].* agent 'cart0\.wheel1' is of learner\.parts\[0\] already; a pat",
+            r"learner\.parts\[1\].* agent 'cart0\.wheel1' belongs to learner\.parts\[0\] already",
         ),
         (
             (("cart0", {**TD, "decision": {"value_of": "below"}}), ("*", TD)),
-            r"value_of = 'below': values of 'cart1\.wheel0' are not known to 'cart0\.wheel0'",
+            r"value_of = 'below': values of 'cart1\.wheel0' are unknown to 'cart0\.wheel0'",
         ),
     ],
 )

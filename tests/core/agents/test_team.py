@@ -15,16 +15,16 @@ from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.plain import as_explorer, as_learner
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.exploration import BurstExploration
-from nested_agents.core.decision.settings import DecisionSettings
-from nested_agents.core.evaluators.enumeration import ExactEnumeration, Sampling
-from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
 from nested_agents.core.hierarchy.failures import AbsentAgents, LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Experience
 from nested_agents.core.interface.scenario import Members, carried_rows
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings
+from nested_agents.core.search.enumeration import ExactEnumeration, Sampling
+from nested_agents.core.search.evaluator import Counts, EvaluatorSettings
+from nested_agents.core.search.exploration import BurstExploration
+from nested_agents.core.search.settings import DecisionSettings
 from tests.scenarios.test_examples import Tank
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}

@@ -9,10 +9,10 @@ from acting import look
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.agents.views import agreement
-from nested_agents.core.decision.errors import Errors, ErrorSettings
-from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.search.errors import Errors, ErrorSettings
+from nested_agents.core.search.settings import DecisionSettings
 
 SEED = np.random.SeedSequence(7)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.plain import as_scenario
+from nested_agents.core.interface.scenario import checked_scenario
 from nested_agents.core.interface.stacked import LoopedEnvironments
 from nested_agents.scenarios import SCENARIOS
 
@@ -37,7 +37,7 @@ COUNT = 5
 
 def build(name):
     table = dict(TABLES[name])
-    return as_scenario(SCENARIOS.parsed(table.pop("kind"), **table).build())
+    return checked_scenario(SCENARIOS.parsed(table.pop("kind"), **table).build())
 
 
 def seeds_from(first):

@@ -7,14 +7,14 @@ import pytest
 from acting import fuzzy
 
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import DecisionSettings
-from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Experience, Observation
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import REWARD_SCALE
 from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
+from nested_agents.core.search.evaluator import DecisionContext
+from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
 from nested_agents.studies.spec.spec import Spec
@@ -98,7 +98,7 @@ def test_values_are_a_column_of_weights_for_each_action() -> None:
     learner.theta[1] = [1, 2, 3, 4, 5, 6, 10, 20, 30, 40, 50, 60]
     present = np.array([[0.0, 0.0], [0.75, 1.0]])
     nothing = np.zeros((2, 2))
-    known = Deliberation(
+    known = DecisionContext(
         1, np.array([1, 0]), None, list(learner.theta), nothing, np.random.default_rng(0),
         present=present,
     )  # fmt: skip

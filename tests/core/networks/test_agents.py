@@ -13,7 +13,7 @@ from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.hierarchy.messages import Messages
 from nested_agents.core.hierarchy.stages import decision_stages
 from nested_agents.core.interface.experience import Experience
-from nested_agents.core.interface.scenario import Transition
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios.line_up import LineUpSettings
@@ -40,7 +40,7 @@ def spec_of(topology: Any = "chain", **learner: Any) -> Spec:
     )  # fmt: skip
 
 
-class Players:
+class Players(Scenario):
     """Agents who see nothing of a world in which nothing happens."""
 
     state_space = StateSpace("one", (Variable("x", "1", 0, 1),))

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.plain import as_scenario
-from nested_agents.core.interface.scenario import Transition
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.networks.inputs import MAX_INPUT, InputEncoder
 
 
-class Two:
+class Two(Scenario):
     """Two agents of one group, whose own variable is a speed, and who share a periodic one."""
 
     agents = ("a", "b")
@@ -30,7 +29,7 @@ STATES = np.array([[1.0, 0.5], [-100.0, 0.5]])
 
 
 def test_inputs_by_hand():
-    encoder = InputEncoder(as_scenario(Two()))
+    encoder = InputEncoder(Two())
     own = encoder.own(STATES)
     expected = [[0.5, 1, 0, 1, 0], [-MAX_INPUT, 1, 0, 0, 1]]
     assert own == pytest.approx(np.array(expected), abs=1e-7)
@@ -41,13 +40,13 @@ def test_inputs_by_hand():
 
 
 def test_agents_without_numbers():
-    encoder = InputEncoder(as_scenario(Two()), numbered=False)
+    encoder = InputEncoder(Two(), numbered=False)
     assert encoder.own_names == ["speed value", "way value", "way cosine"]
     assert encoder.joint(encoder.own(STATES)) == pytest.approx([0.5, -MAX_INPUT, 1, 0], abs=1e-7)
 
 
 def test_environments_are_encoded_like_one():
-    encoder = InputEncoder(as_scenario(Two()))
+    encoder = InputEncoder(Two())
     states = np.random.default_rng(0).normal(size=(3, 2, 2))
     together = encoder.own(states)
     assert np.array_equal(together, np.stack([encoder.own(own) for own in states]))

@@ -11,7 +11,7 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.failures import LeftAgents
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Observation
-from nested_agents.core.interface.plain import as_scenario
+from nested_agents.core.interface.scenario import checked_scenario
 from nested_agents.core.interface.stacked import LoopedEnvironments
 from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios import SCENARIOS
@@ -38,7 +38,7 @@ TABLES = {
 
 def build(table):
     table = dict(table)
-    return as_scenario(SCENARIOS.parsed(table.pop("kind"), **table).build())
+    return checked_scenario(SCENARIOS.parsed(table.pop("kind"), **table).build())
 
 
 def team_of(kind="hierarchy-ppo", table=SPREAD, seed=0, failures=(), **changes):
@@ -69,7 +69,7 @@ def test_a_saved_team_continues_to_the_same_bits(kind, extra):
         for loop in loops:
             loop.step()
     resumed = team_of(kind, seed=5, **extra)
-    resumed.restore({name: array.copy() for name, array in broken.arrays().items()})
+    resumed.load_state_dict({name: a.copy() for name, a in broken.state_dict().items()})
     loop = loop_of(resumed, table)
     loop.load_state_dict(loops[1].state_dict())
     for _ in range(13):

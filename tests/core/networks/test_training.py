@@ -10,7 +10,7 @@ from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Experience
-from nested_agents.core.interface.scenario import Transition
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
 from nested_agents.studies.errors import SpecError
@@ -242,7 +242,7 @@ def test_only_an_episode_that_was_cut_off_is_worth_what_would_have_come(name: st
     assert rewards[1] - rewards[0] == pytest.approx(agents.settings.discount * ahead, rel=1e-3)
 
 
-class Beacons:
+class Beacons(Scenario):
     """Agents see which of four beacons is lit, and are paid for naming it; an episode is a step."""
 
     agents = ("a", "b")

@@ -11,16 +11,18 @@ from acting import fuzzy, joint_of, look
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.exploration import EXPLORATIONS
-from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.plugins.sources import Sources
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.exploration import EXPLORATIONS
 
 MINE = """
 import numpy as np
-from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
+from nested_agents.core.search.evaluator import Counts, EvaluatorSettings
+from nested_agents.core.search.exploration import ExplorationSettings
 from nested_agents.core.learners.learner import LearnerSettings
 
 class MonteCarlo:
@@ -67,7 +69,10 @@ class Fixed:
 class Least:
     '''Takes the action of least value.'''
 
-    def __init__(self, n_agents):
+    class Settings(ExplorationSettings):
+        pass
+
+    def __init__(self, settings, n_agents):
         self.memory = np.zeros(n_agents)
 
     def begin_episode(self):
@@ -88,13 +93,19 @@ TABLE = {
 }
 
 
-class FewMembers:
+class FewMembers(Scenario):
     """What a scenario must have, and no more: predictions give next states only."""
 
     def __init__(self, world) -> None:
         self.agents, self.state_space = world.agents, world.state_space
-        self.action_set, self.reset, self.step = world.action_set, world.reset, world.step
+        self.action_set = world.action_set
         self._world = world
+
+    def reset(self, seed, episode=0) -> np.ndarray:
+        return self._world.reset(seed, episode)
+
+    def step(self, joint_action) -> Transition:
+        return self._world.step(joint_action)
 
     def predict(self) -> SimpleNamespace:
         return SimpleNamespace(states=self._world.predict().states)
@@ -133,7 +144,7 @@ def test_values_of_other_than_all_actions_are_refused(line_world) -> None:
     fuzzy(team).evaluator = SimpleNamespace(values=lambda deliberation: np.zeros(2))
     team.begin_episode()
     world.reset(0)
-    with pytest.raises(ValueError, match=r"^the evaluator gave 2 values of 4 actions$"):
+    with pytest.raises(ValueError, match=r"^the evaluator returned 2 values for 4 actions$"):
         joint_of(team, world)
 
 
@@ -187,8 +198,8 @@ def test_settings_are_read_without_numba_and_scipy() -> None:
     program = """
 import sys
 import nested_agents.core.learners.learner
-from nested_agents.core.evaluators import EVALUATORS
-from nested_agents.core.decision.exploration import EXPLORATIONS
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.exploration import EXPLORATIONS
 from nested_agents.core.learners import LEARNERS
 for registry in (LEARNERS, EVALUATORS, EXPLORATIONS):
     for name in registry.built_in:

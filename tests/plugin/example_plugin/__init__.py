@@ -13,7 +13,7 @@ def pairs(agents, groups):
     return [(first, other) for first, *others in groups for other in others]
 
 
-class Meeting:
+class Meeting(na.Scenario, na.Prediction):
     """Walkers on a line who shall meet at its middle."""
 
     class Settings(na.ScenarioSettings):

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from acting import fuzzy
 
-from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.interface.measures import measures_of
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.models.self_model import SelfModelSettings
+from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
+from nested_agents.scenarios.box_pushing.prediction.push import mean_twists
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build, parse
 
@@ -109,7 +109,7 @@ def test_a_team_finds_out_that_a_wheel_has_seized() -> None:
     for _ in control_loop(scenario, team, episodes=2, steps=40, seed=0):
         pass
     found, nominal = (
-        fuzzy(team).foresight.self_model.effects[0][0, :4],
+        fuzzy(team).model.self_model.effects[0][0, :4],
         scenario.nominal_effects[0][0, :4],
     )
     assert abs(found[0]) < 0.3 * nominal[0]

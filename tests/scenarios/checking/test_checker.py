@@ -77,7 +77,7 @@ def test_a_made_up_scenario_passes(line_world: Any) -> None:
     assert {*report.passed, *report.skipped} - {"roles"} == set(CHECKS)
 
 
-class Bare:
+class Bare(Scenario):
     """A scenario with nothing but what it must have, and a reward for each agent."""
 
     agents = ("a", "b")
@@ -99,7 +99,7 @@ class Bare:
         return BarePrediction(self.places)
 
 
-class BarePrediction:
+class BarePrediction(Prediction):
     def __init__(self, places: Any) -> None:
         self.places = places
 
@@ -706,10 +706,10 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     ),
     "hidden state": (perceiving(stale), "equal seeds: .*seed 0 .*differ"),
     "plain prediction": (
-        line(predict=lambda self: BarePrediction(self._states())),
-        "form: predict returns BarePrediction, must inherit Prediction",
+        line(predict=lambda self: object()),
+        "form: predict returns object, must inherit Prediction",
     ),
-    "no scenario": (lambda: object(), "form: object lacks agents, .*step"),  # type: ignore[dict-item,return-value]
+    "no scenario": (lambda: object(), "form: .*object must inherit nested_agents.Scenario"),  # type: ignore[dict-item,return-value]
 }
 
 

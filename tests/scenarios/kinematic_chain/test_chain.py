@@ -136,8 +136,8 @@ def test_a_self_model_finds_the_locked_joint() -> None:
     team = na.Team(learner, scenario, hierarchy, na.policy_seed(0))
     for _ in na.control_loop(scenario, team, episodes=1, steps=60, seed=0):
         pass
-    assert fuzzy(team).foresight.self_model is not None
-    turning = [effect[2, 0] for effect in fuzzy(team).foresight.self_model.effects]
+    assert fuzzy(team).model.self_model is not None
+    turning = [effect[2, 0] for effect in fuzzy(team).model.self_model.effects]
     assert turning == pytest.approx([1.0, 1.0, 0.0, 1.0], abs=0.15)
 
 

@@ -149,7 +149,7 @@ def test_without_evaluation_a_team_is_kept_and_not_evaluated_again(tmp_path):
     spec = Spec.of({**TABLE, "seeds": 1, "evaluation": 0})
     study = na.load(kept_at(tmp_path, spec))
     assert fuzzy(study.team()[1]).learner.theta.any()
-    with pytest.raises(na.SpecError, match="evaluation = 0: reevaluate needs"):
+    with pytest.raises(na.SpecError, match="evaluation = 0: kept teams are"):
         na.reevaluate(study, ["chain"])
 
 

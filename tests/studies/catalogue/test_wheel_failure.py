@@ -202,13 +202,13 @@ def test_the_copy_keeps_weights_but_not_its_model_of_itself() -> None:
     copy = module._keeping_weights(session)
     theta, effects = (
         fuzzy(copy).learner.theta.copy(),
-        fuzzy(copy).foresight.self_model.effects[0].copy(),
+        fuzzy(copy).model.self_model.effects[0].copy(),
     )
     assert (theta == fuzzy(session.team).learner.theta).all()
     session.train(3, 5, phase=KEPT, team=copy)
     assert (fuzzy(copy).learner.theta == theta).all()
-    assert (fuzzy(copy).foresight.self_model.effects[0] != effects).any()
-    assert (fuzzy(session.team).foresight.self_model.effects[0] == effects).all()
+    assert (fuzzy(copy).model.self_model.effects[0] != effects).any()
+    assert (fuzzy(session.team).model.self_model.effects[0] == effects).all()
 
 
 @pytest.mark.parametrize(

@@ -280,9 +280,12 @@ BAD = {
 
 @pytest.mark.parametrize("delay", [0.02, 0.05, 0.1, 0.2, 0.3])
 def test_an_interrupt_while_starting_up_is_silent(delay):
-    """From when `main` is called; what Python does before is not ours."""
+    """From when `main` has its handler; what Python does before is not ours."""
     program = (
-        "import sys; from nested_agents.__main__ import main; print(flush=True); sys.exit(main())"
+        "import sys; from nested_agents import __main__ as program; "
+        "opened = program.open_standard_streams; "
+        "program.open_standard_streams = lambda: print(flush=True) or opened(); "
+        "sys.exit(program.main())"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", program, "presets", "paper"], stdout=subprocess.PIPE,

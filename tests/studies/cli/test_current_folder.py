@@ -36,10 +36,10 @@ def ring(agents, groups):
 """
 COMPILE = """
 import numpy as np
-from nested_agents.core.numerics.arrays import wrap_each
+from nested_agents.core.values.updates import _value
 
-wrap_each(np.zeros(1))
-assert wrap_each.compiled.stats.cache_hits  # another process has compiled it
+_value(np.zeros(1), np.zeros(1, dtype=int), np.zeros(1))
+assert _value.compiled.stats.cache_hits  # another process has compiled it
 
 from numba import config
 

@@ -197,7 +197,7 @@ def test_a_report_says_what_it_leaves_out(
 
 PAYLOAD = """
 from networkx import DiGraph
-from nested_agents.core.decision.exploration import BurstExploration
+from nested_agents.core.search.exploration import BurstExploration
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 
 

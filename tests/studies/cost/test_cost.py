@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents.core.agents.cost import Problem
-from nested_agents.core.evaluators.evaluator import Counts
+from nested_agents.core.search.evaluator import Counts
 from nested_agents.studies.cli.commands.describing import numbers
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.cost.cost import (

@@ -1,6 +1,6 @@
 import numpy as np
 
-from nested_agents.core.adaptation.self_model import SelfModel, SelfModelSettings
+from nested_agents.core.models.self_model import SelfModel, SelfModelSettings
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
 from nested_agents.studies.explain.team import BodyEffects
 from nested_agents.studies.explain.text import effects_table, verdicts

@@ -32,7 +32,7 @@ def test_a_learner_below_random_actions_is_remarked() -> None:
     text = lines_of({"default": 1, "random": 3}, lines=below_random)
     assert text.startswith("Below random actions in evaluation success: default 0.10 [")
     assert "; random 0.30 [" in text
-    assert "docs/not_learned.md" in text
+    assert "docs/troubleshooting.md" in text
     assert lines_of({"default": 3, "random": 3}, lines=below_random) == ""
     assert lines_of({"default": 1, "planner": 9}, lines=below_random) == "", "no random control"
     assert lines_of({"frozen": 1, "random": 3}, lines=below_random) == "", "it does not learn"

@@ -5,11 +5,11 @@ from pkgutil import resolve_name
 import pytest
 
 from nested_agents.core.agents.peer import PeerSettings
-from nested_agents.core.decision.exploration import EXPLORATIONS
-from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.plugins.registry import Plugged, Registry
 from nested_agents.core.plugins.settings import Settings
+from nested_agents.core.search import EVALUATORS
+from nested_agents.core.search.exploration import EXPLORATIONS
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.conditions import ConditionSettings

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.learners.td import FrozenSettings
 from nested_agents.scenarios.line_up import LineUp
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.objects import plain
@@ -151,12 +152,9 @@ def test_the_spec_is_laid_over_the_preset_and_the_sweep_over_the_spec():
     ]  # fmt: skip
 
 
-def test_another_kind_over_a_preset_leaves_its_fields_behind():
-    learner = (
-        Spec.parse("preset = 'paper'\nlearner.kind = 'frozen'").conditions()[0].settings.learner
-    )
-    assert learner.kind == "frozen"
-    assert learner.discount == 0.999
+def test_another_kind_replaces_the_table_of_the_preset():
+    (condition,) = Spec.parse("preset = 'paper'\nlearner.kind = 'frozen'").conditions()
+    assert condition.settings.learner == FrozenSettings()
 
 
 def test_the_grid_varies_the_last_key_fastest_and_labels_are_short():
@@ -279,7 +277,7 @@ def test_evaluations_may_change_the_hierarchy_and_the_decision():
     assert not silent.acts_as(condition.settings)
     assert (silent.topology.kind, silent.topology.communication) == ("chain", "none")
     assert (silent.learner.decision.unseen, tree.learner.decision.unseen) == ("last", "maintain")
-    assert (tree.topology.kind, tree.topology.communication) == ("tree", "parents")
+    assert (tree.topology.kind, tree.topology.communication) == ("tree", "ancestors")
     assert silent.scenario == condition.settings.scenario
 
 
@@ -430,9 +428,6 @@ def test_described_boxes_are_called_by_their_names():
     labels = [condition.label for condition in spec.conditions()]
     assert labels[:2] == ["square", "kite"]
     assert labels[2].startswith("described ")
-    # Without a name nothing of a box changes, its trials included.
-    table = spec.conditions()[2].settings.model_dump(mode="json")["scenario"]["box"]
-    assert "name" not in table
     assert spec.conditions()[1].settings.scenario.box.name == "kite"
 
 
@@ -587,7 +582,7 @@ def test_keys_that_no_learner_of_the_spec_has_are_refused(table) -> None:
         ({"robots": 3}, "did you mean 'scenario.robots'?"),
         ({"joints": 3, "scenario": {"kind": "kinematic-chain"}}, "mean 'scenario.joints' or"),
         ({"sweep": {"robots": [2, 3]}}, "did you mean 'scenario.robots'?"),
-        ({"scenario": {"ridge": 3.0}}, "did you mean 'learner.ridge' or"),
+        ({"scenario": {"ridge": 3.0}}, "did you mean 'learner.ridge'?"),
         ({"preset": "paper", "trace_decay": 0.3}, "did you mean 'learner.trace_decay'?"),
     ],
 )

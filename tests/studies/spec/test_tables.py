@@ -2,44 +2,33 @@ import pytest
 
 from nested_agents.core.plugins.models import kind_of, models_of
 from nested_agents.scenarios.box_pushing.world.settings import Failure
-from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.spec.tables import assignment, flat, nested, overlay
-
-LEARNER = ConditionSettings.model_fields["learner"]
+from nested_agents.studies.spec.tables import assignment, flat, merge, nested, override
 
 
 def test_neither_table_is_modified():
     base, table = {"a": {"b": 1}}, {"a": {"c": 2}}
-    assert overlay(base, table) == {"a": {"b": 1, "c": 2}}
+    assert merge(base, table) == {"a": {"b": 1, "c": 2}}
     assert (base, table) == ({"a": {"b": 1}}, {"a": {"c": 2}})
 
 
 def test_a_table_replaces_a_value_and_a_value_a_table():
-    assert overlay({"a": 1}, {"a": {"b": 2}}) == {"a": {"b": 2}}
-    assert overlay({"a": {"b": 2}}, {"a": 1}) == {"a": 1}
+    assert merge({"a": 1}, {"a": {"b": 2}}) == {"a": {"b": 2}}
+    assert merge({"a": {"b": 2}}, {"a": 1}) == {"a": 1}
 
 
-def test_another_kind_keeps_what_both_inherit():
+def test_another_kind_replaces_its_table():
     base = {"kind": "td-lambda", "trace_decay": 0.4, "discount": 0.9}
-    assert overlay(base, {"kind": "frozen"}, LEARNER) == {"kind": "frozen", "discount": 0.9}
+    assert override(base, {"kind": "frozen"}) == {"kind": "frozen"}
+    inner = {"kind": "batch-td", "exploration": {"kind": "burst", "decay": 0.75}}
+    table = {"exploration": {"kind": "paper"}}
+    assert override(inner, table) == {"kind": "batch-td", "exploration": {"kind": "paper"}}
 
 
 def test_the_same_kind_keeps_everything():
     base = {"kind": "td-lambda", "trace_decay": 0.4}
-    assert overlay(base, {"kind": "td-lambda", "discount": 0.9}, LEARNER) == base | {
-        "discount": 0.9
-    }
-
-
-def test_fields_that_only_share_their_name_are_not_kept():
-    base = {"kind": "batch-td", "exploration": {"kind": "burst", "decay": 0.75}}
-    table = {"exploration": {"kind": "paper"}}
-    assert overlay(base, table, LEARNER)["exploration"] == {"kind": "paper"}
-
-
-def test_an_unknown_kind_is_left_for_validation_to_refuse():
-    base = {"kind": "td-lambda", "trace_decay": 0.4}
-    assert overlay(base, {"kind": "fancy"}, LEARNER) == {"kind": "fancy"}
+    table = {"kind": "td-lambda", "discount": 0.9}
+    assert override(base, table) == base | table
+    assert override(base, {"discount": 0.9}) == base | table
 
 
 def test_every_member_of_a_union_has_a_kind():

@@ -31,7 +31,7 @@ import nested_agents as na
 os.chdir("/")
 
 
-class Arm:
+class Arm(na.Scenario, na.Prediction):
     """A walker on a line; one of its measures shows the surroundings of its trial."""
 
     class Settings(na.ScenarioSettings):
@@ -49,12 +49,12 @@ class Arm:
         self.place = np.random.default_rng(seed).uniform(-1, 1)
         return np.array([[self.place]])
 
-    def after(self, actions):
+    def moved(self, actions):
         moves = 0.1 * np.array([1, -1, 0, 0])[actions]
         return np.clip(self.place + moves, -1, 1)
 
     def step(self, joint_action):
-        self.place = self.after(joint_action)[0]
+        self.place = self.moved(joint_action)[0]
         draw = random.random() + np.random.rand() + hash("text") % 97 + helping.N
         states = np.array([[self.place]])
         return na.Transition(states, -abs(self.place), False, False, {"draw": draw})
@@ -63,7 +63,7 @@ class Arm:
         return self
 
     def states(self, agent, joint_actions):
-        return self.after(joint_actions)
+        return self.moved(joint_actions)
 '''
 SPEC = """
 study = "learning-curve"

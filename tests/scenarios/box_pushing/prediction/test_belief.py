@@ -5,20 +5,20 @@ import pytest
 from acting import fuzzy, look
 from pydantic import ValidationError
 
-from nested_agents.core.adaptation.calibration import CalibrationSettings
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import DecisionSettings
 from nested_agents.core.interface.experience import Decision, Experience
-from nested_agents.core.interface.plain import as_scenario
+from nested_agents.core.interface.scenario import checked_scenario
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.models.calibration import CalibrationSettings
+from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import (
     CONSTANTS,
     believing,
     least_gap,
+    mean_twists,
     outcomes,
     push,
 )
@@ -104,18 +104,18 @@ def test_the_least_gap_between_robots():
 def test_wrong_constants_are_found_out_by_pushing(believed):
     world = scenario(start="easy", belief={"soft": SOFT, "stiff": STIFF}[believed])
     _, team = calibrating(world)
-    foresight = fuzzy(team).foresight
+    model = fuzzy(team).model
     controller = ScriptedController(world)
     errors = []
     for seed in range(6):
         world.reset(seed)
         for _ in range(14):
             joint = controller.act(world.measure())
-            prediction = foresight.predict(look(world))
+            prediction = model.predict(look(world))
             transition = world.step(joint)
             decision = Decision(joint, ())
-            foresight.learn(Experience(look(world), decision, transition, False), prediction)
-            errors.append(foresight.calibration.constants - RIGHT[believed])
+            model.learn(Experience(look(world), decision, transition, False), prediction)
+            errors.append(model.calibration.constants - RIGHT[believed])
             if transition.terminated:
                 break
     # After 80 decisions of which three quarters push. A wrong start was off by 1.4, 1.4 and 0.7.
@@ -140,7 +140,7 @@ def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
     assert world.embodiment().constants == CONSTANTS
     for _ in control_loop(world, team, episodes=1, steps=30, seed=0):
         pass
-    assert fuzzy(team).foresight.calibration.constants.any()
+    assert fuzzy(team).model.calibration.constants.any()
     team.save(tmp_path / "team.npz")
     other.load(tmp_path / "team.npz")
     for name, array in team.state_dict().items():
@@ -148,7 +148,7 @@ def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
 
 
 def test_robots_of_other_scenarios_have_no_constants(line_world):
-    joined = join_agents(as_scenario(line_world(2, 2)), "body")
+    joined = join_agents(checked_scenario(line_world(2, 2)), "body")
     assert joined.embodiment() is None
 
 

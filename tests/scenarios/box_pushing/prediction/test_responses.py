@@ -8,10 +8,10 @@ from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.loop import policy_seed, world_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.evaluators.best_response import BestResponse
-from nested_agents.core.evaluators.evaluator import Evaluator
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.search.best_response import BestResponse
+from nested_agents.core.search.evaluator import Evaluator
 from nested_agents.core.values.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import BoxPrediction

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from variables_oracle import batch_of
 
-from nested_agents.core.numerics import wrap, wrap_each
+from nested_agents.core.numerics import wrap, wrap_one
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -139,7 +139,7 @@ def test_angles_wrap() -> None:
 def test_wrap_is_the_remainder_to_the_last_bit() -> None:
     angles = np.random.default_rng(0).uniform(-300, 300, 100_000)
     np.testing.assert_array_equal(wrap(angles), (angles + pi) % (2 * pi) - pi)
-    np.testing.assert_array_equal(wrap_each(angles), wrap(angles))
+    np.testing.assert_array_equal([wrap_one(angle) for angle in angles], wrap(angles))
 
 
 @pytest.mark.parametrize("name", STATE_SPACES)

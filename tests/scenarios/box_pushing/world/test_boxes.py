@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
 from math import pi, sqrt
 
 import numpy as np
@@ -18,15 +17,12 @@ from shapely.geometry.polygon import orient
 from nested_agents.scenarios.box_pushing.world.boxes import (
     AREA,
     BOXES,
-    UNIT,
     BoxSpec,
-    Vertices,
-    _merge,
     box_for,
     growth,
-    moments,
-    polygon_edges,
 )
+from nested_agents.scenarios.box_pushing.world.geometry import moments
+from nested_agents.scenarios.box_pushing.world.polygons import UNIT, Vertices, polygon_edges
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 from nested_agents.scenarios.box_pushing.world.world import World
@@ -47,24 +43,6 @@ def regular(corners: int) -> list[tuple[float, float]]:
     """Return a regular polygon."""
     angles = 2 * pi * np.arange(corners) / corners
     return list(zip(0.1 * np.cos(angles), 0.1 * np.sin(angles), strict=True))
-
-
-def greedy(polygon: Polygon) -> list[np.ndarray]:
-    """Merge triangles as `convex_pieces` says that it does, starting over after each merge."""
-    triangles = shapely.constrained_delaunay_triangles(polygon).geoms
-    pieces = [np.asarray(shapely.orient_polygons(t).exterior.coords)[:-1] for t in triangles]
-    merged = True
-    while merged:
-        merged = False
-        for i, j in combinations(range(len(pieces)), 2):
-            shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
-            union = _merge(pieces[i], pieces[j]) if len(shared) >= 2 else None
-            if union is not None:
-                pieces[i] = union
-                del pieces[j]
-                merged = True
-                break
-    return pieces
 
 
 def test_inertia_of_known_shapes() -> None:
@@ -285,16 +263,6 @@ def sliver(outline: Vertices) -> tuple[BoxSpec | None, str]:
     return box, ""
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_pieces_are_merged_in_the_order_of_the_plain_algorithm(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    box = BoxSpec("star", tuple(star(rng, int(rng.integers(9, 24)))))
-    expected = greedy(box.polygon)
-    assert len(box.fixtures) == len(expected)
-    for one, other in zip(box.fixtures, expected, strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
 @pytest.mark.parametrize("depth", [0.0, 0.4])
 def test_many_vertices_are_cut_into_convex_pieces(depth: float) -> None:
     radii = [10 * (1 - depth * (i % 2)) for i in range(1000)]
@@ -328,3 +296,38 @@ def test_size_grows_with_the_number_of_robots() -> None:
     assert box_for("circle", 3).radius == pytest.approx(1.5 * BOXES["circle"].radius)
     with pytest.raises(ValueError, match=r"box = .egg.: known: L, T, U, bar, circle"):
         box_for("egg", 2)
+
+
+def test_a_center_of_mass_moves_the_frame_but_not_mass_or_friction() -> None:
+    plain = BoxSpec("plain", FRAME)
+    loaded = BoxSpec("loaded", FRAME, center_of_mass=(0.05, 0.1))
+    corners = {(-0.05, -0.1), (0.15, -0.1), (0.15, 0.1), (-0.05, 0.1)}
+    assert {tuple(row) for row in loaded.rings[0].round(12).tolist()} == corners
+    assert (loaded.inertia, loaded.friction_radius) == (plain.inertia, plain.friction_radius)
+    np.testing.assert_array_equal(loaded.friction_points, plain.friction_points)
+    assert loaded.reach == pytest.approx(np.hypot(0.15, 0.1))
+    assert loaded.scaled(2.0).center_of_mass == pytest.approx((0.1, 0.2))
+    assert loaded.scaled(2.0).reach == pytest.approx(2.0 * loaded.reach)
+    same = BoxSpec("same", FRAME, center_of_mass=(0.1, 0.1))
+    np.testing.assert_allclose(same.outline.edges, plain.outline.edges, atol=1e-15)
+
+
+def test_a_box_turns_about_its_own_center_of_mass() -> None:
+    # A push through the center of mass does not turn the box; a push beside it does.
+    angles = []
+    for center in ((0.1, 0.1), (0.1, 0.05)):
+        world = World([ROBOTS["e-puck"]], BoxSpec("box", FRAME, center_of_mass=center))
+        world.place(np.array([[-0.138, 0.1 - center[1], 0.0]]), np.zeros(3))
+        world.advance(np.array([0.13, 0.13]), periods=15)
+        angles.append(float(world.box_pose[2]))
+    assert abs(angles[0]) < 1e-3 < 0.01 < -angles[1]
+
+
+def test_a_center_of_mass_outside_is_refused() -> None:
+    with pytest.raises(
+        ValueError, match=r"center_of_mass = \(0.3, 0.1\), must be within"
+    ) as caught:
+        BoxSpec("loaded", FRAME, center_of_mass=(0.3, 0.1))
+    assert "\n" not in str(caught.value)
+    hollow = BoxSpec("L", L_SHAPE, center_of_mass=(0.12, 0.12))  # between the arms of the L
+    assert hollow.outline.radius > 0.15

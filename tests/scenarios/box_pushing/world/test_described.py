@@ -117,3 +117,40 @@ def test_robots_in_number_stand_free_of_each_other_and_of_the_box(robots: int, s
             assert np.hypot(*(one - other)) > 2 * scenario.robot.radius
     assert len(scenario.agents) == 2 * robots
     assert np.isfinite(scenario.step(np.zeros(2 * robots, dtype=int)).states).all()
+
+
+def test_vertices_are_read_from_a_csv_file_beside_the_spec(tmp_path) -> None:
+    (tmp_path / "outline.csv").write_text("x,y\n0,0\n0.3, 0\n\n0.3,0.2\n0,0.2\n")
+    (tmp_path / "hole.csv").write_text("0.1,0.05\n0.2,0.05\n0.2,0.1\n")
+    box = '{ vertices = "outline.csv", holes = ["hole.csv"], center_of_mass = [0.1, 0.1] }'
+    path = tmp_path / "spec.toml"
+    path.write_text(f"seeds = 1\n[scenario]\nbox = {box}\n")
+    spec = Spec.load(path)
+    settings = spec.conditions()[0].settings.scenario
+    assert settings.box.vertices == ((0.0, 0.0), (0.3, 0.0), (0.3, 0.2), (0.0, 0.2))
+    assert settings.box.holes == (((0.1, 0.05), (0.2, 0.05), (0.2, 0.1)),)
+    assert {*spec.sources.texts} == {"outline.csv", "hole.csv"}
+    again = Spec.of(spec.table(), spec.sources)
+    assert again.conditions()[0].settings.scenario == settings
+    assert BoxPushing(settings).box.rings[0].min() == pytest.approx(-0.1)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("0,0\n1,0\n1,one\n", r"outline.csv:3: '1,one', must be two numbers x,y in meters"),
+        ("x,y\n0,0\n1,0,2\n", r"outline.csv:3: '1,0,2', must be two numbers"),
+        ("0,0\n1,0\n", "vertices"),
+        ("0,0\n1,0\n1,nan\n", "vertices"),
+        (None, "outline.csv: No such file"),
+    ],
+)
+def test_a_csv_file_is_refused_in_one_line(text, complaint, tmp_path) -> None:
+    if text is not None:
+        (tmp_path / "outline.csv").write_text(text)
+    path = tmp_path / "spec.toml"
+    path.write_text('seeds = 1\n[scenario]\nbox = { vertices = "outline.csv" }\n')
+    with pytest.raises(SpecError, match=complaint) as caught:
+        Spec.load(path)
+    assert "\n" not in str(caught.value)
+    assert "scenario.box" in str(caught.value)

@@ -1,1 +1,0 @@
-"""Decision settings, exploration, and errors of agents."""

@@ -1,0 +1,115 @@
+"""The predictor of a team: the scenario's own, adapted or not, or a learned one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..interface.experience import Experience, Observation
+from ..interface.plain import as_prediction
+from ..interface.prediction import Prediction
+from ..interface.scenario import Scenario
+from ..numerics import FloatArray
+from ..plugins.settings import PartSettings
+from .adaptive import Adaptive, DynamicsModel
+from .calibration import Calibration, CalibrationSettings
+from .predictors import GivenPredictor
+from .self_model import SelfModel, SelfModelSettings
+
+
+class TeamModel:
+    """Predicts for a team, and adapts its models.
+
+    Parameters
+    ----------
+    predictor, self_model, calibration
+        Settings of the predictor, and of the models that adapt the scenario's own predictor.
+    scenario
+        The scenario to predict.
+
+    Attributes
+    ----------
+    predictor
+        Dynamics model used instead of the scenario's predictor, or None.
+    self_model
+        Learned effects of the wheels; None: nominal effects.
+    calibration
+        Learned constants of the predictor; None: the scenario's constants.
+    adaptive
+        Those of the three models that adapt, by name.
+
+    Raises
+    ------
+    ValueError
+        If a model is to adapt that the scenario lacks or that another predictor replaces.
+    """
+
+    def __init__(
+        self,
+        predictor: PartSettings,
+        self_model: SelfModelSettings,
+        calibration: CalibrationSettings,
+        scenario: Scenario,
+    ) -> None:
+        self.self_model = SelfModel.of(self_model, scenario)
+        self.calibration = Calibration.of(calibration, scenario)
+        self.predictor: DynamicsModel | None = None
+        if not isinstance(predictor, GivenPredictor):
+            named = f"learner.predictor.kind = {predictor.kind!r}"
+            revised = {"self_model": self_model.enabled, "calibration": calibration.enabled}
+            for name in (name for name, enabled in revised.items() if enabled):
+                raise ValueError(
+                    f"learner.{name}.enabled: adapts the predictor of the scenario, but {named} "
+                    "replaces it; use 'given'"
+                )
+            self.predictor = predictor.build(scenario)
+        parts = {
+            "self_model": self.self_model,
+            "calibration": self.calibration,
+            "predictor": self.predictor,
+        }
+        self.adaptive: dict[str, Adaptive[Any]] = {
+            name: part for name, part in parts.items() if isinstance(part, Adaptive)
+        }
+
+    def predict(self, seen: Observation, errors: FloatArray | None = None) -> Prediction | None:
+        """Return the prediction from the present states; None if the scenario predicts nothing.
+
+        Parameters
+        ----------
+        seen
+            Present observation.
+        errors
+            ``(c,)`` errors of the logarithms of the predictor's constants, or None.
+        """
+        if seen.imagined is not None:
+            return seen.imagined
+        if self.predictor is not None:
+            return self.predictor.predict(seen.present)
+        if self.self_model is None and self.calibration is None and errors is None:
+            return as_prediction(seen.scenario.predict())
+        bodies = seen.scenario.embodiment()
+        if bodies is None:
+            raise ValueError(
+                "learner.self_model, calibration, decision.errors: the scenario has no bodies"
+            )
+        effects = bodies.nominal_effects if self.self_model is None else self.self_model.effects
+        constants = None if self.calibration is None else self.calibration.constants
+        if errors is not None:
+            constants = errors if constants is None else constants + errors
+        return bodies.predict_with(effects, constants)
+
+    def learn(self, experience: Experience, prediction: Prediction | None) -> None:
+        """Adapt the models by the outcome of a decision."""
+        joint_action = experience.decision.joint_action
+        for part in self.adaptive.values():
+            part.adapt(prediction, joint_action, experience.transition)
+
+    def end_episode(self) -> None:
+        """Make the updates that follow an episode."""
+        for part in self.adaptive.values():
+            part.end_episode()
+
+    def continue_from(self, former: TeamModel) -> None:
+        """Start from the models of another team."""
+        for name in self.adaptive.keys() & former.adaptive.keys():
+            self.adaptive[name].continue_from(former.adaptive[name])

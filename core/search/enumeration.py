@@ -1,0 +1,252 @@
+"""Evaluators that try every joint action of the agents below, or a random sample of them.
+
+``auto`` enumerates the joint actions of few agents, samples those of some, and plans for many. For
+many agents, best responses around a plan reach greater values than a sample in half of its time.
+"""
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ..interface.prediction import Tables
+from ..numerics import FloatArray, IntArray
+from .evaluator import (
+    EVALUATORS,
+    Aggregation,
+    DecisionContext,
+    DecisionProblem,
+    Evaluator,
+    EvaluatorSettings,
+)
+
+MAX_JOINT_ACTIONS = 4**11
+"""Maximum number of joint actions per own action; more would fill the memory."""
+
+
+def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
+    """Return all joint actions ``(A ** k, k)`` of k agents, in lexicographic order.
+
+    Raises
+    ------
+    ValueError
+        If there are too many; raised before memory is allocated.
+    """
+    if n_actions ** len(agents) > MAX_JOINT_ACTIONS:
+        raise ValueError(
+            f"learner.decision.evaluator: {n_actions} ** {len(agents)} joint actions of "
+            f"{len(agents)} agents would be tried, allowed {MAX_JOINT_ACTIONS}; use sampling"
+        )
+    k = len(agents)
+    grid = np.indices((n_actions,) * k).reshape(k, n_actions**k)
+    return np.ascontiguousarray(grid.T, dtype=np.int64)
+
+
+Samples = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatArray:
+    """Return the probability ``(A ** k,)`` of each joint action of the k agents below."""
+    probabilities = np.ones(1)
+    for agent in below:
+        probabilities = np.multiply.outer(probabilities, frequencies[agent]).ravel()
+    return probabilities / probabilities.sum()
+
+
+def exact_joint_actions(problem: DecisionProblem) -> int:
+    """Return the number of joint actions that exact enumeration tries in a decision."""
+    below = (len(problem.hierarchy.searched(i)) for i in problem.deciding)
+    return sum(problem.n_actions ** (1 + k) for k in below)
+
+
+class ExactEnumeration(Aggregation):
+    """Tries every joint action of the agents below, as the paper: ``A ** (1 + len(below))`` each.
+
+    Next states come from tables of all joint actions, if the prediction has such tables and all
+    agents together evaluate at least that many joint actions.
+
+    Raises
+    ------
+    ValueError
+        If an agent would have to try more than `MAX_JOINT_ACTIONS`, or the budget is below the
+        joint actions of all agents.
+    """
+
+    name = "exact"
+
+    def __init__(self, problem: DecisionProblem) -> None:
+        super().__init__(problem)
+        n, a = len(self.hierarchy), self.n_actions
+        self.check_budget(exact_joint_actions(problem))
+        self._below = [combinations(self.hierarchy.searched(i), a) for i in range(n)]
+        self._indices: list[IntArray] = []
+        self._given_places: list[IntArray] = []
+        self._means: tuple[tuple[object, ...], FloatArray] | None = None
+        self._uses_tables = self.hierarchy.count_joint_actions(a) >= a**n
+        if self._uses_tables:
+            places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
+            for agent in range(n):
+                below = list(self.hierarchy.searched(agent))
+                own = np.arange(a)[:, None] * places[agent]
+                self._indices.append((own + self._below[agent] @ places[below]).ravel())
+                given = places.copy()
+                given[[agent, *below]] = 0
+                self._given_places.append(given)
+
+    def values(self, context: DecisionContext) -> FloatArray:
+        """Return the value ``(A,)`` of each action of the deciding agent."""
+        agent = context.agent
+        below = self.hierarchy.searched(agent)
+        probabilities = None
+        if self.problem.teammates == "empirical":
+            probabilities = probabilities_of(context.frequencies, below)
+        elif self.problem.teammates == "conditional":
+            probabilities = np.stack([probabilities_of(rows, below) for rows in context.given])
+        return self.aggregate(context, self._below[agent], probabilities)
+
+    def worths(self, context: DecisionContext, tried: IntArray) -> FloatArray:
+        """Return values ``(A, m)``, from tables of all joint actions if the prediction has them."""
+        tables = context.prediction.tables() if self._uses_tables else None
+        if tables is None or (self.problem.rule != "value" and not tables.rewarded):
+            return super().worths(context, tried)
+        agent = context.agent
+        given = int(context.joint_action @ self._given_places[agent])
+        indices = self._indices[agent] + given
+        self.count(agent, len(indices))
+        worth = self.combine(
+            lambda: tables.reward_table()[indices],
+            lambda: self._table_values(context, tables, indices),
+        )
+        return worth.reshape(self.n_actions, -1)
+
+    def _table_values(
+        self, context: DecisionContext, tables: Tables, indices: IntArray
+    ) -> FloatArray:
+        """Return the values ``(m,)`` of joint-action indices ``(m,)`` to the deciding agent.
+
+        The mean over several agents is computed for all joint actions, once in a decision.
+        """
+        weights = context.weights
+        concerned = self.concerned[context.agent]
+        if len(concerned) == 1:
+            blocks = tables.blocks(context.agent)
+            return self.rules.block_values(context.own_weights, blocks, indices)
+        key = tables, weights, concerned
+        if self._means is None or any(a is not b for a, b in zip(self._means[0], key, strict=True)):
+            every = np.arange(self.n_actions ** len(weights))
+            values = [
+                self.rules.block_values(weights[i], tables.blocks(i), every) for i in concerned
+            ]
+            self._means = key, np.add.reduce(values) / len(values)
+        return self._means[1][indices]
+
+
+class SamplingSettings(EvaluatorSettings):
+    """Evaluate a random sample of the joint actions of the agents below."""
+
+    kind: Literal["sampling"] = "sampling"
+    factory: ClassVar[str] = f"{__name__}:Sampling"
+    samples: Samples = 64
+    """Sample size: joint actions of the agents below, evaluated with each own action."""
+
+
+class Sampling(Aggregation):
+    """Evaluates a random sample of the joint actions below, the same for every own action.
+
+    The sample is uniform, or drawn by the empirical frequencies if these are the teammate model;
+    the plain mean then estimates the weighted one. If there are no more joint actions than samples,
+    all are evaluated.
+
+    A budget reduces the samples. If an agent may try fewer joint actions than it has actions, it
+    compares a random sample of its actions, each with one joint action of the agents below.
+
+    Raises
+    ------
+    ValueError
+        If the teammate model is conditional on the own action, or the budget is below one joint
+        action for every agent.
+    """
+
+    name = "sampling"
+
+    def __init__(self, settings: SamplingSettings, problem: DecisionProblem) -> None:
+        super().__init__(problem)
+        if problem.teammates == "conditional":
+            raise ValueError(
+                "learner.decision.teammates = 'conditional': sampling evaluates best-response, "
+                "uniform, empirical; use exact"
+            )
+        a = self.n_actions
+        below = map(len, map(self.hierarchy.searched, range(len(self.hierarchy))))
+        self._shares = self.shares([a * min(settings.samples, a**k) for k in below], least=1)
+
+    def values(self, context: DecisionContext) -> FloatArray:
+        """Return the value ``(A,)`` of each action of the deciding agent.
+
+        Actions that the budget leaves out have the value -inf.
+        """
+        below, a = self.hierarchy.searched(context.agent), self.n_actions
+        share = self._shares[context.agent]
+        if share < a:
+            own = context.rng.choice(a, share, replace=False)
+            tried = self._sample(context, 1)
+            values = np.full(a, -np.inf)
+            values[own] = self.worth(context, self.joint_actions(context, own, tried))
+            return values
+        if a ** len(below) > share // a:
+            return self.aggregate(context, self._sample(context, share // a), None)
+        probabilities = None
+        if self.problem.teammates == "empirical":
+            probabilities = probabilities_of(context.frequencies, below)
+        return self.aggregate(context, combinations(below, a), probabilities)
+
+    def _sample(self, context: DecisionContext, samples: int) -> IntArray:
+        """Return sampled joint actions ``(samples, k)`` of the agents below."""
+        below = self.hierarchy.searched(context.agent)
+        if self.problem.teammates == "empirical":
+            return self.sample(context.frequencies[list(below)], samples, context.rng)
+        return context.rng.integers(self.n_actions, size=(samples, len(below)))
+
+
+class ExactSettings(EvaluatorSettings):
+    """Exact enumeration of the joint actions of the agents below."""
+
+    kind: Literal["exact"] = "exact"
+
+    def build(self, problem: DecisionProblem) -> Evaluator:
+        """Return the evaluator of a team."""
+        return ExactEnumeration(problem)
+
+
+class AutoSettings(EvaluatorSettings):
+    """Exact enumeration for small teams, then sampling, then best responses."""
+
+    kind: Literal["auto"] = "auto"
+    exact_up_to: Annotated[int, Field(ge=1, le=10)] = 5
+    """Maximum number of agents whose joint actions are enumerated."""
+    sampling_up_to: Annotated[int, Field(ge=1)] = 12
+    """Maximum number of agents whose joint actions are sampled, if agents decide by their own value
+    and assume best responses."""
+    samples: Samples = 64
+    """Sample size, see the evaluator ``sampling``."""
+
+    def build(self, problem: DecisionProblem) -> Evaluator:
+        """Return the evaluator of a team."""
+        return self.chosen(problem).build(problem)
+
+    def chosen(self, problem: DecisionProblem) -> EvaluatorSettings:
+        """Return the settings of the chosen evaluator."""
+        hierarchy = problem.hierarchy
+        if problem.unseen == "plan" or problem.plan == "common":
+            return EVALUATORS.parsed("best-response")
+        free = max(1 + len(hierarchy.searched(i)) for i in range(len(hierarchy)))
+        is_affordable = problem.budget is None or exact_joint_actions(problem) <= problem.budget
+        is_small = free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MAX_JOINT_ACTIONS
+        if is_small and is_affordable:
+            return EVALUATORS.parsed("exact")
+        is_large = free > self.sampling_up_to or problem.value_of != "own"
+        own_actions = problem.n_actions * len(problem.deciding)
+        all_fit = problem.budget is None or own_actions <= problem.budget
+        if is_large and all_fit and problem.teammates == "best-response":
+            return EVALUATORS.parsed("best-response")
+        return SamplingSettings(samples=self.samples)

@@ -1,0 +1,222 @@
+"""Analysis of losses: what they cost by position and number, and whether a team tolerates them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import groupby
+from math import comb
+
+from ...core.interface.measures import Measure
+from ...core.numerics import pd
+from ..results.analysis import Summary
+from ..results.comparison import mean_estimate
+from ..results.differences import Difference, Pair, differences, paired_difference
+from ..results.notation import format_estimate, format_number
+from ..results.permutation_tests import LEVEL
+from ..results.results import row_means
+from ..results.statistics import Estimate
+from .losses import LosableTeam
+
+HALF = 0.5
+"""Share of the intact performance at which the number of losses stops growing."""
+
+
+@dataclass
+class TeamLosses:
+    """Performance of the teams of one condition, intact and with losses."""
+
+    condition: str
+    team: LosableTeam
+    intact: pd.DataFrame
+    """Performance by seed and episode."""
+    lost: dict[tuple[int, ...], pd.DataFrame] = field(default_factory=dict)
+    """The same by the indices of the lost units."""
+
+    @property
+    def intact_mean(self) -> float:
+        """Mean performance of intact teams."""
+        return float(row_means(self.intact).mean())
+
+    @property
+    def by_number(self) -> Mapping[int, Sequence[tuple[int, ...]]]:
+        """The evaluated sets by the number of lost units."""
+        return {n: list(sets) for n, sets in groupby(sorted(self.lost, key=len), key=len)}
+
+    def joined(self, sets: Sequence[tuple[int, ...]]) -> pd.DataFrame:
+        """Return the performance with any of some losses by seed and episode."""
+        return pd.concat([self.lost[units] for units in sets], axis=1, ignore_index=True)
+
+    @property
+    def halving(self) -> int | None:
+        """Number of lost units with which performance is at most half; None if not reached."""
+        for n, sets in self.by_number.items():
+            if float(row_means(self.joined(sets)).mean()) <= HALF * self.intact_mean:
+                return n
+        return None
+
+    def name(self, units: Sequence[int]) -> str:
+        """Return the names of lost units."""
+        return ", ".join(self.team.units[i] for i in units)
+
+
+@dataclass(frozen=True)
+class Resilience:
+    """Costs of losses in the teams of a study."""
+
+    fault: str
+    measure: Measure
+    title: str
+    """Title of the measure."""
+    tolerance: float
+    """Share of the intact performance that a tolerated loss may cost."""
+    teams: tuple[TeamLosses, ...]
+
+    @cached_property
+    def single(self) -> Mapping[str, tuple[Difference, ...]]:
+        """Change of performance by each single loss, by condition and in the order of units.
+
+        p is adjusted over all of them.
+        """
+        groups: dict[str, list[Pair]] = {}
+        for own in self.teams:
+            singles = own.by_number.get(1, ())
+            base = row_means(own.intact)
+            groups[own.condition] = [
+                (own.name(units), self.title, row_means(own.lost[units]), base) for units in singles
+            ]
+        return differences(groups, self.measure)
+
+    def verdict(self, own: TeamLosses) -> str:
+        """Return whether teams tolerate any single loss: yes, no, or undecided.
+
+        They do if the interval of every loss lies above the margin, which needs no adjustment for
+        several losses. They do not if that of any loss lies below it and its adjusted p is
+        significant.
+        """
+        margin = -self.tolerance * own.intact_mean
+        single = self.single[own.condition]
+        if single and all(float(d.estimate.low) > margin for d in single):
+            return "yes"
+        if any(float(d.estimate.high) < margin and d.p < LEVEL for d in single):
+            return "no"
+        return "undecided"
+
+    def worst(self, own: TeamLosses) -> Difference | None:
+        """Return the single loss that costs most; None if there are fewer than two seeds."""
+        single = self.single[own.condition]
+        return min(single, key=lambda d: float(d.estimate.value)) if single else None
+
+    @cached_property
+    def summaries(self) -> tuple[Summary, ...]:
+        """Lines of the table: intact teams, single losses by position, and more losses."""
+        return tuple(line for own in self.teams for line in self._lines(own))
+
+    def _lines(self, own: TeamLosses) -> Iterator[Summary]:
+        estimates = {self.title: mean_estimate(self.measure, own.intact)}
+        yield Summary(f"{own.condition}, intact", len(own.intact), estimates)
+        positions = own.team.positions
+        for n, sets in own.by_number.items():
+            of = comb(len(own.team.units), n)
+            count = f"{len(sets)} sets" if len(sets) == of else f"{len(sets)} of {of} sets"
+            if n > 1:
+                yield self._line(own, f"{n} lost, {count}", sets)
+                continue
+            for position in dict.fromkeys(positions):
+                part = [units for units in sets if positions[units[0]] == position]
+                yield self._line(own, f"1 lost, {position} ({len(part)})", part)
+
+    def _line(self, own: TeamLosses, label: str, sets: Sequence[tuple[int, ...]]) -> Summary:
+        lost = own.joined(sets)
+        estimates = {
+            self.title: mean_estimate(self.measure, lost),
+            "change": self._change(own, lost),
+        }
+        return Summary(f"{own.condition}, {label}", len(lost), estimates)
+
+    def _change(self, own: TeamLosses, lost: pd.DataFrame) -> Estimate:
+        with_losses, intact = row_means(lost), row_means(own.intact)
+        return paired_difference(
+            with_losses.to_numpy(), intact[with_losses.index].to_numpy(), self.measure
+        )
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The findings, two sentences for each condition."""
+        return tuple(sentence for own in self.teams for sentence in self._sentences(own))
+
+    def _sentences(self, own: TeamLosses) -> Iterator[str]:
+        worst = self.worst(own)
+        if worst is None:
+            yield f"{own.condition}: one seed has no interval, so that nothing can be said."
+            return
+        place = own.team.positions[own.team.units.index(worst.condition)]
+        yield (
+            f"{own.condition}: the team tolerates any single loss: {self.verdict(own)}. The worst "
+            f"is that of {worst.condition} ({place}), which changes {self.title} by "
+            f"{format_estimate(worst.estimate, signed=True)}."
+        )
+        n = len(own.team.units)
+        halving = own.halving
+        if halving is None:
+            largest = max(own.by_number)
+            yield f"Performance does not halve with up to {largest} of {n} lost."
+        else:
+            value = format_estimate(mean_estimate(self.measure, own.joined(own.by_number[halving])))
+            yield f"Performance is at most half with {halving} of {n} lost: {value}."
+
+    @property
+    def legend(self) -> tuple[str, ...]:
+        """Sentences on what was lost and what counts as tolerated."""
+        share = format_number(100.0 * self.tolerance)
+        return (
+            f"Fault: {self.fault}, from the first step on; teams are not trained again. A loss is "
+            f"tolerated if it costs at most {share}% of the intact performance. Changes are paired "
+            "by seed, on the same initial states.",
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """Return everything as plain data, which JSON can hold."""
+        return {
+            "fault": self.fault,
+            "measure": self.measure.name,
+            "tolerance": self.tolerance,
+            "teams": [self._team_to_dict(own) for own in self.teams],
+            "sentences": list(self.sentences),
+        }
+
+    def _team_to_dict(self, own: TeamLosses) -> dict[str, object]:
+        positions = dict(zip(own.team.units, own.team.positions, strict=True))
+        return {
+            "condition": own.condition,
+            "seeds": len(own.intact),
+            "intact": _plain(mean_estimate(self.measure, own.intact)),
+            "tolerates_any_single_loss": self.verdict(own),
+            "halving": own.halving,
+            "single": [
+                {
+                    "lost": d.condition,
+                    "position": positions[d.condition],
+                    "change": _plain(d.estimate),
+                    "p": d.p,
+                }
+                for d in self.single[own.condition]
+            ],
+            "sets": [
+                {
+                    "lost": [own.team.units[i] for i in units],
+                    "value": float(row_means(values).mean()),
+                }
+                for units, values in own.lost.items()
+            ],
+            "numbers": [
+                {"n_lost": n, "sets": len(sets)}
+                | {"change": _plain(self._change(own, own.joined(sets)))}
+                for n, sets in own.by_number.items()
+            ],
+        }
+
+
+def _plain(estimate: Estimate) -> list[float | None]:
+    return [None if end != end else end for end in map(float, estimate)]

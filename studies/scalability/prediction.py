@@ -1,0 +1,280 @@
+"""Predictions for team sizes that were not run, and their comparison with later results.
+
+The laws and intervals are those of `nested_agents.studies.results.laws`. A prediction file holds
+the spec of the study and a hash, so that a later change of the file is found.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from ...core.numerics import pd
+from ..errors import SpecError
+from ..presentation.tables import SummaryTable, tabulate
+from ..results.analysis import Summary, estimate_over_seeds
+from ..results.comparison import values_of
+from ..results.notation import format_estimate, format_number
+from ..results.results import Results
+from ..results.scaling_law import columns_of, scaling_law, size_key
+from ..results.statistics import Estimate
+from ..spec.tables import SpecTable, flat, label_but
+from ..store import durable
+from .data import COSTS, TIME
+
+LEVEL = 0.9
+"""Coverage of the intervals, for the mean of as many seeds as were fitted."""
+FREE_KEYS = ("seeds", "title", "keep_teams")
+"""Keys besides the size in which the spec of later results may differ."""
+
+
+class SizePrediction(NamedTuple):
+    """The predicted mean of a measure for one hierarchy at one size."""
+
+    measure: str
+    title: str
+    hierarchy: str
+    size: float
+    value: float
+    low: float
+    high: float
+
+
+class PredictionFile(NamedTuple):
+    """Content of a prediction file."""
+
+    size: str
+    """Swept key that is the size."""
+    seeds: int
+    """Smallest number of seeds that a law was fitted to."""
+    spec: dict[str, object]
+    """Spec of the study that the predictions are based on."""
+    predictions: tuple[SizePrediction, ...]
+    sha256: str = ""
+    """Hash of everything else."""
+
+    @property
+    def digest(self) -> str:
+        """Hash of everything but the hash."""
+        content = json.dumps(self._replace(sha256=""), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(content.encode()).hexdigest()
+
+    def write(self, path: Path) -> None:
+        """Write the file with its hash."""
+        table = self._replace(sha256=self.digest)._asdict()
+        table["predictions"] = [p._asdict() for p in self.predictions]
+        durable.write(path, json.dumps(table, indent=1).encode())
+
+    @classmethod
+    def read(cls, path: Path) -> PredictionFile:
+        """Read a file.
+
+        Raises
+        ------
+        SpecError
+            If it is no prediction file, or was changed after it was written; one line.
+        """
+        try:
+            content = TypeAdapter(cls).validate_json(durable.read_text(path))
+        except (ValidationError, ValueError):
+            raise SpecError(
+                f"{path}: is no prediction file; scalability --predict N --out FILE writes one"
+            ) from None
+        if content.sha256 != content.digest:
+            raise SpecError(f"{path}: was changed after it was written: its hash does not match")
+        return content
+
+
+def predict(
+    results: Results, spec: SpecTable, measure: str, size: str | None, sizes: Sequence[int]
+) -> tuple[PredictionFile, tuple[str, ...]]:
+    """Return predictions of performance, time and costs, and remarks on measures without a law.
+
+    Parameters
+    ----------
+    results, spec
+        The study.
+    measure
+        Measure of performance.
+    size
+        The swept key that is the size; by default the only one of numbers.
+    sizes
+        Sizes to predict, none of which was run.
+
+    Raises
+    ------
+    SpecError
+        If a size was run, or nothing has a law; one line.
+    """
+    columns = columns_of(results)
+    key = size_key(columns, size)
+    run = {float(str(own[key])) for own in columns.values()}
+    for n in sizes:
+        if n in run:
+            raise SpecError(f"predict = {n}: was run; name sizes that were not")
+    numbers = [cost.number for cost in COSTS.values() if cost.number]
+    predictions: list[SizePrediction] = []
+    remarks: list[str] = []
+    seeds: list[int] = []
+    for name in dict.fromkeys((measure, TIME, *numbers)):
+        try:
+            growth = scaling_law(results, name, size=key, predict=sizes)
+        except SpecError:  # was not measured
+            continue
+        for fitted in growth.fits:
+            hierarchy = fitted.group or "all teams"
+            if fitted.law is None:
+                remarks.append(f"{hierarchy}: {growth.title} is not predicted: {fitted.why}.")
+                continue
+            seeds.append(fitted.law.seeds)
+            for n in sizes:
+                ends = map(float, fitted.law.predict(n, LEVEL))
+                predictions.append(SizePrediction(name, growth.title, hierarchy, float(n), *ends))
+    if not predictions:
+        raise SpecError(f"predict: no measure has a law; {' '.join(remarks)}")
+    plain = json.loads(json.dumps(spec))
+    return PredictionFile(key, min(seeds), plain, tuple(predictions)), tuple(remarks)
+
+
+class CheckedPrediction(NamedTuple):
+    """A prediction and what was measured later."""
+
+    prediction: SizePrediction
+    seeds: int
+    measured: Estimate
+
+    @property
+    def has_held(self) -> bool:
+        """Whether the measured mean is within the interval."""
+        return self.prediction.low <= float(self.measured.value) <= self.prediction.high
+
+
+@dataclass(frozen=True)
+class PredictionCheck:
+    """Predictions compared with later results."""
+
+    file: PredictionFile
+    checked: tuple[CheckedPrediction, ...]
+
+    @property
+    def table(self) -> SummaryTable:
+        """Predicted and measured means."""
+        heading = f"predicted ({LEVEL:.0%})"
+        return tabulate(
+            [
+                Summary(
+                    _name(c.prediction),
+                    c.seeds,
+                    {heading: _estimate(c.prediction), "measured": c.measured},
+                )
+                for c in self.checked
+            ]
+        )
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The number of predictions that held, and those that did not."""
+        failed = [c for c in self.checked if not c.has_held]
+        total = len(self.checked)
+        held = total - len(failed)
+        expected = format_number(LEVEL * total)
+        lines = [f"{held} of {total} predictions held; {expected} are expected at {LEVEL:.0%}."]
+        for c in failed:
+            lines.append(
+                f"Not held: {_name(c.prediction)}, predicted "
+                f"{format_estimate(_estimate(c.prediction))}, measured "
+                f"{format_estimate(c.measured)}."
+            )
+        if {c.seeds for c in self.checked} != {self.file.seeds}:
+            lines.append(
+                f"Intervals are for means of {self.file.seeds} seeds; other numbers of seeds were "
+                "measured."
+            )
+        return tuple(lines)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return everything as plain data, which JSON can hold."""
+        return {
+            "sha256": self.file.sha256,
+            "checked": [
+                c.prediction._asdict()
+                | {"seeds": c.seeds, "measured": float(c.measured.value), "held": c.has_held}
+                for c in self.checked
+            ],
+            "sentences": list(self.sentences),
+        }
+
+
+def _name(prediction: SizePrediction) -> str:
+    return f"{prediction.hierarchy}, {prediction.size:g}: {prediction.title}"
+
+
+def _estimate(prediction: SizePrediction) -> Estimate:
+    return Estimate(*map(np.asarray, (prediction.value, prediction.low, prediction.high)))
+
+
+def check(file: PredictionFile, results: Results, spec: SpecTable) -> PredictionCheck:
+    """Compare predictions with results of a study that differs in its sizes and seeds alone.
+
+    Raises
+    ------
+    SpecError
+        If the specs differ in another key, or no predicted size was measured; one line.
+    """
+    _check_spec(file, spec)
+    columns = columns_of(results)
+    places = {
+        condition: (label_but(own, [file.size]) or "all teams", float(str(own[file.size])))
+        for condition, own in columns.items()
+        if file.size in own
+    }
+    checked = [
+        measured
+        for prediction in file.predictions
+        if (measured := _measured(prediction, results, places)) is not None
+    ]
+    if not checked:
+        predicted = ", ".join(f"{n:g}" for n in sorted({p.size for p in file.predictions}))
+        raise SpecError(
+            f"check: none of the predicted sizes was measured: {file.size} = {predicted}; the "
+            "study must sweep this key"
+        )
+    return PredictionCheck(file, tuple(checked))
+
+
+def _check_spec(file: PredictionFile, spec: SpecTable) -> None:
+    tables = (dict(_fixed(own, file.size)) for own in (file.spec, json.loads(json.dumps(spec))))
+    predicted, measured = tables
+    for key in dict.fromkeys((*predicted, *measured)):
+        if predicted.get(key) != measured.get(key):
+            raise SpecError(
+                f"check: {key} = {measured.get(key, 'absent')}, but "
+                f"{predicted.get(key, 'absent')} in the prediction: specs must be equal except "
+                f"for {file.size} and seeds"
+            )
+
+
+def _fixed(spec: Mapping[str, object], size: str) -> Iterator[tuple[str, object]]:
+    for key, value in flat(spec):
+        if key.removeprefix("sweep.") not in (size, *FREE_KEYS):
+            yield key, value
+
+
+def _measured(
+    prediction: SizePrediction, results: Results, places: Mapping[str, tuple[str, float]]
+) -> CheckedPrediction | None:
+    """Return a prediction with what was measured; None if it was not."""
+    measure, values, _ = values_of(results, prediction.measure)
+    for condition, own in values.items():
+        if places.get(condition) == (prediction.hierarchy, prediction.size):
+            numbers = pd.Series(own).to_numpy(dtype=float)
+            estimate = estimate_over_seeds(numbers, measure)
+            return CheckedPrediction(prediction, len(numbers), estimate)
+    return None
