@@ -70,12 +70,12 @@ def measure(trial: Trial) -> TrialResult:
         "memory": 1e-3 * team.learner.theta.nbytes,
         "messages": float(hierarchy.n_messages),
         "formula": float(tried * n_rules),
-        "counted": counted / len(session.deciding),
+        "counted": counted / len(session.decision_seconds),
     }
     period = trial.settings.scenario.period
     if period is not None:
         numbers["period"] = float(period)
-    return session.finish(numbers, {"decision_median": float(np.median(session.deciding))})
+    return session.finish(numbers, {"decision_median": float(np.median(session.decision_seconds))})
 
 
 def analyse(results: Results) -> Analysis:

@@ -22,7 +22,7 @@ from ..spec.spec import Spec
 from ..store.database import CHECKPOINTS
 from ..store.store import Store
 from ..trials.arrangement import check_conditions
-from ..trials.checkpoints import sweep
+from ..trials.checkpoints import remove_damaged
 from ..trials.keeping import open_to_run, pending
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer, Outcome, run_trials, versions
@@ -129,7 +129,7 @@ def _checkpoints(store: Store, seconds: float, observer: Observer) -> Iterator[C
     folder = store.directory.resolve() / CHECKPOINTS
     with suppress(OSError):  # trials go on without
         folder.mkdir(exist_ok=True)
-        for remark in sweep(folder):
+        for remark in remove_damaged(folder):
             observer.note(remark)
     code = json.dumps([store.code_digest, versions()])
     try:

@@ -1,1 +1,1 @@
-"""What one trial is, and what is measured of its episodes."""
+"""Trials: one condition with one seed, and its measurements."""

@@ -1,6 +1,6 @@
-"""What a condition arranges: its world and its team, its curriculum, its further evaluations.
+"""Scenario and team of a condition, of its curriculum and of its further evaluations.
 
-Before a study is run all of its conditions are arranged once, so that what does not fit is told
+Before a study runs, all its conditions are built once, so settings that do not fit are reported
 before anything is written.
 """
 
@@ -24,32 +24,32 @@ from ..spec.spec import Spec
 from .episodes import join_measures
 
 Evaluations = Sequence[tuple[str, ConditionSettings]]
-"""Names and settings under which a trained team is evaluated beside its own."""
+"""Names and settings of the further evaluations of a trained team."""
 
 
 class Arrangement(NamedTuple):
-    """A world and those who act in it."""
+    """A scenario and its team."""
 
     world: Scenario
-    """As the settings describe it."""
+    """The scenario that the settings describe."""
     scenario: Scenario
-    """The same as the agents see it, which may be as one agent."""
+    """The same scenario as the team sees it, with one agent if the team decides centrally."""
     team: Team
     """The agents."""
 
     @property
     def measures(self) -> tuple[Measure, ...]:
-        """What is measured of an episode: of the world, then what decisions cost."""
+        """Measures of an episode: those of the scenario, then the costs of decisions."""
         return (*measures_of(self.world.measures), *self.team.costs)
 
 
 def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
-    """Return the world of a condition and its untrained team.
+    """Build the scenario of a condition and its untrained team.
 
     Raises
     ------
     ValueError
-        If the settings do not fit together; one line.
+        If the settings do not fit together, in one line.
     """
     world = checked_scenario(settings.scenario.build())
     scenario, hierarchy = settings.arrange(world)
@@ -61,40 +61,41 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
 def teach(
     own: Arrangement, settings: ConditionSettings, curriculum: Sequence[Stage], seed: int
 ) -> Iterator[tuple[Stage, Arrangement]]:
-    """Yield each stage with its arrangement, which is trained before the next is asked for.
+    """Yield each stage with its arrangement. The caller trains the team before the next stage.
 
-    Its team continues from that of the stage before; after the last, the team of `own` continues.
+    The team of a stage starts from the weights of the previous stage. After the last stage the
+    team of `own` receives the weights.
 
     Raises
     ------
     ValueError
-        If a stage cannot be built, or what is learned in one means nothing in the next.
+        If a stage cannot be built, or a team cannot use the weights of the previous stage.
     """
-    reached: Arrangement | None = None
+    previous: Arrangement | None = None
     for stage in curriculum:
         with _naming(f"curriculum.{stage.name}"):
             there = arrange(settings.model_copy(update={"scenario": stage.scenario}), seed)
-            if reached is not None:
-                there.team.warm_start(reached.team)
+            if previous is not None:
+                there.team.warm_start(previous.team)
         yield stage, there
-        reached = there
-    if reached is not None:
+        previous = there
+    if previous is not None:
         with _naming("curriculum"):
-            own.team.warm_start(reached.team)
+            own.team.warm_start(previous.team)
 
 
 def transfer(
     own: Arrangement, settings: ConditionSettings, evaluations: Evaluations, seed: int
 ) -> Iterator[tuple[str, Arrangement]]:
-    """Yield the name and the arrangement of each further evaluation: to be evaluated, not to learn.
+    """Yield the name and the arrangement of each further evaluation, in which no team learns.
 
-    Its team is that of `own` itself if the same agents decide in the same way, else one that
-    continues from it.
+    The team is that of `own` if the same agents decide in the same way. Otherwise it is a new team
+    with the weights of `own`.
 
     Raises
     ------
     ValueError
-        If a scenario or a team cannot be built, or what was learned means nothing there.
+        If a scenario or a team cannot be built, or the team cannot use the weights.
     """
     for name, other in evaluations:
         with _naming(f"evaluations.{name}"):
@@ -118,21 +119,21 @@ def _naming(key: str) -> Iterator[None]:
 def check_conditions(
     spec: Spec, chosen: Container[str] | None = None, *, may_fail: bool = False
 ) -> tuple[Measure, ...]:
-    """Return what a study measures of its episodes, if all its conditions can be built.
+    """Build all conditions of a study once and return the measures of its episodes.
 
     Parameters
     ----------
     spec
         The study.
     chosen
-        Labels of the conditions that matter; None: all.
+        Labels of the conditions to build; None: all.
     may_fail
-        Whether code of the user's may fail in some conditions: their trials will fail, others run.
+        Whether user code may fail in some conditions. Their trials will fail and others run.
 
     Raises
     ------
     SpecError
-        If one cannot be, or their measures do not fit together; before anything is run or written.
+        If a condition cannot be built, or the measures of two conditions contradict each other.
     """
     failing: SpecError | None = None
     conditions = [c for c in spec.conditions() if chosen is None or c.label in chosen]
@@ -163,22 +164,23 @@ def check_conditions(
 
 
 def _check_saved(settings: ConditionSettings) -> None:
-    """Refuse a team that arrays cannot bring back."""
+    """Raise if a team cannot be restored from arrays."""
     team = arrange(settings, 0).team
     try:
         arrays = {name: np.array(array) for name, array in team.state_dict().items()}
         if objects := [name for name, array in arrays.items() if array.dtype.hasobject]:
             raise TypeError(f"its array {objects[0]!r} holds objects")
         team.load_state_dict(arrays)
-    except Exception as error:  # a learner may be anybody's
+    except Exception as error:  # a user's learner may raise anything
         raise ValueError(
             f"keep_teams = true: a team of learner.kind = {settings.learner.kind!r} cannot be "
-            f"saved, {error}; needs `arrays` of numbers, and `restore` that takes them"
+            f"saved, {error}; `state_dict` must return arrays of numbers that `load_state_dict` "
+            "accepts"
         ) from None
 
 
 def _arrangements(condition: Condition) -> Iterator[Arrangement]:
-    """Yield a condition's own arrangement and those of its stages and evaluations."""
+    """Yield the arrangements of a condition, of its stages and of its evaluations."""
     settings = condition.settings
     own = arrange(settings, 0)
     stages = teach(own, settings, condition.curriculum, 0)

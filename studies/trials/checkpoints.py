@@ -1,9 +1,9 @@
-"""Checkpoints: the state of a running trial, from which an interrupted trial continues.
+"""Checkpoints: the state of a running trial, from which an interrupted trial resumes.
 
-A file per trial in the folder of the study, replaced every few minutes and at evaluations on the
-way, gone when its trial is kept. It holds arrays of numbers and a table of JSON, behind a digest of
-both. What is damaged, of another trial, or of other code is as if it were not there; damage is
-remarked when a study is run. A trial that goes on has the rows that it would have had, bit by bit.
+Each trial that takes minutes has one file in the folder of the study. It is replaced every few
+minutes and deleted when the result of the trial is stored. It contains arrays of numbers and a JSON
+table, after a digest of both. A checkpoint that is damaged or belongs to another trial or to other
+code is ignored. A resumed trial gives the same rows, bit for bit.
 """
 
 from __future__ import annotations
@@ -27,95 +27,89 @@ from .episodes import EpisodeRow
 from .trial import Trial
 
 TABLE = "table"
-"""The array that holds the text of the table."""
-DIGEST = 64
-"""Characters before the arrays."""
+"""Name of the array that holds the JSON text."""
+DIGEST_LENGTH = 64
+"""Number of characters before the arrays."""
 
 
-class Reached(NamedTuple):
-    """What a trial select_prefix way has come to."""
+class CheckpointState(NamedTuple):
+    """State of a running trial."""
 
     rows: Sequence[EpisodeRow]
-    """Of the episodes so far."""
+    """Episodes so far."""
     seconds: Mapping[str, float]
-    """Time spent in each part of the control loop."""
+    """Duration of each part of the control loop [s]."""
     usage: Mapping[str, float]
-    """What it took beside time."""
-    spent: float
-    """Processor time of training [s], where that is counted apart."""
+    """Other resources that the trial has used, by name."""
+    training_cpu_s: float
+    """Processor time of `Session.train_until` [s]."""
     recordings: Mapping[str, Recording]
-    """As in `TrialResult`."""
+    """Recordings as in `TrialResult`."""
     team: Recording
-    """What the team remembers."""
+    """State of the team."""
     environments: Recording
-    """State of many environments; empty for a learner of one environment."""
+    """State of parallel environments; empty for a learner with one environment."""
 
 
 class Checkpoint:
-    """The checkpoint of a trial.
-
-    Parameters
-    ----------
-    trial
-        The trial.
-    """
+    """The checkpoint file of a trial."""
 
     def __init__(self, trial: Trial) -> None:
-        self._place = place(trial)
+        self._location = location(trial)
         self._identity = trial.identity
-        self._next = time.monotonic() + (self._place.seconds if self._place else 0.0)
+        self._next = time.monotonic() + (self._location.seconds if self._location else 0.0)
 
     @property
     def is_due(self) -> bool:
-        """Whether it is time to write one."""
-        return self._place is not None and time.monotonic() >= self._next
+        """Whether it is time to write a checkpoint."""
+        return self._location is not None and time.monotonic() >= self._next
 
-    def write(self, reached: Reached) -> None:
-        """Replace the file; where it cannot be written, the trial goes on without."""
-        if self._place is None:
+    def write(self, state: CheckpointState) -> None:
+        """Replace the file. If it cannot be written, the trial continues without it."""
+        if self._location is None:
             return
         table = {
             "identity": self._identity,
-            "code": self._place.code,
-            "rows": [[*row] for row in reached.rows],
-            "seconds": dict(reached.seconds),
-            "usage": dict(reached.usage),
-            "spent": reached.spent,
+            "code": self._location.code,
+            "rows": [[*row] for row in state.rows],
+            "seconds": dict(state.seconds),
+            "usage": dict(state.usage),
+            "training_cpu_s": state.training_cpu_s,
         }
-        groups = {f"recordings/{k}": arrays for k, arrays in reached.recordings.items()}
-        groups |= {"team": reached.team, "environments": reached.environments}
+        groups = {f"recordings/{name}": arrays for name, arrays in state.recordings.items()}
+        groups |= {"team": state.team, "environments": state.environments}
         arrays = {
             f"{group}/{k}": array for group, own in groups.items() for k, array in own.items()
         }
         text = np.frombuffer(json.dumps(table, allow_nan=False).encode(), np.uint8)
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **{TABLE: text, **arrays})
+        content = buffer.getvalue()
+        digest = hashlib.sha256(content).hexdigest().encode()
         with suppress(OSError, ValueError):
-            _write(self._place.file(self._identity), {TABLE: text, **arrays})
-        self._next = time.monotonic() + self._place.seconds
+            write(self._location.file(self._identity), digest + content)
+        self._next = time.monotonic() + self._location.seconds
 
-    def read(self) -> Reached | None:
-        """Return what it holds; None if it holds nothing that this trial may go on from."""
-        if self._place is None:
+    def read(self) -> CheckpointState | None:
+        """Return the saved state; None if there is none from which this trial can resume."""
+        if self._location is None:
             return None
         try:
-            content = _content(self._place.file(self._identity))
+            content = _content(self._location.file(self._identity))
             if content is None:
                 return None
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
                 arrays = dict(file)
             table = json.loads(arrays.pop(TABLE).tobytes())
-            if (table["identity"], table["code"]) != (self._identity, self._place.code):
+            if (table["identity"], table["code"]) != (self._identity, self._location.code):
                 return None
-            recordings = dict.fromkeys(
-                key.split("/", 2)[1] for key in arrays if key.startswith("recordings/")
-            )
-            return Reached(
+            names = {key.split("/", 2)[1]: None for key in arrays if key.startswith("recordings/")}
+            return CheckpointState(
                 rows=[EpisodeRow(*row) for row in table["rows"]],
                 seconds=table["seconds"],
                 usage=table["usage"],
-                spent=float(table["spent"]),
-                recordings={
-                    name: select_prefix(f"recordings/{name}/", arrays) for name in recordings
-                },
+                training_cpu_s=float(table["training_cpu_s"]),
+                recordings={name: select_prefix(f"recordings/{name}/", arrays) for name in names},
                 team=select_prefix("team/", arrays),
                 environments=select_prefix("environments/", arrays),
             )
@@ -123,37 +117,29 @@ class Checkpoint:
             return None
 
 
-def place(trial: Trial) -> Checkpoints | None:
-    """Return where a trial puts down what it has come to; None: nowhere.
+def location(trial: Trial) -> Checkpoints | None:
+    """Return where the checkpoint of a trial is stored; None if it has none.
 
-    What things of users remember is not known, so that trials with such begin anew.
+    The state of user code is unknown, so a trial with user code starts from the beginning.
     """
-    known = trial.sources.checkpoints
     is_built_in = trial.settings.learner.kind in LEARNERS.built_in
-    if known is None or not is_built_in or any(n.endswith(".py") for n in trial.sources.texts):
+    if not is_built_in or any(name.endswith(".py") for name in trial.sources.texts):
         return None
-    return known
+    return trial.sources.checkpoints
 
 
-def sweep(folder: Path) -> Iterator[str]:
-    """Remove what is half-written and what is damaged, and yield a remark on each of the latter."""
-    for half_written in folder.glob(".*.new"):
-        half_written.unlink()
+def remove_damaged(folder: Path) -> Iterator[str]:
+    """Delete incomplete and damaged checkpoints, and yield a remark on each damaged one."""
+    for incomplete in folder.glob(".*.new"):
+        incomplete.unlink()
     for file in sorted(folder.glob("*.npz")):
         if _content(file) is None:
             file.unlink()
-            yield f"{file}: is damaged, its trial begins anew"
+            yield f"{file}: is damaged, its trial starts from the beginning"
 
 
 def _content(path: Path) -> bytes | None:
-    """Return the arrays in a file as bytes; None if their digest is another one."""
+    """Return the arrays in a file as bytes; None if they do not match their digest."""
     content = read_bytes(path)
-    digest = hashlib.sha256(content[DIGEST:]).hexdigest().encode()
-    return content[DIGEST:] if content[:DIGEST] == digest else None
-
-
-def _write(path: Path, arrays: Recording) -> None:
-    buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)
-    content = buffer.getvalue()
-    write(path, hashlib.sha256(content).hexdigest().encode() + content)
+    digest = hashlib.sha256(content[DIGEST_LENGTH:]).hexdigest().encode()
+    return content[DIGEST_LENGTH:] if content[:DIGEST_LENGTH] == digest else None

@@ -1,6 +1,6 @@
-"""What is measured of an episode, step by step, and what columns of results are called.
+"""Measurements of episodes, and the names of their columns.
 
-Measures are those that scenarios declare, see `nested_agents.core.interface.measures`.
+Scenarios declare the measures, see `nested_agents.core.interface.measures`.
 """
 
 from __future__ import annotations
@@ -17,47 +17,47 @@ from ...core.interface.scenario import Transition
 from ..errors import SpecError
 from ..store.database import AFTER, BEFORE
 
-NOTHING: Mapping[str, float] = {}
-"""What decisions cost that ask no function."""
+NO_COSTS: Mapping[str, float] = {}
+"""Costs of a decision of agents that report none."""
 
 
 class EpisodeRow(NamedTuple):
     """The measurements of one episode."""
 
     phase: str
-    """``training`` or ``evaluation``; or one that begins with `STAGE` or `EVALUATION`."""
+    """``training``, ``evaluation``, or a phase that begins with `STAGE` or `EVALUATION`."""
     episode: int
-    """Counted from 0 within its phase, or through all stages of a curriculum."""
+    """Number from 0 within its phase, or within all stages of a curriculum."""
     steps: int
     measures: Mapping[str, float]
-    """Values of the scenario's measures by name, in their order; of a rate, whether it is so."""
+    """Values of the scenario's measures by name, in their order. A rate has a Boolean value."""
     return_: float
-    """Sum of the rewards, not discounted; of rewards of each agent, of their mean."""
+    """Undiscounted sum of the rewards. If each agent has its own reward, their mean is summed."""
 
     def flat(self, names: Iterable[str]) -> tuple[object, ...]:
-        """Return it with the measures of these names in place of all; None where it has not one."""
+        """Return the values in the order of `columns`. A measure that is missing is None."""
         measured = (self.measures.get(name) for name in names)
         return (self.phase, self.episode, self.steps, *measured, self.return_)
 
 
-GATHER: dict[str, Callable[[float, float], float]] = {
+ACCUMULATE: dict[str, Callable[[float, float], float]] = {
     "last": lambda _, value: value,
     "max": max,
     "sum": add,
     "mean": add,
 }
-"""What is gathered of two values, one after the other; a mean is divided at the end."""
+"""Update of a measure by the value of a step. A mean is divided at the end of the episode."""
 
 
 class EpisodeMeter:
-    """Takes in the transitions of one episode and sums them up.
+    """Computes the measures of one episode from its transitions.
 
     Parameters
     ----------
     phase, episode
-        Where the episode stands.
+        Phase and number of the episode.
     measures
-        What is measured of it.
+        Measures to compute.
 
     Examples
     --------
@@ -76,30 +76,30 @@ class EpisodeMeter:
         self._steps = 0
         self._return = 0.0
 
-    def add(self, transition: Transition, spent: Mapping[str, float] = NOTHING) -> None:
-        """Take in one step, and what the decision cost that led to it.
+    def add(self, transition: Transition, costs: Mapping[str, float] = NO_COSTS) -> None:
+        """Add one step and the costs of its decision.
 
         Raises
         ------
         ValueError
-            If the transition does not hold what a measure is taken from.
+            If the transition lacks the source of a measure.
         """
         self._steps += 1
         for measure in self._measures:
             source = measure.source
-            value = spent[source] if source in spent else value_at(measure, transition)
+            value = costs[source] if source in costs else value_at(measure, transition)
             before = self._values[measure.name]
-            self._values[measure.name] = GATHER[measure.gathering](before, value)
+            self._values[measure.name] = ACCUMULATE[measure.gathering](before, value)
         reward = transition.reward
         self._return += reward if isinstance(reward, float) else float(np.mean(reward))
 
     def row(self) -> EpisodeRow:
-        """Return the measurements of the episode, which has ended.
+        """Return the measurements at the end of the episode.
 
         Raises
         ------
         FloatingPointError
-            If one of them is not finite: the trial has come to nothing, and says so.
+            If a measurement is not finite.
         """
         means = [m.name for m in self._measures if m.gathering == "mean"]
         measured = self._values | {name: self._values[name] / self._steps for name in means}
@@ -117,7 +117,7 @@ def value_at(measure: Measure, transition: Transition) -> float:
     Raises
     ------
     ValueError
-        If the step does not hold what the measure is taken from.
+        If the step lacks the source of the measure.
     """
     if measure.source == "terminated":
         return float(transition.terminated)
@@ -137,26 +137,26 @@ def value_at(measure: Measure, transition: Transition) -> float:
 
 
 RESERVED = ("identity", "condition", "seed", "position", *BEFORE, *AFTER)
-"""What no measure may be called, as columns of results are called so."""
+"""Names of other columns of results, which no measure may have."""
 
 
 def join_measures(
     by_scenario: Iterable[Sequence[Measure]], taken: Iterable[str] = ()
 ) -> tuple[Measure, ...]:
-    """Return the measures of several scenarios, each once, in the order in which they come.
+    """Return the distinct measures of several scenarios in order of appearance.
 
     Parameters
     ----------
     by_scenario
-        What each scenario declares.
+        Measures of each scenario.
     taken
-        Names of the columns that tell conditions apart, which no measure may have.
+        Names of the columns of swept keys, which no measure may have.
 
     Raises
     ------
     SpecError
-        If a name is reserved, two scenarios mean different things by it, or two columns differ
-        only in case.
+        If a name is reserved, two scenarios declare a name differently, or two names differ only
+        in case.
 
     Examples
     --------
@@ -168,15 +168,15 @@ def join_measures(
     for name in taken:
         if (other := columns.setdefault(name.lower(), name)) != name:
             raise SpecError(
-                f"sweep: {other!r} and {name!r} differ only in case, and columns of results do "
-                "not; rename one of these settings"
+                f"sweep: {other!r} and {name!r} differ only in case, but columns of results must "
+                "differ by more; rename one of these settings"
             )
     reserved = {name.lower() for name in (*RESERVED, *taken)}
     by_name: dict[str, Measure] = {}
     for measures in by_scenario:
         for measure in measures:
             if measure.name.lower() in reserved:
-                raise SpecError(f"measure {measure.name!r}: a column of results is called so")
+                raise SpecError(f"measure {measure.name!r}: is the name of another column")
             known = by_name.setdefault(measure.name.lower(), measure)
             if column_of(known) != column_of(measure):
                 raise SpecError(
@@ -187,7 +187,7 @@ def join_measures(
 
 
 def column_of(measure: Measure) -> tuple[str, str, str, bool]:
-    """Return what equal columns have in common: name, unit, gathering, whether it is a rate."""
+    """Return name, unit, gathering and rate flag of a measure, which define its column."""
     return measure.name, measure.unit, measure.gathering, measure.is_rate
 
 

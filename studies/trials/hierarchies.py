@@ -1,4 +1,4 @@
-"""The hierarchies of a study's conditions and evaluations, each once."""
+"""Distinct hierarchies of a study's conditions and evaluations."""
 
 from collections.abc import Iterator
 
@@ -9,12 +9,12 @@ from ..spec.spec import Spec
 
 
 def hierarchies_of(spec: Spec) -> Iterator[HierarchyView]:
-    """Yield the distinct hierarchies of a spec, each called by the first that has it.
+    """Yield the distinct hierarchies of a spec, each labeled by its first condition.
 
     Raises
     ------
     SpecError
-        If one cannot be built; one line.
+        If a hierarchy cannot be built, in one line.
     """
     seen = set[object]()
     for label, settings in _labelled(spec):

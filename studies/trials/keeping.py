@@ -1,4 +1,4 @@
-"""A study and its store: opened to run what is left, if it is the same study, and read back."""
+"""Opening the store of a study to run the trials that are left, or to read its trials."""
 
 import json
 import tomllib
@@ -31,9 +31,9 @@ SAME = (
     "keep_teams",
     "evaluations",
 )
-"""What of a spec must be the same for a study to go on."""
+"""Keys of a spec that must be equal for a study to continue."""
 ABSENT = object()
-"""In place of the value of a key that is not there."""
+"""Value of a key that is missing."""
 
 
 @contextmanager
@@ -45,7 +45,7 @@ def open_to_run(
     *,
     accept_code: bool = False,
 ) -> Iterator[Store]:
-    """Open the store of a study in a directory; make it if it does not exist.
+    """Open the store of a study in a directory, and create it if it does not exist.
 
     Parameters
     ----------
@@ -54,17 +54,17 @@ def open_to_run(
     spec
         The study.
     trials
-        Those that are to be run now: all, or some. Others of it that were planned before stay so.
+        Trials to run now. Other trials that were planned before remain planned.
     measures
-        What it measures of its episodes, see `arrangement.check_conditions`.
+        Measures of its episodes, see `arrangement.check_conditions`.
     accept_code
-        Whether to go on although the installed code has changed since.
+        Whether to continue although the installed code has changed.
 
     Raises
     ------
     SpecError
-        If it cannot be written, holds a study that differs by more than additional seeds, or
-        another process is writing to it. Nothing has been changed then.
+        If the directory cannot be written, contains a study that differs by more than additional
+        seeds, or another process is writing to it. Nothing has been changed then.
     """
     notes = notes_of(spec, measures)
     _examine(directory, spec, notes, accept_code=accept_code)  # a refusal leaves nothing behind
@@ -77,7 +77,7 @@ def open_to_run(
             code=present(code, notes.spec, notes.sources),
             planned=[trial.planned for trial in trials_of(spec) if trial.identity in chosen],
         )
-        copies = spec.sources.texts.items()  # to be read and run again, as is the spec
+        copies = spec.sources.texts.items()  # so that the study can be run again
         files = {f"{FOLDER}/{kept_name(name)}": text.encode() for name, text in copies}
         if not is_copy(directory / SPEC_FILE, spec, notes):
             files[SPEC_FILE] = dumps(spec.table()).encode()
@@ -86,21 +86,21 @@ def open_to_run(
 
 
 def spec_of(store: Store) -> Spec:
-    """Return the spec of a kept study; what it names of users' files is run."""
+    """Return the spec of a stored study. This runs the user files that it names."""
     return Spec.of(store.spec(), sources_of(store))
 
 
 def pending(store: Store, trials: Iterable[Trial]) -> list[Trial]:
     """Return the trials that have neither failed nor finished with undamaged results.
 
-    What is damaged is added to the store's `notes`.
+    A remark on each damaged trial is added to the store's `notes`.
     """
     states = store.states()
     return [trial for trial in trials if trial.identity not in states]
 
 
 def finished_trial(store: Store, condition: str | None, seed: int | None) -> Trial:
-    """Return the trial of a condition and seed of a study, each the first one unless named.
+    """Return the finished trial of a condition and seed; by default the first ones of the study.
 
     Raises
     ------
@@ -219,9 +219,9 @@ def _check_same(store: Store, spec: Spec, notes: StudyNotes) -> None:
 
 
 def difference(old: StudyNotes, new: StudyNotes) -> str | None:
-    """Return one line on what keeps a study from being added to another; None if nothing does.
+    """Return one line on the first difference of two studies; None if they are the same study.
 
-    Only what they mean is compared, not how it is written. Seeds may be added.
+    Meanings are compared, not notation. Additional seeds are no difference.
     """
     lines = list(_differences(old, new))
     if not lines:
@@ -245,12 +245,12 @@ def _differences(old: StudyNotes, new: StudyNotes) -> Iterator[str]:
         yield f"conditions = {there} there, {here} here{written and f', by {written}'}"
     for stages, new_stages in zip(_curricula(old), _curricula(new), strict=False):
         yield from _unequal("curriculum", stages, new_stages)
-    # What tells conditions apart are the columns of every table.
+    # The swept keys are columns of every table.
     keys, new_keys = (list(next(iter(notes.columns.values()))) for notes in (old, new))
     yield from _unequal("columns", keys, new_keys)
     if old.measures and [*map(column_of, old.measures)] != [*map(column_of, new.measures)]:
         there, here = (", ".join(m.name for m in notes.measures) for notes in (old, new))
-        yield f"episodes are measured by {there} there, {here} here, or these mean something else"
+        yield f"measures of episodes = {there} there, {here} here, or their definitions differ"
     for label in [label for label in new.conditions if label in old.conditions]:
         before, after = (dict(flat(notes.conditions[label])) for notes in (old, new))
         for key in sorted(before.keys() | after.keys()):
@@ -264,18 +264,18 @@ def _changed_files(old: Mapping[str, str], new: Mapping[str, str]) -> Iterator[s
     here = Sources(None, new)
     for name in sorted(old):
         if name not in new:
-            yield f"{name} is part of it, not of this one"
+            yield f"{name} is a file of the study there, not of this one"
         elif there.digest(name) != here.digest(name):
             yield f"{name} has changed since"
 
 
 def _seeds(written: int | Sequence[int]) -> Sequence[int]:
-    """Return the seeds of a spec, which it may give by their number."""
+    """Return the seeds of a spec, which may be written as their number."""
     return list(range(written)) if isinstance(written, int) else written
 
 
 def _written(old: SpecTable, new: SpecTable) -> Iterator[str]:
-    """Yield which keys of two specs differ, besides seeds."""
+    """Yield the keys, except seeds, in which two specs differ."""
     before, after = (dict(flat(spec)) for spec in (old, new))
     for key in sorted((before.keys() | after.keys()) - {"seeds"}):
         yield from _unequal(key, before.get(key, ABSENT), after.get(key, ABSENT))
@@ -288,6 +288,6 @@ def _unequal(name: str, there: object, here: object) -> Iterator[str]:
 
 
 def _curricula(notes: StudyNotes) -> list[Sequence[SpecTable]]:
-    """Return the stages of the spec and of each of its overrides, as they are written."""
+    """Return the curriculum of the spec and of each of its overrides, as written."""
     own = notes.spec.get("curriculum", [])
     return [own, *(o.get("curriculum", own) for o in notes.spec.get("overrides", ()))]

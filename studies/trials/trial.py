@@ -1,6 +1,6 @@
-"""A trial: one condition, one seed, and what running it gives: a pure function of its content.
+"""A trial: one condition with one seed. Its result is a pure function of its content.
 
-It gives what is measured of its episodes, and what is recorded of them.
+The result contains measurements and recordings of its episodes.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ class Trial:
     """One run of a study."""
 
     study: str
-    """Name of the study that measures it."""
+    """Name of its study."""
     condition: str = field(compare=False)
-    """Label of its condition; a name only, no part of its identity."""
+    """Label of its condition, which is not a part of its identity."""
     settings: ConditionSettings
-    """What the condition consists of."""
+    """Settings of the condition."""
     seed: int
     """As in `Spec`."""
     episodes: int
@@ -46,20 +46,20 @@ class Trial:
     evaluation: int
     """As in `Spec`."""
     evaluations: tuple[tuple[str, ConditionSettings], ...] = ()
-    """Names and settings under which the trained team is evaluated beside its own."""
+    """Names and settings of the further evaluations of the trained team."""
     curriculum: tuple[Stage, ...] = ()
-    """Stages that the team is trained in before its own scenario."""
+    """Stages in which the team is trained before its own scenario."""
     evaluation_steps: int | None = None
     """As in `Spec`."""
     decisions: int | None = None
     """As in `Spec`."""
     keep_teams: bool = False
-    """As in `Spec`; changes nothing that is measured, and is no part of its identity."""
+    """As in `Spec`. It does not affect measurements and is not a part of the identity."""
     sources: Sources = field(default_factory=Sources, compare=False)
-    """The files of users that it names; what they mean is part of its identity."""
+    """User files that it names. Digests of those that it uses are a part of its identity."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Settings of a user's thing are of a class that only its file can make again.
+        # The class of settings of user code exists only after its file has been run.
         evaluations = [(name, other.model_dump()) for name, other in self.evaluations]
         curriculum = [(s.name, s.episodes, s.scenario.model_dump()) for s in self.curriculum]
         plain = {
@@ -73,7 +73,7 @@ class Trial:
             "decisions": self.decisions,
             "keep_teams": self.keep_teams,
         }
-        return revive, (self.sources, self.settings.model_dump(), evaluations, curriculum, plain)
+        return unpickle, (self.sources, self.settings.model_dump(), evaluations, curriculum, plain)
 
     @cached_property
     def identity(self) -> str:
@@ -84,7 +84,7 @@ class Trial:
 
     @cached_property
     def _content(self) -> dict[str, Any]:
-        """What is hashed, except the seed."""
+        """Hashed content except the seed."""
         evaluations = {name: self._own_part(other) for name, other in self.evaluations}
         content: dict[str, Any] = {
             "version": RESULTS_VERSION,
@@ -106,37 +106,37 @@ class Trial:
         return content | {"sources": {name: self.sources.digest(name) for name in files}}
 
     def _own_part(self, other: ConditionSettings) -> Settings:
-        """Return what settings of an evaluation have that the trial's own have not."""
+        """Return the scenario of an evaluation, or all settings if the team acts differently."""
         return other.scenario if other.acts_as(self.settings) else other
 
     def with_seed(self, seed: int) -> Trial:
-        """Return the trial with another seed; what both have in common is not written out again."""
+        """Return the trial with another seed. Both share the content that is hashed."""
         other = replace(self, seed=seed)
         vars(other)["_content"] = self._content
         return other
 
     def world(self) -> Scenario:
-        """Return its scenario as the settings describe it, built anew."""
+        """Build the scenario that the settings describe."""
         with self.sources.active():
             return checked_scenario(self.settings.scenario.build())
 
     @property
     def planned(self) -> Planned:
-        """What a store notes of it."""
+        """Description of the trial in a store."""
         return Planned(self.identity, self.condition, self.seed, self.recorded)
 
     @property
     def lengths(self) -> str:
-        """Its episodes of training, stage by stage, or its decisions, in words."""
+        """Number of training episodes in each stage, or of decisions, as text."""
         if self.decisions is not None:
             return f"{self.decisions} decisions"
         return lengths([[stage.episodes for stage in self.curriculum]], self.episodes)
 
     @cached_property
     def recorded(self) -> dict[int, str]:
-        """Names of the training episodes that are recorded, by number.
+        """Names of the recorded training episodes, by number.
 
-        The first and the last; if something is scheduled to fail, also that one and the one before.
+        The first and the last episode are recorded, and those before and after a scheduled failure.
         """
         names = {}
         onset = self.settings.onset
@@ -148,26 +148,25 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """What a trial measured."""
+    """Measurements and recordings of a trial."""
 
     rows: tuple[EpisodeRow, ...]
-    """The episodes in order, training first. A function of the trial, bit by bit."""
+    """Episodes in order, training first. They are a function of the trial, bit for bit."""
     measures: tuple[Measure, ...]
-    """What is measured of them; of some episodes a part, if scenarios of evaluations differ."""
+    """Measures of any episode. Scenarios of evaluations may lack some of them."""
     recordings: dict[str, Recording]
-    """Training episodes by name, those of `Trial.recorded`; none if the scenario is no
-    `RecordedScenario`. Under `TEAM` the arrays of the trained team, if it is to be kept. A function
-    of the trial, too."""
+    """Training episodes of `Trial.recorded` by name, if the scenario is a `RecordedScenario`. With
+    `keep_teams`, `TEAM` names the arrays of the trained team. They are a function of the trial."""
     seconds: dict[str, float]
-    """Time spent in each part of the control loop; differs from run to run."""
+    """Duration of each part of the control loop [s]; differs from run to run."""
     numbers: Mapping[str, float] = field(default_factory=dict)
-    """Further measurements of the trial as a whole by name; a function of the trial."""
+    """Further measurements of the whole trial by name. They are a function of the trial."""
     usage: Mapping[str, float] = field(default_factory=dict)
-    """What it took beside time, by name; differs from run to run."""
+    """Further resources that the trial used, by name; differs from run to run."""
 
 
 def trials_of(spec: Spec) -> tuple[Trial, ...]:
-    """Return the trials of a spec: seed by seed, so that every condition advances alike."""
+    """Return the trials of a spec, seed by seed, so that all conditions advance equally."""
     first = [
         Trial(
             condition=condition.label,
@@ -189,17 +188,14 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
     return tuple(trial.with_seed(seed) for seed in spec.seeds for trial in first)
 
 
-"""Settings, as plain values."""
-
-
-def revive(
+def unpickle(
     sources: Sources,
     settings: SpecTable,
     evaluations: Sequence[tuple[str, SpecTable]],
     curriculum: Sequence[tuple[str, int, SpecTable]],
     plain: SpecTable,
 ) -> Trial:
-    """Return a trial that was pickled, its settings made again by its files."""
+    """Return a pickled trial, whose settings are validated by the classes in its files."""
     build = partial(ConditionSettings.model_validate, strict=True)
     with sources.active():
         stages = [Stage(n, k, build({"scenario": table}).scenario) for n, k, table in curriculum]

@@ -1,8 +1,8 @@
-"""Workers of a local Dask cluster, or of a running one.
+"""Workers of a new local Dask cluster, or of a running cluster.
 
-A cluster has an idea of its own of what to do when a worker dies: it hands the trial to another
-one, and gives up after some deaths (`allowed-failures` in its configuration; none in a cluster
-started here). Only then is the trial lost. Workers may join and leave at any time.
+When a worker dies, the cluster gives its trial to another worker. The trial is lost after
+`allowed-failures` deaths, a setting of the cluster; a local cluster allows none. Workers may join
+and leave at any time.
 """
 
 from __future__ import annotations
@@ -21,39 +21,39 @@ from distributed.comm.registry import get_backend
 
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .nursery import Answer, call_for
-from .runner import ONE_THREAD, Outcome, RunTrial, Workers, beginning_processes, versions
+from .fork_server import Answer, call_for
+from .runner import ONE_THREAD, Outcome, RunTrial, Workers, starting_processes, versions
 
-CONNECT = 10.0
+CONNECT_TIMEOUT_S = 10.0
 """Timeout for connecting to a scheduler [s]."""
 
-PATIENCE = 60.0
+WORKER_TIMEOUT_S = 60.0
 """Timeout for the first worker, or for a new one when all have gone [s]."""
 
 
-class UnlikeWorkerError(Exception):
-    """A worker on which a trial might give other bits, or could not run; one line."""
+class IncompatibleWorkerError(Exception):
+    """A worker might give other bits, in one line."""
 
 
-def call_alike(
+def call_if_compatible(
     expected: dict[str, str], function: Callable[..., Outcome | Answer], *arguments: object
 ) -> Outcome | Answer:
-    """Run a trial on a worker that somebody else started, if it is as `expected`; see `call_for`.
+    """Call a function of `call_for` on a worker of the cluster if its versions are `expected`.
 
     Raises
     ------
-    UnlikeWorkerError
-        If its versions are not the `expected` ones, see `versions`, or it uses several threads.
+    IncompatibleWorkerError
+        If its `versions` differ, or it uses several threads.
     """
     worker = get_worker()
     here = versions() | {name: os.environ.get(name, "not set") for name in ONE_THREAD}
     for name, wanted in (expected | ONE_THREAD).items():
         if here[name] != wanted:
-            raise UnlikeWorkerError(
+            raise IncompatibleWorkerError(
                 f"the worker {worker.address} has {name} {here[name]}, must be {wanted}"
             )
     if worker.state.nthreads > 1:
-        raise UnlikeWorkerError(
+        raise IncompatibleWorkerError(
             f"the worker {worker.address} has {worker.state.nthreads} threads, must be 1: start "
             f"dask worker with --nworkers {worker.state.nthreads} --nthreads 1"
         )
@@ -66,25 +66,25 @@ class DaskWorkers(Workers[Future]):
     Parameters
     ----------
     client
-        Connected to the cluster.
-    most
-        Most trials at a time; None: one for every worker.
+        Client that is connected to the cluster.
+    max_trials
+        Maximum number of trials at a time; None: one for each worker.
     name
-        What to call the cluster in messages.
+        Name of the cluster in messages.
     """
 
-    def __init__(self, client: Client, most: int | None, name: str) -> None:
+    def __init__(self, client: Client, max_trials: int | None, name: str) -> None:
         self._client = client
-        self._most = most
+        self._max_trials = max_trials
         self._name = name
-        self._alone_since: float | None = None  # when there was no worker any more
+        self._empty_since: float | None = None  # time when the last worker left
 
     @classmethod
     @contextmanager
     def local(cls, jobs: int) -> Iterator[DaskWorkers]:
-        """Start a cluster of `jobs` workers on this machine; it ends with the context."""
+        """Start a cluster of `jobs` workers on this machine, which ends with the context."""
         with _quiet():
-            with beginning_processes():
+            with starting_processes():
                 cluster = LocalCluster(
                     n_workers=jobs,
                     threads_per_worker=1,
@@ -100,17 +100,19 @@ class DaskWorkers(Workers[Future]):
     @classmethod
     @contextmanager
     def at(cls, address: str, jobs: int | None) -> Iterator[DaskWorkers]:
-        """Use the cluster with its scheduler at `address`, with at most `jobs` trials at a time.
+        """Connect to the scheduler at `address` and run at most `jobs` trials at a time.
 
         Raises
         ------
         SpecError
-            If it cannot be reached.
+            If the scheduler cannot be reached.
         """
         with _quiet():
             try:
-                get_backend(parse_address(address)[0])  # a client may fail on others by assertion
-                client = Client(address, timeout=CONNECT)
+                get_backend(
+                    parse_address(address)[0]
+                )  # Client reports an unknown protocol by an AssertionError only
+                client = Client(address, timeout=CONNECT_TIMEOUT_S)
             except (OSError, ValueError, AssertionError) as error:
                 why = " ".join(str(error).split()) or "no scheduler answers"
                 raise SpecError(f"--address {address}: {why}") from None
@@ -126,36 +128,36 @@ class DaskWorkers(Workers[Future]):
             raise self._gone() from error
         now = time.monotonic()
         if workers:
-            self._alone_since = None
-        elif self._alone_since is None:
-            self._alone_since = now
-        elif now - self._alone_since > PATIENCE:
+            self._empty_since = None
+        elif self._empty_since is None:
+            self._empty_since = now
+        elif now - self._empty_since > WORKER_TIMEOUT_S:
             raise SpecError(
-                f"{self._name} has had no worker for {PATIENCE:.0f} s; what has finished "
-                "is kept, the same command continues"
+                f"{self._name} has had no worker for {WORKER_TIMEOUT_S:.0f} s; finished "
+                "trials are stored, the same command continues"
             )
-        return workers if self._most is None else min(workers, self._most)
+        return workers if self._max_trials is None else min(workers, self._max_trials)
 
     def submit(self, run_trial: RunTrial, trial: Trial) -> Future:
         """See `Workers.submit`."""
         call = call_for(run_trial, trial)
-        return self._client.submit(call_alike, versions(), *call, pure=False)
+        return self._client.submit(call_if_compatible, versions(), *call, pure=False)
 
     def fetch(self, future: Future, trial: Trial) -> Outcome | None:
         """See `Workers.fetch`."""
         try:
-            result: Outcome | Answer = future.result(timeout=CONNECT)
+            result: Outcome | Answer = future.result(timeout=CONNECT_TIMEOUT_S)
         except TimeoutError:
             return None  # the worker that held the result died
         except KilledWorker:
-            self._alone_since = None
+            self._empty_since = None
             return Outcome(trial, f"killed, in {self._name}", 0.0, lost=True)
-        except UnlikeWorkerError as error:
+        except IncompatibleWorkerError as error:
             raise SpecError(f"{self._name}: {error}") from None
         except (CancelledError, CommClosedError):
             raise self._gone() from None
         except ImportError as error:
-            raise SpecError(f"{self._name}: a worker cannot begin: {error}") from None
+            raise SpecError(f"{self._name}: a worker cannot start: {error}") from None
         return result if isinstance(result, Outcome) else result.outcome(trial)
 
     def stop(self, futures: Sequence[Future]) -> None:
@@ -165,13 +167,13 @@ class DaskWorkers(Workers[Future]):
 
     def _gone(self) -> SpecError:
         return SpecError(
-            f"{self._name} is gone; what has finished is kept, the same command continues"
+            f"{self._name} is gone; finished trials are stored, the same command continues"
         )
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence the logs and warnings of the cluster: what matters is reported in one line."""
+    """Silence logs and warnings of the cluster, because errors are reported in one line."""
     with warnings.catch_warnings(action="ignore"), ExitStack() as stack:
         for logger in map(logging.getLogger, ("distributed", "tornado", "asyncio")):
             stack.callback(logger.setLevel, logger.level)

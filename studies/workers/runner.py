@@ -1,7 +1,7 @@
-"""Runs trials on workers of any kind and keeps every result the moment it arrives.
+"""Running trials on workers and storing each result when it arrives.
 
-A trial whose worker died is run again when the others are done, alone, up to `ATTEMPTS` times. What
-happens in a worker process stands here, too, so this is light to import: a worker must be up early.
+A trial whose worker died runs again after the others, alone, up to `ATTEMPTS` times. Worker
+processes import this module, so it imports little.
 """
 
 from __future__ import annotations
@@ -28,61 +28,60 @@ if TYPE_CHECKING:
     from ..spec.spec import Spec
     from ..trials.trial import Trial, TrialResult
 
-ORPHANED = 0.5
-"""How often a worker looks whether its parent is still there [s]."""
+PARENT_POLL_S = 0.5
+"""Polling interval of a worker for the end of its parent [s]."""
 
 PACKAGES = ("nested-agents", "numpy", "numba", "scipy", "Box2D")
-"""The packages on whose versions the bits of a result may depend."""
+"""Packages whose versions may affect the bits of a result."""
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""What tells linear algebra to use one thread: last bits depend on their number."""
+"""Environment variables for one thread of linear algebra, because bits depend on the number."""
 
-MOST_ERROR = 20_000
-"""Characters of a traceback that are kept; the middle of a longer one is left out."""
+MAX_ERROR_LENGTH = 20_000
+"""Maximum length of a stored traceback; the middle of a longer one is left out [characters]."""
 
 RunTrial = Callable[["Trial"], "TrialResult"]
-"""Runs one trial; a module-level function, since workers import it by name."""
+"""Module-level function that runs one trial. Workers import it by name."""
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     from joblib import cpu_count
 
     return int(cpu_count())
 
 
 class Outcome(NamedTuple):
-    """What became of a trial."""
+    """Outcome of a trial."""
 
     trial: Trial
     error: str | None
-    """Its traceback if it failed; how its worker died if it is `lost`."""
+    """Traceback if the trial failed; cause of death of the worker if it is `lost`."""
     seconds: float
-    """How long it took."""
+    """Duration [s]."""
     result: TrialResult | None = None
-    """What it measured, if it came to an end."""
+    """Result if the trial finished."""
     lost: bool = False
-    """Whether its worker died while it ran: perhaps its fault, perhaps not."""
+    """Whether its worker died, which may have other causes than the trial."""
 
 
-def begin(parent: int) -> None:
-    """Do not outlive the process `parent`, even if it is killed."""
+def end_with_parent(parent: int) -> None:
+    """End this process when the process `parent` ends, even if that is killed."""
 
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(ORPHANED)
+            time.sleep(PARENT_POLL_S)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
 
 
 def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
-    """Run one trial; what goes wrong is returned as text.
+    """Run one trial and return its result or its traceback.
 
-    A scenario that calls ``sys.exit``, or raises KeyboardInterrupt, has failed like any other: a
-    worker ignores Ctrl-C, so that neither can come from anybody else.
+    SystemExit and KeyboardInterrupt are failures of the trial, too, because workers ignore Ctrl-C.
     """
-    begin = time.perf_counter()
+    start = time.perf_counter()
     error = None
     result = None
     try:
@@ -90,29 +89,29 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
             result = run_trial(trial)
     except BaseException:
         error = storable(traceback.format_exc())
-    return Outcome(trial, error, time.perf_counter() - begin, result)
+    return Outcome(trial, error, time.perf_counter() - start, result)
 
 
 def storable(error: str) -> str:
-    r"""Return a traceback as text that any file can hold, shortened if it is very long.
+    r"""Return a traceback as valid UTF-8, shortened to about `MAX_ERROR_LENGTH`.
 
     Examples
     --------
     >>> storable("ValueError: \ud800")
     'ValueError: \\ud800'
-    >>> len(storable("x" * 3_000_000)) < MOST_ERROR + 100
+    >>> len(storable("x" * 3_000_000)) < MAX_ERROR_LENGTH + 100
     True
     """
     text = error.encode("utf-8", "backslashreplace").decode("utf-8")
-    left_out = len(text) - MOST_ERROR
+    left_out = len(text) - MAX_ERROR_LENGTH
     if left_out <= 0:
         return text
-    half = MOST_ERROR // 2
+    half = MAX_ERROR_LENGTH // 2
     return f"{text[:half]}\n[... {left_out} characters left out ...]\n{text[-half:]}"
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what a trial's bits may depend on, by name."""
+    """Return the versions that may affect the bits of a trial, by name."""
     from ..store.database import RESULTS_VERSION
 
     packages = {name: installed(name) for name in PACKAGES}
@@ -120,7 +119,7 @@ def versions() -> dict[str, str]:
 
 
 def installed(package: str) -> str:
-    """Return the version of a package. That of Box2D is its module's: several packages offer it."""
+    """Return the version of a package. Several packages contain Box2D, so its module is asked."""
     if package == "Box2D":
         import Box2D
 
@@ -132,9 +131,9 @@ def installed(package: str) -> str:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Put off Ctrl-C until what is being kept is kept."""
+    """Delay Ctrl-C until the end of the context."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # Python tells the main thread only, and lets no other change that
+        yield  # only the main thread receives signals
         return
     pressed: list[int] = []
     usual = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
@@ -147,12 +146,12 @@ def undisturbed() -> Iterator[None]:
 
 
 @contextmanager
-def beginning_processes() -> Iterator[None]:
-    """Put off Ctrl-C; the processes begun meanwhile never hear of it: it is for the parent."""
-    from multiprocessing import resource_tracker  # takes its time
+def starting_processes() -> Iterator[None]:
+    """Delay Ctrl-C, and start processes that ignore it, because the parent handles it."""
+    from multiprocessing import resource_tracker  # slow to import
 
-    resource_tracker.ensure_running()  # would unblock the signal when the first process begins
-    if sys.platform == "win32":  # which blocks no signals
+    resource_tracker.ensure_running()  # it would unblock the signal when the first process starts
+    if sys.platform == "win32":  # Windows cannot block signals
         with undisturbed():
             yield
         return
@@ -167,20 +166,20 @@ def beginning_processes() -> Iterator[None]:
 Backend = Literal["loky", "dask"]
 """``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
 ATTEMPTS = 2
-"""How often a trial is run alone whose worker has died."""
+"""How often a trial whose worker has died runs alone."""
 
 
 class Observer:
-    """Is notified of a study's progress; this one does nothing with it."""
+    """Receives the progress of a study. This base class shows nothing."""
 
     def announce(self, spec: Spec, directory: Path, processes: int) -> None:
-        """Learn what is about to be run, if anything is left to run."""
+        """Show the study before its trials run."""
 
     def note(self, line: str) -> None:
-        """Learn of something out of the ordinary, in one line."""
+        """Show a remark of one line."""
 
     def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
-        """Consume the outcomes, which runs the trials; `done` of `total` were run before."""
+        """Iterate over the outcomes, which runs the trials; `done` of `total` were run before."""
         for _ in outcomes:
             pass
 
@@ -197,11 +196,11 @@ def run_trials(
     trials
         The trials to run, for instance those that are `pending`.
     store
-        Where results and tracebacks are kept.
+        Store of results and tracebacks.
     run_trial
-        Runs one trial; a module-level function, since workers import it by name.
+        Module-level function that runs one trial.
     workers
-        Who runs them.
+        Workers that run the trials.
     """
     lost: list[Trial] = []
     with Running(store.directory, workers.processes) as running:
@@ -212,7 +211,7 @@ def run_trials(
                 if outcome.lost:
                     lost.append(outcome.trial)
                 else:
-                    _keep(store, outcome)
+                    _store_outcome(store, outcome)
                     yield outcome
 
 
@@ -227,7 +226,7 @@ def _alone(trial: Trial, run_trial: RunTrial, workers: Workers[F], running: Runn
     return outcome._replace(error=error, lost=False)
 
 
-def _keep(store: Store, outcome: Outcome) -> None:
+def _store_outcome(store: Store, outcome: Outcome) -> None:
     with undisturbed():
         if outcome.result is None:
             store.fail(outcome.trial.planned, outcome.error or "")
@@ -236,12 +235,12 @@ def _keep(store: Store, outcome: Outcome) -> None:
 
 
 def save(store: Store, trial: Trial, result: TrialResult, total: float) -> None:
-    """Keep the result of a trial that took `total` seconds; durable on return.
+    """Store the result of a trial that took `total` seconds. It is durable on return.
 
     Raises
     ------
     ValueError
-        If it has a measure that the study has not.
+        If the study does not have one of its measures.
     """
     names = [measure.name for measure in store.measures()]
     if unknown := {measure.name for measure in result.measures} - set(names):
@@ -257,39 +256,39 @@ def save(store: Store, trial: Trial, result: TrialResult, total: float) -> None:
     )
 
 
-POLL = 1.0
-"""How often to look for workers while no trial finishes [s]."""
+POLL_S = 1.0
+"""Polling interval for new workers [s]."""
 
 
 class Submitted(Protocol):
-    """A trial that a worker has been handed: a future of a backend."""
+    """Future of a backend."""
 
     def add_done_callback(self, fn: Callable[[Self], object], /) -> object:
-        """Call a function with it when it is done."""
+        """Call a function with the future when it is done."""
 
 
 F = TypeVar("F", bound=Submitted)
 
 
 class Workers(ABC, Generic[F]):
-    """Processes that run trials; what their backends have in common."""
+    """Processes that run trials; base class of the backends."""
 
     @property
     @abstractmethod
     def processes(self) -> int:
-        """How many trials run at a time."""
+        """Number of trials that run at a time."""
 
     @abstractmethod
     def submit(self, run_trial: RunTrial, trial: Trial) -> F:
-        """Hand a trial to a worker that is free, and return its future."""
+        """Submit a trial to a free worker and return its future."""
 
     @abstractmethod
     def fetch(self, future: F, trial: Trial) -> Outcome | None:
-        """Return what became of a trial whose future is done; None if it runs once more."""
+        """Return the outcome of a trial whose future is done; None if it runs again."""
 
     @abstractmethod
     def stop(self, futures: Sequence[F]) -> None:
-        """End the trials that are running."""
+        """Stop the running trials."""
 
     def arrivals(
         self,
@@ -298,27 +297,27 @@ class Workers(ABC, Generic[F]):
         started: Callable[[str], None],
         ended: Callable[[str], None],
     ) -> Generator[Outcome]:
-        """Run trials and yield what becomes of each, in whatever order; closing stops them.
+        """Run trials and yield their outcomes as they arrive. Closing the generator stops them.
 
         Parameters
         ----------
         trials
             The trials.
         run_trial
-            Runs one of them; a module-level function, since workers import it by name.
+            Module-level function that runs one trial.
         started
-            Called with the identity of each trial when it is handed to a worker.
+            Called with the identity of a trial when it is submitted.
         ended
-            Called with it when the trial has come back, before a next one is handed out.
+            Called with the identity of a trial when it has ended, before the next is submitted.
         """
         waiting = iter(trials)
         left = len(trials)
         running: dict[F, Trial] = {}
         finished: SimpleQueue[F] = SimpleQueue()
 
-        def hand_out() -> None:
+        def submit_waiting() -> None:
             for trial in islice(waiting, max(self.processes - len(running), 0)):
-                with beginning_processes():
+                with starting_processes():
                     future = self.submit(run_trial, trial)
                     running[future] = trial
                 started(trial.identity)
@@ -326,9 +325,9 @@ class Workers(ABC, Generic[F]):
 
         try:
             while left:
-                hand_out()
+                submit_waiting()
                 try:
-                    future = finished.get(timeout=POLL)
+                    future = finished.get(timeout=POLL_S)
                 except Empty:
                     continue
                 outcome = self.fetch(future, running[future])
@@ -336,9 +335,11 @@ class Workers(ABC, Generic[F]):
                     future.add_done_callback(finished.put)
                     continue
                 ended(running.pop(future).identity)
-                del future  # else a Dask worker keeps its result, which is run again if it dies
+                del (
+                    future
+                )  # otherwise Dask keeps the result and runs the trial again if the worker dies
                 left -= 1
-                hand_out()  # the worker goes on while this one is kept
+                submit_waiting()  # the worker continues while the outcome is stored
                 yield outcome
         finally:
             if running:

@@ -23,18 +23,18 @@ from ...core.plugins.words import closest
 from ...core.shell import command_line
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .nursery import Answer, call_for, describe_exit
-from .runner import ONE_THREAD, Backend, Outcome, RunTrial, Workers, begin, cores
+from .fork_server import Answer, call_for, describe_exit
+from .runner import ONE_THREAD, Backend, Outcome, RunTrial, Workers, cores, end_with_parent
 
 
 def check_jobs(jobs: int) -> None:
-    """Refuse a number of processes below one."""
+    """Raise if the number of processes is below one."""
     if jobs < 1:
         raise SpecError(f"--jobs {jobs}: must be at least 1")
 
 
 def check_workers(backend: Backend, jobs: int | None, address: str | None) -> None:
-    """Refuse workers that cannot be, before anything is written; see `start_workers`."""
+    """Raise if `start_workers` could not start, before anything is written."""
     if jobs is not None:
         check_jobs(jobs)
     if backend not in (known := get_args(Backend)):
@@ -46,9 +46,9 @@ def check_workers(backend: Backend, jobs: int | None, address: str | None) -> No
 
 
 def _check_semaphores() -> None:
-    """Refuse a machine without semaphores between processes, which all local workers need."""
+    """Raise if processes of this machine cannot share semaphores, which local workers need."""
     try:
-        with safe_path():  # it starts a process that frees shared memory
+        with safe_path():  # a semaphore starts a process that frees shared memory
             get_context("spawn").Semaphore()
     except (ImportError, OSError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
@@ -62,23 +62,23 @@ def _check_semaphores() -> None:
 def start_workers(
     backend: Backend, jobs: int | None, address: str | None, trials: int
 ) -> Iterator[Workers[Any]]:
-    """Start workers, which end with the context, or connect to those of a cluster.
+    """Start workers, which end with the context, or connect to a cluster.
 
     Parameters
     ----------
     backend
-        Of which kind.
+        Kind of workers.
     jobs
-        Most trials at a time; None: one for every core, or for every worker at `address`.
+        Maximum number of trials at a time; None: one for each core or worker of the cluster.
     address
-        Of the scheduler of a running Dask cluster; None: workers of this machine are started.
+        Address of the scheduler of a running Dask cluster; None: start workers on this machine.
     trials
-        How many trials there are; no more workers are started.
+        Number of trials, which also limits the number of workers.
 
     Raises
     ------
     SpecError
-        If there are none to be had; one line says why.
+        If no workers can be started or reached, in one line.
     """
     check_workers(backend, jobs, address)
     wanted = max(1, min(jobs or cores(), trials))
@@ -98,50 +98,53 @@ def start_workers(
             yield workers
 
 
-QUIET = "ignore:resource_tracker:UserWarning"
-"""The process that tidies up after a killed run would complain at length of what it tidies up."""
+TRACKER_FILTER = "ignore:resource_tracker:UserWarning"
+"""Filter for warnings of the process that frees resources after a killed run."""
 
-REPLACED = "A worker stopped while some jobs were given to the executor"
+REPLACED_WARNING = "A worker stopped while some jobs were given to the executor"
 """Warning of loky when it replaces a process that has grown by 300 MB, as with PyTorch."""
 
-THREADS = ("BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+THREAD_VARIABLES = (
+    "BLIS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
 """Environment variables that limit other libraries to one thread, besides `ONE_THREAD`."""
 
-IDLE = 300
+IDLE_TIMEOUT_S = 300
 """Time after which an idle process ends [s]."""
 
-HANDED_ON = 2.0
-"""Maximum time in which loky hands a trial to a process [s]; before, it cannot be stopped."""
+HAND_OVER_TIMEOUT_S = 2.0
+"""Maximum time until a process receives a trial from loky and can be stopped [s]."""
 
-
-CODES = re.compile(r"\w+\((-?\d+)\)")
-"""An exit code as loky writes it, such as ``SIGKILL(-9)``."""
+EXIT_CODE = re.compile(r"\w+\((-?\d+)\)")
+"""Finds the exit codes in a message of loky, such as ``SIGKILL(-9)``."""
 
 
 def _describe(death: TerminatedWorkerError) -> str:
-    """Return how workers ended; loky says it at length, and what else one might do.
+    """Return how workers ended, from a longer message of loky.
 
     Examples
     --------
     >>> _describe(TerminatedWorkerError("The exit codes of the workers are {EXIT(3), SIGABRT(-6)}"))
     'exit code 3, killed by SIGABRT'
     """
-    codes = CODES.findall(str(death).partition("exit codes of the workers are")[2])
-    return ", ".join(describe_exit(int(code)) for code in codes) or "it has not said how"
+    codes = EXIT_CODE.findall(str(death).partition("exit codes of the workers are")[2])
+    return ", ".join(describe_exit(int(code)) for code in codes) or "unknown exit code"
 
 
 class LokyWorkers(Workers[Future[Outcome | Answer]]):
     """Processes of this machine, which end with their parent; see `Workers`.
 
-    Workers are separate processes even for one job: a crash in native code costs one trial, and
-    the number of threads that linear algebra uses is always one. When a worker dies, loky ends all
-    others: the trials that were running then are all lost. The process of a trial that runs files
-    of a user is no worker, and dies alone.
+    Even a single job has its own process, so a crash in native code costs one trial, and linear
+    algebra uses one thread. When a worker dies, loky ends all others, so all running trials are
+    lost. The process of a trial with user code is not a worker and dies alone.
 
     Parameters
     ----------
     jobs
-        Number of processes that are busy at a time, at least 1.
+        Number of processes, at least 1.
     """
 
     processes = 0
@@ -149,19 +152,19 @@ class LokyWorkers(Workers[Future[Outcome | Answer]]):
     def __init__(self, jobs: int) -> None:
         self.processes = jobs
         self._executor: Any = None
-        warnings.filterwarnings("ignore", REPLACED)
+        warnings.filterwarnings("ignore", REPLACED_WARNING)
         filters = os.environ.get("PYTHONWARNINGS", "")
-        if QUIET not in filters:  # processes that are started from here on inherit it
-            os.environ["PYTHONWARNINGS"] = f"{filters},{QUIET}".lstrip(",")
+        if TRACKER_FILTER not in filters:  # later processes inherit it
+            os.environ["PYTHONWARNINGS"] = f"{filters},{TRACKER_FILTER}".lstrip(",")
 
     def submit(self, run_trial: RunTrial, trial: Trial) -> Future[Outcome | Answer]:
         """See `Workers.submit`."""
-        self._executor = get_reusable_executor(  # another one, if a worker has died
+        self._executor = get_reusable_executor(  # a new one if a worker has died
             self.processes,
-            timeout=IDLE,
-            initializer=begin,
+            timeout=IDLE_TIMEOUT_S,
+            initializer=end_with_parent,
             initargs=(os.getpid(),),
-            env=ONE_THREAD | dict.fromkeys(THREADS, "1"),
+            env=ONE_THREAD | dict.fromkeys(THREAD_VARIABLES, "1"),
         )
         future: Future[Outcome | Answer] = self._executor.submit(*call_for(run_trial, trial))
         return future
@@ -176,7 +179,7 @@ class LokyWorkers(Workers[Future[Outcome | Answer]]):
 
     def stop(self, futures: Sequence[Future[Outcome | Answer]]) -> None:
         """See `Workers.stop`."""
-        until = time.monotonic() + HANDED_ON
+        until = time.monotonic() + HAND_OVER_TIMEOUT_S
         while any(not (f.running() or f.done()) for f in futures) and time.monotonic() < until:
-            time.sleep(0.01)  # its thread would end with a traceback
+            time.sleep(0.01)  # otherwise a thread of loky ends with a traceback
         self._executor.shutdown(wait=True, kill_workers=True)

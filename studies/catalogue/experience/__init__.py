@@ -74,12 +74,12 @@ def measure(trial: Trial) -> TrialResult:
     done = 0
     for stop in (*stops(budget), budget):
         done = session.train_until(stop)
-        session.usage.setdefault(f"{CPU}{stop}", session.spent)
+        session.usage.setdefault(f"{CPU}{stop}", session.training_cpu_s)
         if stop < budget and f"{AFTER}{stop}" not in session.phases:
             with session.team.drawing_apart():
                 session.evaluate(phase=f"{AFTER}{stop}")
             session.evaluate_sampled(f"{AFTER}{stop}{BY_SAMPLING}")
-            session.put_down()
+            session.save_checkpoint()
     return session.finish({DECISIONS: float(done)}, session.usage)
 
 

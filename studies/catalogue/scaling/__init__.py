@@ -60,7 +60,7 @@ def measure(trial: Trial) -> TrialResult:
         "robots": float(len(session.world.groups)),
         "agents": float(len(hierarchy)),
         "messages": float(hierarchy.n_messages),
-        "joint_actions": tried / len(session.deciding),
+        "joint_actions": tried / len(session.decision_seconds),
         "team_bytes": float(sum(array.nbytes for array in team.state_dict().values())),
         "weight_bytes": float(team.weight_bytes),
     }
@@ -85,8 +85,8 @@ def measure(trial: Trial) -> TrialResult:
         numbers["least_touching"] = float(np.mean(least))
         numbers["all_touching"] = float((np.array(least) >= 0.5).mean())
     usage = {
-        "decision_median": float(np.median(session.deciding)),
-        "decision_99": float(np.quantile(session.deciding, 0.99)),
+        "decision_median": float(np.median(session.decision_seconds)),
+        "decision_99": float(np.quantile(session.decision_seconds, 0.99)),
     }
     if peak is not None:
         usage["process_bytes"] = float(peak)

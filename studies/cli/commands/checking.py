@@ -80,8 +80,6 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
             frame = DataFrame(report.variables)
             _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
     if is_spec and not faults:
-        faults += _report_order(source, changes, steps)
-    if is_spec and not faults:
         for label, errors in _learned_errors(source, changes, steps):
             print_wrapped(
                 f"{label}: prediction errors after {LESSONS} training episodes", "learned  ", 8
@@ -92,24 +90,6 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
 
 def _print_frame(text: str) -> None:
     print_text("", text, "")
-
-
-def _report_order(source: str, changes: tuple[str, ...], steps: int) -> bool:
-    """Print and return whether the results of a trial depend on the trials before it."""
-    from ...spec.spec import Spec
-    from ...trials.order import fault_of_order, has_programs
-    from ...trials.trial import trials_of
-
-    trials = trials_of(Spec.load(Path(source), changes))
-    if not has_programs(trials[0]):
-        return False
-    with refused():
-        fault = fault_of_order(trials, steps)
-    if fault:
-        print_text(f"FAULT   order of trials: {fault}")
-    else:
-        print_wrapped("order of trials: two orders gave the same results", "passed  ", 8)
-    return bool(fault)
 
 
 def _learned_errors(

@@ -180,41 +180,6 @@ def test_a_class_is_checked_with_its_default_settings(
     assert "its Settings have no defaults for all keys, Unsettled.Settings: carts: missing" in err
 
 
-KEEPING = """
-import nested_agents as na
-from nested_agents.scenarios.line_up import LineUp
-
-PLAYED = []
-
-class Keeping(LineUp):
-    class Settings(na.ScenarioSettings):
-        carts: int = 2
-
-    def reset(self, seed, episode=0):
-        super().reset(seed, episode)
-        if episode > 1:  # later than the episodes that a scenario is checked by
-            PLAYED.append(episode)
-            self._places = self._places + 0.01 * len(PLAYED)
-        return self._states()
-"""
-
-
-@pytest.mark.parametrize("keeps", [True, False])
-def test_trials_are_run_in_two_orders_where_users_files_may_keep_something(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], keeps: bool
-) -> None:
-    (tmp_path / "own.py").write_text(KEEPING if keeps else KEEPING.replace("PLAYED.append", "id"))
-    path = tmp_path / "spec.toml"
-    path.write_text('seeds = 2\npreset = "frozen"\nscenario.kind = "own.py:Keeping"\n')
-    assert main(["check", str(path), "--steps", "6"]) == keeps
-    line = next(line for line in capsys.readouterr().out.splitlines() if "order of trials" in line)
-    if keeps:
-        assert line.startswith("FAULT   order of trials: seed ")
-        assert "when another trial has run before it: what own.py keeps in a module" in line
-    else:
-        assert line == "passed  order of trials: two orders gave the same results"
-
-
 def test_errors_of_learned_predictors_are_shown_once_beside_those_of_persistence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -145,7 +145,7 @@ def test_damage_is_remarked_once_and_the_trial_begins_anew(tmp_path):
     (folder / ".half.npz.new").write_bytes(b"")
     na.run(TABLES["ours"], tmp_path, jobs=1, observer=observer)
     assert [note for note in observer.notes if "damaged" in note] == [
-        f"{folder / trial.identity}.npz: is damaged, its trial begins anew"
+        f"{folder / trial.identity}.npz: is damaged, its trial starts from the beginning"
     ]
     assert not folder.exists()
 

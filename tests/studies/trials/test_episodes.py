@@ -41,7 +41,7 @@ def test_one_name_for_two_things_is_refused(other):
 
 @pytest.mark.parametrize("name", ["steps", "Return", "seed", "identity", "scenario.robots"])
 def test_names_of_other_columns_are_refused(name):
-    with pytest.raises(SpecError, match="a column of results is called so"):
+    with pytest.raises(SpecError, match="is the name of another column"):
         join_measures([(SUCCESS, Measure(name, "a measure"))], ["scenario.robots"])
 
 

@@ -135,7 +135,7 @@ def test_a_machine_killed_in_a_cluster_costs_its_running_trial_only(cluster, tmp
 @pytest.mark.usefixtures("made_up_results")
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere:-3", "tcp://", "http://x:1"])
 def test_no_scheduler_there_is_one_line(tmp_path, monkeypatch, capsys, address):
-    monkeypatch.setattr(dask_workers, "CONNECT", 0.5)
+    monkeypatch.setattr(dask_workers, "CONNECT_TIMEOUT_S", 0.5)
     assert run(tmp_path, "--address", address) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
@@ -169,14 +169,14 @@ def test_a_worker_with_other_versions_is_refused(cluster, tmp_path, monkeypatch)
 def test_a_worker_with_several_threads_is_refused_and_a_lost_scheduler_is_told(
     tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(dask_workers, "PATIENCE", 1.0)
+    monkeypatch.setattr(dask_workers, "WORKER_TIMEOUT_S", 1.0)
     with closing(Cluster(tmp_path)) as other, DaskWorkers.at(other.address, None) as workers:
         with pytest.raises(SpecError, match="has had no worker for 1 s"):
             attempt(workers, tmp_path / "a")
-        monkeypatch.setattr(dask_workers, "PATIENCE", 30.0)
+        monkeypatch.setattr(dask_workers, "WORKER_TIMEOUT_S", 30.0)
         other.add("--nthreads", "2")
         with pytest.raises(SpecError, match="has 2 threads, must be 1: start dask worker with"):
             attempt(workers, tmp_path / "b")
         other.scheduler.kill()
-        with pytest.raises(SpecError, match="is gone; what has finished is kept"):
+        with pytest.raises(SpecError, match="is gone; finished trials are stored"):
             attempt(workers, tmp_path / "c")

@@ -18,9 +18,9 @@ from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers import workers
-from nested_agents.studies.workers.runner import ATTEMPTS, MOST_ERROR, attempt, run_trials
+from nested_agents.studies.workers.runner import ATTEMPTS, MAX_ERROR_LENGTH, attempt, run_trials
 from nested_agents.studies.workers.workers import (
-    REPLACED,
+    REPLACED_WARNING,
     Backend,
     LokyWorkers,
     check_workers,
@@ -202,7 +202,7 @@ def test_a_machine_without_shared_memory_is_told_before_anything_is_written(
 
 def test_what_loky_says_of_a_process_that_it_replaces_is_not_shown(recwarn) -> None:
     LokyWorkers(1)
-    warnings.warn(f"{REPLACED}. This can be caused by ...", UserWarning, stacklevel=1)
+    warnings.warn(f"{REPLACED_WARNING}. This can be caused by ...", UserWarning, stacklevel=1)
     assert not recwarn
 
 
@@ -228,7 +228,7 @@ def test_any_message_can_be_stored_and_is_short(tmp_path, message: str) -> None:
         raise ValueError(message)
 
     arrival = attempt(measure, made_up.TRIALS[0])
-    assert len(arrival.error.encode()) < 2 * MOST_ERROR
+    assert len(arrival.error.encode()) < 2 * MAX_ERROR_LENGTH
     with made_up.opened(tmp_path) as store:
         store.fail(arrival.trial, arrival.error)
         assert len(store.failed()) == 1

@@ -17,16 +17,16 @@ from nested_agents.core.plugins.sources import Sources
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import trials_of
-from nested_agents.studies.workers import nursery
-from nested_agents.studies.workers.nursery import Answer, call_for, run_apart
+from nested_agents.studies.workers import fork_server
+from nested_agents.studies.workers.fork_server import Answer, call_for, run_in_own_process
 from nested_agents.studies.workers.runner import ATTEMPTS, Outcome, attempt
 from nested_agents.studies.workers.workers import LokyWorkers
 
 TRIAL = made_up.TRIALS[0]
 
 
-def apart(function, trial=TRIAL) -> Outcome:
-    return run_apart(pickle.dumps((function, trial)), trial.seed).outcome(trial)
+def run_apart(function, trial=TRIAL) -> Outcome:
+    return run_in_own_process(pickle.dumps((function, trial)), trial.seed).outcome(trial)
 
 
 def test_only_trials_that_run_files_of_a_user_have_a_process_each() -> None:
@@ -35,29 +35,29 @@ def test_only_trials_that_run_files_of_a_user_have_a_process_each() -> None:
     own = replace(TRIAL, sources=files)
     assert call_for(made_up.measure, own)[0] is attempt
     own = replace(TRIAL, sources=Sources(None, {"arm.py": "x = 1"}))
-    assert call_for(made_up.measure, own)[0] is run_apart
+    assert call_for(made_up.measure, own)[0] is run_in_own_process
 
 
 def test_a_trial_finds_what_the_first_one_found() -> None:
-    first = apart(made_up_harm.innocent)
+    first = run_apart(made_up_harm.innocent)
     assert first.error is None
     assert first.result.numbers["sum"] == 2.0
     assert first.result.numbers["trials"] == 1
-    assert apart(made_up_harm.harmful).result.numbers == first.result.numbers
-    assert apart(made_up_harm.innocent).result.numbers == first.result.numbers
-    other = apart(made_up_harm.innocent, made_up.TRIALS[2]).result.numbers
+    assert run_apart(made_up_harm.harmful).result.numbers == first.result.numbers
+    assert run_apart(made_up_harm.innocent).result.numbers == first.result.numbers
+    other = run_apart(made_up_harm.innocent, made_up.TRIALS[2]).result.numbers
     assert other["random"] != first.result.numbers["random"]
     assert other["numpy"] != first.result.numbers["numpy"]
 
 
-def test_another_nursery_gives_the_same() -> None:
-    first = apart(made_up_harm.innocent).result.numbers
-    nursery._begin.cache_clear()
-    assert apart(made_up_harm.innocent).result.numbers == first
+def test_another_fork_server_gives_the_same() -> None:
+    first = run_apart(made_up_harm.innocent).result.numbers
+    fork_server._start_server.cache_clear()
+    assert run_apart(made_up_harm.innocent).result.numbers == first
 
 
 def test_the_process_that_forks_has_one_thread_and_runs_no_trial() -> None:
-    told = [apart(made_up_harm.tells_parents).result.numbers for _ in range(2)]
+    told = [run_apart(made_up_harm.tells_parents).result.numbers for _ in range(2)]
     assert {numbers["threads"] for numbers in told} == {1.0}
     assert len({numbers["parent"] for numbers in told}) == 1
     assert len({numbers["own"] for numbers in told}) == 2
@@ -68,9 +68,9 @@ def test_the_second_trial_need_not_import_what_the_first_did() -> None:
     from nested_agents.studies.catalogue.study import measure
 
     for _ in range(2):
-        apart(measure, trial[0])
+        run_apart(measure, trial[0])
     begin = time.perf_counter()
-    seconds = apart(measure, trial[0]).seconds
+    seconds = run_apart(measure, trial[0]).seconds
     assert time.perf_counter() - begin - seconds < 2.0  # of a busy machine; usually 0.03
 
 
@@ -85,40 +85,40 @@ def test_the_second_trial_need_not_import_what_the_first_did() -> None:
 )
 def test_how_a_process_died_is_told(function, reason) -> None:
     trial = next(t for t in made_up.TRIALS if (t.condition, t.seed) == ("frozen", 1))
-    outcome = apart(function, trial)
+    outcome = run_apart(function, trial)
     assert (outcome.lost, outcome.error) == (True, reason)
-    assert apart(made_up_harm.innocent).error is None
+    assert run_apart(made_up_harm.innocent).error is None
 
 
 def test_a_process_that_is_left_behind_is_not_waited_for() -> None:
     begin = time.monotonic()
-    assert apart(made_up_harm.leaves).error is None
+    assert run_apart(made_up_harm.leaves).error is None
     assert time.monotonic() - begin < 3.0
 
 
 def test_what_cannot_be_pickled_fails_its_trial() -> None:
-    outcome = apart(made_up_harm.odd)
+    outcome = run_apart(made_up_harm.odd)
     assert not outcome.lost
     assert "odd.<locals>.<lambda>" in outcome.error.splitlines()[-1]
 
 
 def test_what_it_prints_is_printed(capfd) -> None:
-    nursery._begin.cache_clear()
-    assert apart(made_up_harm.prints).error is None
+    fork_server._start_server.cache_clear()
+    assert run_apart(made_up_harm.prints).error is None
     out, err = capfd.readouterr()
     assert out == "I speak\n"
     assert "I complain\n" in err
 
 
-def test_a_killed_nursery_costs_its_trial_and_another_is_begun() -> None:
-    apart(made_up_harm.innocent)
-    process, _ = nursery._begin(os.getpid())
+def test_a_killed_fork_server_costs_its_trial_and_another_starts() -> None:
+    run_apart(made_up_harm.innocent)
+    process, _ = fork_server._start_server(os.getpid())
     process.kill()
     process.wait()
-    assert apart(made_up_harm.innocent) == Outcome(
-        TRIAL, "the process that begins trials has died", 0.0, lost=True
+    assert run_apart(made_up_harm.innocent) == Outcome(
+        TRIAL, "the process that starts trials has died", 0.0, lost=True
     )
-    assert apart(made_up_harm.innocent).error is None
+    assert run_apart(made_up_harm.innocent).error is None
 
 
 def test_an_answer_is_what_became_of_a_trial() -> None:

@@ -37,7 +37,7 @@ LIBRARIES = frozenset(
 """Modules that may be preloaded, because their import has no side effects."""
 
 
-class Loaded(NamedTuple):
+class LoadedKernel(NamedTuple):
     """A kernel that has been loaded for arguments of some types."""
 
     module: str
@@ -48,33 +48,33 @@ class Loaded(NamedTuple):
     """Pickled types of its arguments."""
 
 
-class Warmth(NamedTuple):
+class LoadedCode(NamedTuple):
     """Modules and kernels that a process has loaded."""
 
     modules: tuple[str, ...]
     """Names of modules of `LIBRARIES`, in the order in which they were imported."""
-    kernels: tuple[Loaded, ...]
-    """Modules of this package."""
+    kernels: tuple[LoadedKernel, ...]
+    """Kernels of this package."""
 
 
-def measure_warmth() -> Warmth:
-    """Return what this process has."""
+def loaded_code() -> LoadedCode:
+    """Return the modules and kernels that this process has loaded."""
     modules = (name for name in sys.modules if name.partition(".")[0] in LIBRARIES)
-    return Warmth(tuple(modules), tuple(_loaded_kernels()))
+    return LoadedCode(tuple(modules), tuple(_loaded_kernels()))
 
 
-def _loaded_kernels() -> Iterator[Loaded]:
+def _loaded_kernels() -> Iterator[LoadedKernel]:
     for module, content in list(sys.modules.items()):
         if module.partition(".")[0] != PACKAGE:
             continue
         for name, kernel in list(vars(content).items()):
             if isinstance(kernel, Kernel) and kernel.py_func.__module__ == module:
                 for types in kernel.signatures:
-                    yield Loaded(module, name, pickle.dumps(types))
+                    yield LoadedKernel(module, name, pickle.dumps(types))
 
 
-def warm_up(goal: Warmth, known: Warmth) -> None:
-    """Import and load what a process had that is not `known`; what cannot be is left out."""
+def preload(goal: LoadedCode, known: LoadedCode) -> None:
+    """Load the modules and kernels of `goal` that are not `known`. Errors are ignored."""
     for name in goal.modules:
         if name not in sys.modules:
             with suppress(Exception):
