@@ -56,6 +56,8 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
     from pandas import DataFrame
 
     from ....scenarios.checking.checker import ScenarioError, check_scenario
+    from ...spec.spec import Spec
+    from ...trials.arrangement import check_conditions
     from ..loading import trust_beside
 
     is_spec = not source.partition(":")[0].endswith(".py")
@@ -80,6 +82,7 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
             frame = DataFrame(report.variables)
             _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
     if is_spec and not faults:
+        check_conditions(Spec.load(Path(source), changes))
         for label, errors in _learned_errors(source, changes, steps):
             print_wrapped(
                 f"{label}: prediction errors after {LESSONS} training episodes", "learned  ", 8

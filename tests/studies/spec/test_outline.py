@@ -86,5 +86,7 @@ def test_changed_modules_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     old = {"core/a.py": ("0", "1"), "studies/trials/b.py": ("2", "3"), "plugin/c.py": ("4", "5")}
     here = {"core/d.py": ("6", "7"), "plugin/c.py": ("4", "5")}
     monkeypatch.setattr(outline, "present", lambda *_: here)
-    store = SimpleNamespace(code=lambda: old, spec=dict, sources=dict, directory="out")
+    store = SimpleNamespace(
+        is_older=False, code=lambda: old, spec=dict, sources=dict, directory="out"
+    )
     assert "core/a.py and 2 more have changed" in outline.outdated(store)

@@ -277,7 +277,7 @@ def test_a_full_disk_is_one_line_and_keeps_what_was_there(finished, monkeypatch)
 
 
 def test_no_condition_is_computed_again_to_continue_a_study(finished, monkeypatch):
-    monkeypatch.setattr(spec_module, "grid", None)
+    monkeypatch.setattr(spec_module, "conditions_of", None)
     with made_up.opened(finished) as store:
         assert pending(store, made_up.TRIALS) == []
 

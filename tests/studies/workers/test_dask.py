@@ -98,7 +98,7 @@ def test_a_local_cluster_and_a_trial_that_kills_every_worker(tmp_path, expected)
         ((condition, seed, error),) = store.failed()
         assert (condition, seed) == ("frozen", 1)
         assert f"died {ATTEMPTS} times" in error
-        assert store.forget_failed() == 1
+        store.forget_failed()
         again = pending(store, trials)
         assert [o.error for o in run_trials(again, store, made_up.measure, workers)] == [None]
         assert content(store) == expected
