@@ -23,6 +23,9 @@ from ....core.numerics import FloatArray, njit, quadrature
 
 ON_SURFACE = 1e-12
 """Distance below which the direction to the nearest point is meaningless [m]."""
+CLEAR = 1e-9
+"""Distance [m] from which a point is clearly before an edge, and the square of the distance from
+its ends, over that from the edge: rounding can neither move it behind nor make an end nearer."""
 LANES = 16
 """Points side by side, see `nearest_points`."""
 LOCAL_X, LOCAL_Y, SQUARE, NEAR_X, NEAR_Y, SIDE, EDGE_X, EDGE_Y = range(0, 8 * LANES, LANES)
@@ -121,6 +124,51 @@ def surface(
     return side * distance - rounding, nx, ny, qx + rounding * nx, qy + rounding * ny
 
 
+@njit(cache=True)
+def _facing(edges: FloatArray, x: float, y: float) -> int:
+    """Return the edge that a point stands before, if all of the outline is behind it; else -1."""
+    for i in range(len(edges)):
+        x0, y0 = edges[i, 0], edges[i, 1]
+        dx, dy = edges[i, 2] - x0, edges[i, 3] - y0
+        length2 = dx * dx + dy * dy
+        along, across = (x - x0) * dx + (y - y0) * dy, (y - y0) * dx - (x - x0) * dy
+        if 0.0 < along < length2 and across < 0.0:
+            behind = True
+            for e in range(len(edges)):
+                depth = (edges[e, 1] - y0) * dx - (edges[e, 0] - x0) * dy
+                behind = behind and depth >= 0.0
+            return i if behind else -1
+    return -1
+
+
+@njit(cache=True, fastmath={"contract", "nsz"})
+def _ahead_of(edge: FloatArray, rows: FloatArray, lanes: int) -> int:
+    """Write the nearest points on one edge; return how many points stand clearly before it.
+
+    To these no other edge is nearer, as all of the outline is behind this one.
+    """
+    x0, y0 = edge[0], edge[1]
+    dx, dy = edge[2] - x0, edge[3] - y0
+    length2 = dx * dx + dy * dy
+    scale = 1.0 / length2
+    least = CLEAR * np.sqrt(length2)
+    before = 0
+    for k in range(lanes):
+        x, y = rows[LOCAL_X + k], rows[LOCAL_Y + k]
+        t = ((x - x0) * dx + (y - y0) * dy) * scale
+        cx, cy = x0 + t * dx, y0 + t * dy
+        square = (x - cx) * (x - cx) + (y - cy) * (y - cy)
+        rows[SQUARE + k] = square
+        rows[NEAR_X + k] = cx
+        rows[NEAR_Y + k] = cy
+        rows[SIDE + k] = 1.0
+        end = t if t < 0.5 else 1.0 - t
+        off = (x - x0) * dy - (y - y0) * dx
+        clear = (end > 0.0) & (end * end * length2 > CLEAR * square) & (off > least)
+        before += 1 if clear else 0
+    return before
+
+
 @njit(cache=True, fastmath={"contract", "nsz"})
 def nearest_points(edges: FloatArray, rows: FloatArray, lanes: int) -> None:
     """Write for each of some points the nearest point of an outline without rounding.
@@ -136,6 +184,9 @@ def nearest_points(edges: FloatArray, rows: FloatArray, lanes: int) -> None:
     lanes
         How many points, at most `LANES`.
     """
+    face = _facing(edges, rows[LOCAL_X], rows[LOCAL_Y])
+    if face >= 0 and _ahead_of(edges[face], rows, lanes) == lanes:
+        return
     for k in range(lanes):
         rows[SQUARE + k] = np.inf
         rows[SIDE + k] = 1.0

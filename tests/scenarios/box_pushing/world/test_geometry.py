@@ -8,6 +8,7 @@ from world_oracles import ray_numpy, surface_numpy
 
 from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.world import geometry
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.geometry import (
     Outline,
     ray,
@@ -84,6 +85,27 @@ def test_nearest_points_side_by_side_are_those_of_the_surface(edges: FloatArray)
         np.testing.assert_allclose(got, (expected[0], *expected[3:]), atol=1e-14)
         if square <= geometry.ON_SURFACE**2:
             np.testing.assert_allclose((ey, -ex), expected[1:3], atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["square", "triangle", "T", "circle"])
+@pytest.mark.parametrize("farthest", [0.05, 3.0])
+def test_points_before_one_edge_have_the_bits_of_points_all_around(
+    name: str, farthest: float
+) -> None:
+    edges = BOXES[name].outline.edges
+    rng = np.random.default_rng(0)
+    for edge in edges:
+        along = edge[2:] - edge[:2]
+        across = np.array([along[1], -along[0]]) / max(np.hypot(*along), 1e-9)
+        shares = rng.uniform(0, 1, (geometry.LANES, 1)) ** 8  # many next to an end
+        points = edge[:2] + shares * along + rng.uniform(0, farthest, shares.shape) * across
+        before = np.zeros((8, geometry.LANES))
+        before[:2] = points.T
+        around = before.copy()
+        around[:2, 0] = 0.0  # the first stands within
+        geometry.nearest_points(edges, before.ravel(), geometry.LANES)
+        geometry.nearest_points(edges, around.ravel(), geometry.LANES)
+        np.testing.assert_array_equal(before[:6, 1:], around[:6, 1:])
 
 
 @given(
