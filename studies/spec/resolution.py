@@ -154,7 +154,9 @@ def _condition(
 
 def _learner_of(preset: object) -> SpecTable:
     """Return the learner of a preset; none if there is no such preset."""
-    learner: SpecTable = PRESETS[preset].table["learner"] if preset in PRESETS else {}
+    if not isinstance(preset, str) or preset not in PRESETS:
+        return {}
+    learner: SpecTable = PRESETS[preset].table["learner"]
     return learner
 
 
