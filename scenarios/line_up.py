@@ -126,7 +126,7 @@ class LineUp(Scenario):
         """Return the period of recorded steps."""
         return {"dt": PERIOD}
 
-    def draw(self, path: Path) -> None:
+    def draw(self, path: Path | str) -> None:
         """Draw rails, carts and the goal line to a picture file."""
         from matplotlib.figure import Figure
 

@@ -25,11 +25,11 @@ PICTURES = (".png", ".svg", ".pdf")
 class Drawable(Protocol):
     """Optional part of a scenario: a picture of the present state."""
 
-    def draw(self, path: Path) -> None:
+    def draw(self, path: Path | str) -> None:
         """Draw the present state, after `reset` the start of an episode, to a picture file."""
 
 
-def save_picture(figure: Figure, path: Path) -> None:
+def save_picture(figure: Figure, path: Path | str) -> None:
     """Write a figure in the format of the suffix.
 
     Raises
@@ -37,6 +37,7 @@ def save_picture(figure: Figure, path: Path) -> None:
     ValueError
         If the suffix is unknown or the file cannot be written.
     """
+    path = Path(path)
     if path.suffix not in PICTURES:
         raise ValueError(f"picture: suffix {path.suffix!r} of {path.name}, allowed {PICTURES}")
     try:

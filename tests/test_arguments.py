@@ -34,6 +34,7 @@ VALID: dict[str, dict[str, object]] = {
         "scenario": SCENARIO, "team": None, "episodes": 1, "steps": 1, "seed": 0,
     },
     "detectable": {"deviation": 0.25, "seeds": 15, "comparisons": 1},
+    "explain_decision": {"decision": None},
     "from_gymnasium": {"env": None},
     "from_pettingzoo": {"env": None},
     "keys": {"prefix": "scenario"},

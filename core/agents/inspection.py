@@ -9,6 +9,7 @@ import numpy as np
 from ..hierarchy.stages import Inbox
 from ..interface.experience import AgentDecision, Decision
 from ..numerics import SAME, FloatArray, IntArray
+from ..plugins.words import expect
 
 
 def inspect_agents(
@@ -81,6 +82,7 @@ def explain_decision(decision: Decision) -> str:
       values: push 0, wait 1
       received: push from leader
     """
+    expect("a decision of Team.act", Decision, decision=decision)
     if not decision.agents:
         raise ValueError("decision: has no details; decide with team.act(..., inspect=True)")
     return "\n".join(line for agent in decision.agents for line in _explain(agent))

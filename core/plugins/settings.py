@@ -239,7 +239,7 @@ class PartSettings(Settings):
             If it cannot be built; one line.
         """
         if not self.factory:
-            raise TypeError(f"{type(self).__name__} {self.kind!r} has no factory")
+            raise TypeError(f"{type(self).__name__} has no kind, or its class no factory")
         factory = self.factory
         return (resolve_name(factory) if isinstance(factory, str) else factory)(self, *given)
 

@@ -190,7 +190,7 @@ class EnvironmentScenario(Scenario):
         """Whether the environment renders pictures."""
         return "rgb_array" in (self._simulator.env.metadata or {}).get("render_modes", ())
 
-    def draw(self, path: Path) -> None:
+    def draw(self, path: Path | str) -> None:
         """Draw the start of the episode, as the environment renders it, to a picture file."""
         if not self.draws:
             raise ValueError(f"{self.settings.id}: renders no pictures")

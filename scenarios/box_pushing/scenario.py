@@ -251,7 +251,7 @@ class BoxPushing(Scenario, Embodiment):
 
         animate(recording, path)
 
-    def draw(self, path: Path) -> None:
+    def draw(self, path: Path | str) -> None:
         """Draw the current state, after `reset` the start of an episode, to a picture file."""
         from .pictures.rendering import snapshot
 

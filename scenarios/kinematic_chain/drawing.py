@@ -99,7 +99,7 @@ def animate(recording: Recording, path: Path) -> None:
     film(_ChainScene(recording).pixels, len(recording["angles"]) - 1, float(recording["dt"]), path)
 
 
-def snapshot(recording: Recording, path: Path) -> None:
+def snapshot(recording: Recording, path: Path | str) -> None:
     """Draw the last step of a recording to a picture file."""
     scene = _ChainScene(recording)
     scene.draw(len(recording["angles"]) - 1)

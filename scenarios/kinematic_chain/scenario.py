@@ -196,7 +196,7 @@ class KinematicChain(Scenario, Embodiment):
 
         animate(recording, path)
 
-    def draw(self, path: Path) -> None:
+    def draw(self, path: Path | str) -> None:
         """Draw the present posture and the goal to a picture file."""
         from .drawing import snapshot
 

@@ -11,7 +11,7 @@ from ..movies import save_picture
 
 
 def draw_tables(
-    tables: FloatArray, titles: Sequence[str], actions: Sequence[str], path: Path
+    tables: FloatArray, titles: Sequence[str], actions: Sequence[str], path: Path | str
 ) -> None:
     """Draw payoff tables side by side; the maximum payoff of all tables is framed.
 

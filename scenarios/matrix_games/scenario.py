@@ -237,7 +237,7 @@ class MatrixGame(Scenario, Prediction):
         """Return many environments that are stepped in one call."""
         return MatrixGameEnvironments(self, count)
 
-    def draw(self, path: Path) -> None:
+    def draw(self, path: Path | str) -> None:
         """Draw the payoffs to a picture file, in a panel for each action of a third agent."""
         from .drawing import draw_tables
 

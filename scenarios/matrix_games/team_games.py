@@ -245,7 +245,7 @@ class TeamGame(Scenario):
         self.game.advance(self._rng)
         return Transition(self._states(), payoff, False, False, info)
 
-    def draw(self, path: Path) -> None:
+    def draw(self, path: Path | str) -> None:
         """Draw the agents and the edges of the payoff to a picture file."""
         from matplotlib.figure import Figure
 

@@ -3,7 +3,8 @@
 import csv
 import io
 import json
-from contextlib import redirect_stdout
+import sqlite3
+from contextlib import closing, redirect_stdout
 
 import made_up
 import numpy as np
@@ -218,10 +219,12 @@ def test_a_measure_that_two_scenarios_mean_otherwise_is_refused(carts, monkeypat
         check_conditions(SPEC)
 
 
-def test_results_of_an_older_version_are_not_read(study, monkeypatch):
-    monkeypatch.setattr(database, "RESULTS_VERSION", 99)
-    with pytest.raises(SpecError, match="this is version 99; an older"), Store.open(study):
-        pass
+def test_results_of_an_older_version_are_read_with_a_remark(study):
+    with closing(sqlite3.connect(study / database.DATABASE)) as db, db:
+        db.execute("UPDATE meta SET value = '4' WHERE key = 'results_version'")
+    results = na.load(study)
+    assert len(results.trials)
+    assert any("holds results of version 4, this is version" in line for line in results.remarks)
 
 
 def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):

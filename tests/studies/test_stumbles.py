@@ -159,7 +159,7 @@ def test_hierarchies_say_how_small_a_difference_they_could_find() -> None:
     [
         (
             "learner.predictor = { ridge = 1 }",
-            "learner.predictor = {ridge = 1}: kind is missing; known: given, learned, static",
+            "learner.predictor.ridge = 1: unknown key for kind 'given'",
         ),
         (
             'learner.predictor.kind = "push"',

@@ -222,7 +222,7 @@ def picture(recording: Recording, step: int, *, sensors: bool = False) -> Pixels
     return _BoxScene(recording, sensors=sensors).pixels(step)
 
 
-def snapshot(recording: Recording, step: int, path: Path, *, sensors: bool = False) -> None:
+def snapshot(recording: Recording, step: int, path: Path | str, *, sensors: bool = False) -> None:
     """Draw the moment after `step` steps (negative: from the end) to a picture file."""
     scene = _BoxScene(recording, sensors=sensors)
     scene.draw(range(len(recording["box_pose"]))[step])

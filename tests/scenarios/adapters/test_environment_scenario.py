@@ -428,8 +428,6 @@ def test_centres_of_membership_functions_are_given_by_name() -> None:
         Odd(Box(-1.0, 1.0, (2,))), angles={"turn": 1}, centres={"o0": fine, "turn": (-0.1, 0.1)}
     )
     assert [variable.centres for variable in world.state_space.variables] == [fine, (-0.1, 0.1)]
-    plain = GymnasiumSettings(id="CartPole-v1")
-    assert "centres" not in plain.model_dump()  # the identity of studies begun before is the same
 
 
 def test_check_and_run_say_it_in_one_line(
