@@ -17,7 +17,6 @@ from shutil import get_terminal_size
 from typing import Any, Literal, NamedTuple, TextIO
 
 import numpy as np
-from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -247,7 +246,7 @@ class SummaryTable:
         rows = []
         for line in self.lines:
             estimates = {
-                title: dict(zip(("value", "low", "high"), map(_finite, estimate), strict=True))
+                title: dict(zip(Estimate._fields, estimate.to_json(), strict=True))
                 for title, estimate in line.estimates.items()
                 if title in self.titles
             }
@@ -285,12 +284,6 @@ class SummaryTable:
 
     def _repr_html_(self) -> str:
         return self.html
-
-
-def _finite(value: ArrayLike) -> float | None:
-    """Return a number of JSON, which has no infinity and no NaN."""
-    number = float(np.asarray(value))
-    return number if np.isfinite(number) else None
 
 
 def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTable:

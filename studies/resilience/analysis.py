@@ -191,14 +191,14 @@ class Resilience:
         return {
             "condition": own.condition,
             "seeds": len(own.intact),
-            "intact": _plain(mean_estimate(self.measure, own.intact)),
+            "intact": mean_estimate(self.measure, own.intact).to_json(),
             "tolerates_any_single_loss": self.verdict(own),
             "halving": own.halving,
             "single": [
                 {
                     "lost": d.condition,
                     "position": positions[d.condition],
-                    "change": _plain(d.estimate),
+                    "change": d.estimate.to_json(),
                     "p": d.p,
                 }
                 for d in self.single[own.condition]
@@ -212,11 +212,7 @@ class Resilience:
             ],
             "numbers": [
                 {"n_lost": n, "sets": len(sets)}
-                | {"change": _plain(self._change(own, own.joined(sets)))}
+                | {"change": self._change(own, own.joined(sets)).to_json()}
                 for n, sets in own.by_number.items()
             ],
         }
-
-
-def _plain(estimate: Estimate) -> list[float | None]:
-    return [None if end != end else end for end in map(float, estimate)]

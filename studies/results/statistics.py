@@ -45,6 +45,10 @@ class Estimate(NamedTuple):
     low: Array
     high: Array
 
+    def to_json(self) -> list[float | None]:
+        """Return the three scalars for JSON, which has no infinity and no NaN: these are None."""
+        return [float(end) if np.isfinite(end) else None for end in self]
+
 
 def exactly(value: ArrayLike) -> Estimate:
     """Return values without an interval, such as counts."""

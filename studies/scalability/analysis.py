@@ -251,14 +251,14 @@ class Scalability:
                 {
                     "condition": line.condition,
                     "seeds": line.seeds,
-                    "estimates": {title: _plain(e) for title, e in line.estimates.items()},
+                    "estimates": {title: e.to_json() for title, e in line.estimates.items()},
                 }
                 for line in self.summaries
             ],
             "laws": {name: self._law_to_dict(name) for name in self.laws},
             "best_sizes": {name: own._asdict() for name, own in self.best_sizes.items()},
             "crossovers": [
-                {"better": c.better, "worse": c.worse, "size": _plain(c.size)}
+                {"better": c.better, "worse": c.worse, "size": c.size.to_json()}
                 for c in self.crossovers
             ],
             "fronts": [point._asdict() for point in self.fronts],
@@ -269,10 +269,10 @@ class Scalability:
     def _law_to_dict(self, hierarchy: str) -> dict[str, object]:
         law = self.laws[hierarchy]
         return {
-            "contention": _plain(law.contention),
-            "coherency": _plain(law.coherency),
+            "contention": law.contention.to_json(),
+            "coherency": law.coherency.to_json(),
             "describes_times": law.is_plausible,
-            "best_size": _plain(law.best_size) if law.is_plausible else None,
+            "best_size": law.best_size.to_json() if law.is_plausible else None,
             "sentence": _place(law, self.data.sizes(hierarchy)[-1], self.data.size),
         }
 
@@ -307,7 +307,3 @@ def _join(names: Sequence[str]) -> str:
     """
     *first, last = names or [""]
     return f"{', '.join(first)} and {last}" if first else last
-
-
-def _plain(estimate: Estimate) -> list[float | None]:
-    return [end if math.isfinite(end) else None for end in map(float, estimate)]

@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from ...core.numerics import pd
 from ..errors import SpecError
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary, estimate_over_seeds
@@ -126,8 +125,10 @@ def predict(
     for name in dict.fromkeys((measure, TIME, *numbers)):
         try:
             growth = scaling_law(results, name, size=key, predict=sizes)
-        except SpecError:  # was not measured
-            continue
+        except SpecError:
+            if name == measure:
+                raise
+            continue  # was not measured
         for fitted in growth.fits:
             hierarchy = fitted.group or "all teams"
             if fitted.law is None:
@@ -230,16 +231,20 @@ def check(file: PredictionFile, results: Results, spec: SpecTable) -> Prediction
     """
     _check_spec(file, spec)
     columns = columns_of(results)
-    places = {
-        condition: (label_but(own, [file.size]) or "all teams", float(str(own[file.size])))
+    condition_at = {
+        (label_but(own, [file.size]) or "all teams", float(str(own[file.size]))): condition
         for condition, own in columns.items()
         if file.size in own
     }
-    checked = [
-        measured
-        for prediction in file.predictions
-        if (measured := _measured(prediction, results, places)) is not None
-    ]
+    measured = {name: values_of(results, name) for name in {p.measure for p in file.predictions}}
+    checked: list[CheckedPrediction] = []
+    for prediction in file.predictions:
+        measure, values, _ = measured[prediction.measure]
+        condition = condition_at.get((prediction.hierarchy, prediction.size))
+        if condition in values:
+            numbers = values[condition].to_numpy(dtype=float)
+            estimate = estimate_over_seeds(numbers, measure)
+            checked.append(CheckedPrediction(prediction, len(numbers), estimate))
     if not checked:
         predicted = ", ".join(f"{n:g}" for n in sorted({p.size for p in file.predictions}))
         raise SpecError(
@@ -265,16 +270,3 @@ def _fixed(spec: Mapping[str, object], size: str) -> Iterator[tuple[str, object]
     for key, value in flat(spec):
         if key.removeprefix("sweep.") not in (size, *FREE_KEYS):
             yield key, value
-
-
-def _measured(
-    prediction: SizePrediction, results: Results, places: Mapping[str, tuple[str, float]]
-) -> CheckedPrediction | None:
-    """Return a prediction with what was measured; None if it was not."""
-    measure, values, _ = values_of(results, prediction.measure)
-    for condition, own in values.items():
-        if places.get(condition) == (prediction.hierarchy, prediction.size):
-            numbers = pd.Series(own).to_numpy(dtype=float)
-            estimate = estimate_over_seeds(numbers, measure)
-            return CheckedPrediction(prediction, len(numbers), estimate)
-    return None

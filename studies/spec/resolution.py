@@ -22,7 +22,7 @@ from ...topologies.config import parse
 from ..errors import SpecError, refused
 from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings
 from .controls import LEARN_NOTHING, for_control
-from .presets import PRESETS
+from .presets import PRESETS, Preset
 from .tables import SWEEP, SpecTable, TomlTable, flat, label, merge, nested, override, scalar
 
 SECTIONS = ("scenario", "topology", "learner")
@@ -65,14 +65,13 @@ def resolve(preset: object, user: SpecTable, where: str = "") -> ConditionSettin
     SpecError
         If the preset is unknown or a value is refused; one line.
     """
-    if not isinstance(preset, str) or preset not in PRESETS:
-        raise SpecError(f"preset = {show(preset)}: {closest(preset, PRESETS)}{where}")
-    base = PRESETS[preset].table
+    own = _preset(preset, where)
+    base = own.table
     table = override({"scenario": base["scenario"]}, {"scenario": user.get("scenario", {})})
     scenario = _validate(table, where).scenario
     if scenario.kind != base["scenario"]["kind"]:
-        base = merge(base, PRESETS[preset].other_scenarios)
-    base = override(base, expand_sections(scenario.scenario_defaults(preset)))
+        base = merge(base, own.other_scenarios)
+    base = override(base, expand_sections(scenario.scenario_defaults(str(preset))))
     return _validate(override(base, user), where)
 
 
@@ -125,13 +124,13 @@ def _condition(
     preset = point.get("preset", table.preset if table and table.preset else spec.preset)
     user = spec.sections
     if table and table.preset and "preset" not in point:
-        user = for_control(_learner_of(preset), user)
+        user = for_control(_preset(preset, where).table["learner"], user)
     layers = [sections_of(table)] if table else []
     layers += [expand_sections(nested(key, v)) for key, v in point.items() if key != "preset"]
     for layer in layers:
         user = merge(for_control(layer.get("learner", {}), user), layer)
     if "preset" in point:
-        user = for_control(_learner_of(preset), user)
+        user = for_control(_preset(preset, where).table["learner"], user)
     settings = resolve(preset, user, where)
     curriculum = spec.curriculum
     if table and table.curriculum is not None:
@@ -152,12 +151,10 @@ def _condition(
     return Condition(name, columns, settings, tuple(evaluations), tuple(stages))
 
 
-def _learner_of(preset: object) -> SpecTable:
-    """Return the learner of a preset; none if there is no such preset."""
-    if not isinstance(preset, str) or preset not in PRESETS:
-        return {}
-    learner: SpecTable = PRESETS[preset].table["learner"]
-    return learner
+def _preset(name: object, where: str) -> Preset:
+    if not isinstance(name, str) or name not in PRESETS:
+        raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
+    return PRESETS[name]
 
 
 def sections_of(own: Settings) -> TomlTable:

@@ -69,6 +69,11 @@ def test_another_spec_and_sizes_that_were_not_run_are_refused(tables):
         predicted(tables, (8,))
 
 
+def test_a_measure_that_there_is_not_is_refused(tables):
+    with pytest.raises(na.SpecError, match="scores"):
+        predict(load(tables / "small.csv").results, {}, "scores", None, (16,))
+
+
 def test_commands_predict_and_check(tables, tmp_path, capsys):
     path = tmp_path / "prediction.json"
     columns = ["--columns", "condition=agents"]
