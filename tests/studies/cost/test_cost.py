@@ -265,7 +265,8 @@ def test_latex_has_what_was_measured() -> None:
         r"n & topology & formula & counted & rules tried & updates & decide ms & learn ms \\",
         r"\midrule",
         r"1 & chain & 4 & 4 & 4 & 1 & 0.004 & 0.001 \\",
-        r"10 & chain & 1\,048\,576 & 1\,048\,576 & 1\,048\,576 & 10 & $1.100\times 10^{9}$ & 0.001 \\",
+        r"10 & chain & 1\,048\,576 & 1\,048\,576 & 1\,048\,576 & 10 & $1.100\times 10^{9}$ "
+        r"& 0.001 \\",
         r"11 & chain & 4\,194\,304 & -- & -- & -- & -- & -- \\",
         r"\bottomrule",
         r"\end{tabular}",
