@@ -26,7 +26,7 @@ from nested_agents.figures import COLOURS, STYLES
 
 from grade import grade
 
-SEEDS, EPISODES, FAILS = 8, 24, 10
+SEEDS, EPISODES, FAILS = 4, 20, 10
 failure = {"kind": "reversed", "wheels": "robot1.front-left", "episode": FAILS}
 spec = na.Spec(
     study="wheel-failure",
@@ -82,7 +82,7 @@ figure.savefig("out/course/wheel-failure.png", dpi=80)
 #
 # Questions
 # ---------
-# Eight seeds are enough to see it, and too few to conclude anything: the intervals say so.
+# Four seeds are enough to see it, and too few to conclude anything: the intervals say so.
 
 answers = {
     "episode": None,  # in which episode, counted from 0, does the wheel begin to fail?
