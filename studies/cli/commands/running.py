@@ -183,7 +183,7 @@ class Supposed(TypedDict):
 @options.trust
 @options.changes
 def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Unpack[Supposed]) -> int:
-    """Estimate the time and memory of a study, and the differences that it can detect.
+    """Estimate the time of a study, and the differences that it can detect.
 
     SPEC.toml is the spec of the study. Every condition runs some pilot episodes; nothing is kept.
     """
