@@ -136,7 +136,7 @@ class TuneOptions(Budget, options.RunOptions):
 def tune(
     spec: Path, out: Path, trust: bool, changes: tuple[str, ...], **choice: Unpack[TuneOptions]
 ) -> int:
-    """Look for better settings of a spec, on seeds that no report uses; again, it continues.
+    """Search for better settings of a spec on separate seeds; the same command resumes it.
 
     SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
     configurations are tried on two seeds, the better half on four, and so on.
