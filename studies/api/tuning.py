@@ -235,8 +235,8 @@ def _space(spec: Spec) -> dict[str, Sequence[object]]:
                 _changed(spec, {key: value})  # refuses unknown keys and values
         return dict(spec.tune)
     possible: dict[str, list[object]] = {}
-    for key, values in USUAL.items():
-        for value in values:
+    for key, usual in USUAL.items():
+        for value in usual:
             with suppress(SpecError):
                 _content(_changed(spec, {key: value}))
                 possible.setdefault(key, []).append(value)
