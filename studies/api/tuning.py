@@ -248,18 +248,18 @@ def _sample(spec: Spec, trials: int, draw: int) -> dict[str, Configuration]:
     space = _space(spec)
     rng = np.random.default_rng(draw)
     problem = "all are the spec's own"
-    found: dict[str, Configuration] = {_content(spec): {}}
+    drawn: dict[str, Configuration] = {_content(spec): {}}
     for _ in range(MAX_DRAWS * trials):
-        if len(found) == trials:
+        if len(drawn) == trials:
             break
-        drawn = {key: values[int(rng.integers(len(values)))] for key, values in space.items()}
+        changes = {key: values[int(rng.integers(len(values)))] for key, values in space.items()}
         try:
-            found.setdefault(_content(_changed(spec, drawn)), drawn)
+            drawn.setdefault(_content(_changed(spec, changes)), changes)
         except SpecError as error:
             problem = str(error)
-    if len(found) == 1:
+    if len(drawn) == 1:
         raise SpecError(f"tune: there is nothing to try: {problem}")
-    return {f"c{i:02}" if i else GIVEN: drawn for i, drawn in enumerate(found.values())}
+    return {f"c{i:02}" if i else GIVEN: changes for i, changes in enumerate(drawn.values())}
 
 
 def _study(spec: Spec, configurations: Mapping[str, Configuration], seeds: Sequence[int]) -> Spec:
