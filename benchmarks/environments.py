@@ -9,22 +9,11 @@ from __future__ import annotations
 import random
 import traceback
 from collections import Counter
-from fractions import Fraction
 from sys import stderr
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import (
-    Box,
-    Dict,
-    Discrete,
-    MultiBinary,
-    MultiDiscrete,
-    Sequence,
-    Space,
-    Text,
-    Tuple,
-)  # fmt: skip
+from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Space, Text
 from pettingzoo import ParallelEnv
 
 from nested_agents.scenarios.adapters.scenario import EnvironmentScenario, from_pettingzoo
@@ -35,11 +24,11 @@ SEEDS = 3
 PLAYERS: dict[str, tuple[Any, ...]] = {
     "two": ("a", "b"), "one": ("a",), "twelve": tuple(f"a_{i}" for i in range(12)),
     "numbers": (1, 0), "empty": ("", "b"), "pairs": (("x", 1), ("x", 2)), "alike": (1, "1"),
-    "raw": ("\x1b[31m", "b\n"), "numpy": (np.int64(3), np.int64(4)), "none": (None, "b"),
+    "raw": ("\x1b[31m", "b\n"), "numpy": (np.int64(3), np.int64(4)),
 }  # fmt: skip
 SEEN = (
     "array", "scales", "unbounded", "huge", "dict", "swapped", "other keys", "number", "counted",
-    "bits", "image", "text", "sequence", "tuple", "nested", "mask", "sizes", "float32", "no space",
+    "bits", "text", "nested", "mask", "sizes", "float32", "no space",
 )  # fmt: skip
 ACTIONS: dict[str, Space[Any] | None] = {
     "three": Discrete(3), "from -1": Discrete(3, start=-1), "numbers": Box(-1.0, 1.0, (2,)),
@@ -48,9 +37,9 @@ ACTIONS: dict[str, Space[Any] | None] = {
 }  # fmt: skip
 FAULTS = (
     "nan", "inf", "outside", "same array", "list", "missing player", "unknown player", "nothing",
-    "shape", "words", "raises", "exits", "is late", "numbers are text", "after the rehearsal",
+    "shape", "raises", "exits", "is late", "numbers are text", "after the rehearsal",
 )  # fmt: skip
-PAID = ("array", "arrays", "scalar", "nothing", "nan", "text", "fraction", "missing", "bool", "inf")
+PAID = ("array", "arrays", "scalar", "nothing", "nan", "text", "missing", "bool", "inf")
 ENDS = ("mixed", "listed", "dies", "empties", "late", "old", "numpy", "nothing", "at once", "keys")
 FACES = ("no possible_agents", "no agents", "no seed", "no infos", "infos None", "no reset")
 
@@ -94,8 +83,7 @@ class Drawn(ParallelEnv[Any, Any, Any]):
             "dict": Dict(of), "swapped": Dict(of if is_first else dict(reversed(of.items()))),
             "other keys": Dict(of if is_first else {"place": box, "hour": box}),
             "number": Box(-1.0, 1.0, (), np.float64), "counted": Discrete(21, start=-10),
-            "bits": MultiBinary(2), "image": Box(0, 255, (84, 84, 3), np.uint8), "text": Text(5),
-            "sequence": Sequence(box), "tuple": Tuple([box, box]), "nested": Dict({"of": Dict(of)}),
+            "bits": MultiBinary(2), "text": Text(5), "nested": Dict({"of": Dict(of)}),
             "mask": Dict({"observation": box, "action_mask": Box(0, 1, (3,), np.int8)}),
             "sizes": Box(-1.0, 1.0, (2 if is_first else 3,), np.float64),
             "float32": Box(-1.0, 1.0, (2,), np.float32), "no space": None,
@@ -133,8 +121,7 @@ class Drawn(ParallelEnv[Any, Any, Any]):
             "swapped": ({"place": np.array(x), "time": np.array(t)}, [x, t]),
             "other keys": ({"place": x, "hour": t} | third, [x, t]),
             "number": (np.array(x), [x]), "counted": (counted, [float(counted)]),
-            "bits": (bits, bits.tolist()), "image": (np.zeros((84, 84, 3), np.uint8), []),
-            "text": ("words", []), "sequence": ((x,), [x]), "tuple": ((x, t), [x, t]),
+            "bits": (bits, bits.tolist()), "text": ("words", []),
             "nested": ({"of": {"place": x, "time": t}}, [x, t]),
             "mask": ({"observation": x, "action_mask": np.ones(3, np.int8)}, [x]),
             "sizes": (pair if agent == self.ids[0] else np.append(pair, 0.5), [x, t]),
@@ -157,7 +144,7 @@ class Drawn(ParallelEnv[Any, Any, Any]):
         if fault in number and isinstance(seen, np.ndarray):
             seen = np.array(seen, dtype=np.float64)
             seen.flat[0] = self.truth[agent][0] = number[fault]
-        others = {"nothing": None, "shape": np.zeros((3, 3)), "words": "words"}
+        others = {"nothing": None, "shape": np.zeros((3, 3))}
         if fault == "numbers are text" and isinstance(seen, np.ndarray):
             return seen.astype(str)
         return others.get(fault, seen)
@@ -196,7 +183,7 @@ class Drawn(ParallelEnv[Any, Any, Any]):
         forms: dict[str, Any] = {
             "array": np.array([reward], np.float64), "arrays": np.array([reward, reward]),
             "scalar": np.float64(reward), "nothing": None, "nan": np.nan, "text": str(reward),
-            "fraction": Fraction(reward), "bool": reward < -0.4, "inf": -np.inf,
+            "bool": reward < -0.4, "inf": -np.inf,
         }  # fmt: skip
         return forms.get(self.traits["paid"], reward)
 

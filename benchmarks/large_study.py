@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -21,6 +19,8 @@ from nested_agents.studies.trials.episodes import EpisodeRow
 from nested_agents.studies.trials.keeping import open_to_run
 from nested_agents.studies.trials.trial import TrialResult, trials_of
 from nested_agents.studies.workers.runner import save
+
+from .startup import used_by
 
 LIMITS_S = {"status": 0.7, "table": 2.5, "compare": 3.5, "report": 7.8, "export": 3.0}
 """Processor times that must not be exceeded on an idle machine, by command [s]."""
@@ -57,13 +57,8 @@ def _draw(measures: tuple[Measure, ...], rng: np.random.Generator) -> dict[str, 
 
 def processor_seconds(command: str, directory: Path) -> float:
     """Return the processor time of a command on a study in a new process [s]."""
-    line = [sys.executable, "-m", "nested_agents", *command.split(), str(directory)]
-    before = os.times()
-    subprocess.run(line, check=True, capture_output=True)
-    after = os.times()
-    return (
-        after.children_user - before.children_user + after.children_system - before.children_system
-    )
+    used = used_by(["-m", "nested_agents", *command.split(), str(directory)])
+    return used.ru_utime + used.ru_stime
 
 
 def main() -> None:
@@ -79,9 +74,8 @@ def main() -> None:
             generate(directory, options.trials)
         for command, limit in LIMITS_S.items():
             line = f"{command} --overwrite" if command == "export" else command
-            times = [processor_seconds(line, directory) for _ in range(options.rounds)]
-            shown = " ".join(f"{time:.2f}" for time in times)
-            print(f"{command:8} {min(times):5.2f} s, at most {limit} s; runs: {shown}", flush=True)
+            seconds = min(processor_seconds(line, directory) for _ in range(options.rounds))
+            print(f"{command:8} {seconds:5.2f} s of {limit} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ import numpy as np
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.experience import Decision, Experience, Observation
-from nested_agents.core.interface.plain import as_prediction
 from nested_agents.core.interface.scenario import Transition, checked_scenario
 
 
@@ -21,8 +20,6 @@ def look(world: Any, states: Any = None, **more: Any) -> Observation:
     scenario = checked_scenario(world)
     if states is None:
         states = np.zeros((len(scenario.agents), scenario.state_space.n_variables))
-    if "imagined" in more:
-        more["imagined"] = as_prediction(more["imagined"])
     return Observation(states, scenario, **more)
 
 

@@ -18,12 +18,13 @@ from ..interface.experience import Experience, Observation
 from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
-from ..learners.learner import LearnerSettings
+from ..learners.learner import Learner, LearnerSettings
 from ..models.predictors import GivenPredictor, Mirror
 from ..models.team_model import TeamModel
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
+from ..plugins.words import must_inherit
 from ..search.evaluator import NOBODY, NOTHING_GIVEN, Aggregation, DecisionContext, Evaluator
-from .plain import as_explorer, as_learner
+from ..search.exploration import Explorer
 from .valuing import Present, evaluator_of, is_private
 from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
 
@@ -96,7 +97,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             scenario.state_space, scenario.action_set, self._n_told
         )
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
-        self.learner = as_learner(settings.build(self.rules, rows))
+        self.learner: Learner = settings.build(self.rules, rows)
+        must_inherit("learner.kind", self.learner, Learner)
         self._placement = context
         self._evaluators: dict[Hierarchy, Evaluator | None] = {}
         self._left = NOBODY
@@ -113,7 +115,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             plans = isinstance(self.evaluator, Aggregation) and self.evaluator.plans
             self.views = Views(settings, context, self._row_of, n_rules, self.model, plans=plans)
             self.costs = self.views.costs
-        self.explorer = as_explorer(settings.exploration.build(n))
+        self.explorer: Explorer = settings.exploration.build(n)
+        must_inherit("learner.exploration.kind", self.explorer, Explorer)
         self.rng = np.random.Generator(np.random.PCG64(context.seed))
         self.seen: FloatArray = np.ones((n, n_actions))
         conditional = settings.decision.teammates == "conditional"
@@ -387,15 +390,15 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             If the learner or the exploration does not support it; one line.
         """
         rows = former._carried_rows(self.scenario, self.members)
-        self.learner.continue_from(former.learner, rows)
-        self.explorer.continue_from(former.explorer)
+        self.learner.warm_start(former.learner, rows)
+        self.explorer.warm_start(former.explorer)
         self.rng.bit_generator.state = former.rng.bit_generator.state
         for agent, row in zip(self.members, self.rows, strict=True):
             alike = former.members[former.rows == rows[row]]
             self.seen[agent] = former.seen[alike].mean(axis=0)
         if self.given.shape == former.given.shape:
             self.given = former.given.copy()
-        self.model.continue_from(former.model)
+        self.model.warm_start(former.model)
 
     def state_dict(self) -> StateDict:
         """Return the saved state."""
@@ -406,9 +409,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         }
         if self.given.size:
             memory["given"] = self.given
-        memory |= {f"learner.{key}": array for key, array in self.learner.arrays().items()}
+        memory |= {f"learner.{key}": array for key, array in self.learner.state_dict().items()}
         for name, part in self.model.adaptive.items():
-            memory |= {f"{name}.{key}": array for key, array in part.arrays().items()}
+            memory |= {f"{name}.{key}": array for key, array in part.state_dict().items()}
         return memory
 
     def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
@@ -437,6 +440,6 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.seen = state["seen"].copy()
         if self.given.size:
             self.given = state["given"].copy()
-        self.learner.restore(select_prefix("learner.", state))
+        self.learner.load_state_dict(select_prefix("learner.", state))
         for name, part in self.model.adaptive.items():
-            part.restore(select_prefix(f"{name}.", state))
+            part.load_state_dict(select_prefix(f"{name}.", state))

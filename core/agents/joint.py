@@ -22,7 +22,6 @@ from typing import Literal
 
 import numpy as np
 
-from ..interface.plain import as_prediction
 from ..interface.prediction import (
     Blocks,
     EmbodiedPrediction,
@@ -170,7 +169,7 @@ class JointAgents(Scenario):
 
     def predict(self) -> JointPrediction | None:
         """Return the prediction from the present state, if there is one."""
-        prediction = as_prediction(self.scenario.predict())
+        prediction = self.scenario.predict()
         return None if prediction is None else JointPrediction(prediction, self)
 
     def embodiment(self) -> Embodiment | None:

@@ -9,10 +9,10 @@ from ..interface.agents import AgentContext
 from ..interface.scenario import Scenario
 from ..learners.learner import LearnerSettings
 from ..numerics import IntArray
+from ..plugins.words import must_inherit
 from ..search.budget import check_budget
 from ..search.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
 from ..values.rule_base import RuleBase
-from .plain import as_evaluator
 
 
 class Present(NamedTuple):
@@ -85,7 +85,8 @@ def evaluator_of(
         is_private=private,
         budget=decision.budget,
     )
-    evaluator = as_evaluator(decision.evaluator.build(problem))
+    evaluator: Evaluator = decision.evaluator.build(problem)
+    must_inherit("learner.decision.evaluator", evaluator, Evaluator)
     if decision.budget is not None and not evaluator.keeps_budget:
         raise ValueError(
             f"learner.decision.budget = {decision.budget}: learner.decision.evaluator = "

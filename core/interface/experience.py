@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..numerics import FloatArray, IntArray
-from .plain import as_prediction
 from .prediction import Prediction
 from .scenario import Scenario, Transition
 
@@ -35,7 +34,7 @@ class Observation(NamedTuple):
         ValueError
             If the scenario predicts nothing.
         """
-        prediction = self.imagined or as_prediction(self.scenario.predict())
+        prediction = self.imagined or self.scenario.predict()
         if prediction is None:
             raise ValueError(f"the scenario {type(self.scenario).__name__} predicts nothing")
         return prediction.states(agent, joint_actions)

@@ -206,7 +206,7 @@ class BatchTD(Learner):
         own = new[:, self.members[row]].reshape(-1, d)
         return own if since else np.concatenate([self._earlier[row].states, own])
 
-    def arrays(self) -> dict[str, FloatArray]:
+    def state_dict(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""
         n, d = self._n_agents, len(self.rules.partitions)
         held = [len(earlier.states) for earlier in self._earlier]
@@ -221,22 +221,22 @@ class BatchTD(Learner):
             "earlier_follower": np.concatenate([e.follower for e in self._earlier]),
         }
 
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
-        self.theta = arrays["theta"].copy()
-        self._states = list(arrays["states"])
-        self._rewards = list(arrays["rewards"])
-        self._follower = [int(f) for f in arrays["follower"]]
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        self.theta = state["theta"].copy()
+        self._states = list(state["states"])
+        self._rewards = list(state["rewards"])
+        self._follower = [int(f) for f in state["follower"]]
         ended = [s for s, f in enumerate(self._follower) if f in (TERMINAL, CUT_OFF)]
         self._episode_start = ended[-1] + 1 if ended else 0
-        rows = arrays["earlier_rows"]
+        rows = state["earlier_rows"]
         self._earlier = [
-            Earlier(*(arrays[f"earlier_{name}"][rows == row] for name in Earlier._fields))
+            Earlier(*(state[f"earlier_{name}"][rows == row] for name in Earlier._fields))
             for row in range(len(self.theta))
         ]
         self._active, self._regressed, self._summed = [], 0, {}
 
-    def continue_from(self, former: Self, rows: IntArray) -> None:
+    def warm_start(self, former: Self, rows: IntArray) -> None:
         """Start from weights and experience of another team, between its episodes."""
         self.theta = former.theta[rows]
         outcomes = former._outcomes()

@@ -198,19 +198,19 @@ class FittedQ(BatchTD, Evaluator):
             of_action = weights * (taken[:, 0] % self._n_actions == action)
             add_gram(gram, taken // self._n_actions, strengths, of_action)
 
-    def arrays(self) -> dict[str, FloatArray]:
+    def state_dict(self) -> dict[str, FloatArray]:
         """Return weights, all experience, and its sums."""
         held = np.cumsum([len(weights) for weights in self._weights])
         sums = {"gram": self._gram, "weights": np.concatenate(self._weights), "held": held}
-        return super().arrays() | sums
+        return super().state_dict() | sums
 
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
-        super().restore(arrays)
-        self._gram = arrays["gram"].copy()
-        self._weights = np.split(arrays["weights"], arrays["held"].astype(int)[:-1])
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        super().load_state_dict(state)
+        self._gram = state["gram"].copy()
+        self._weights = np.split(state["weights"], state["held"].astype(int)[:-1])
 
-    def continue_from(self, former: Self, rows: IntArray) -> None:
+    def warm_start(self, former: Self, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way.
 
         The number of messages may differ: see `carried_weights` and `_with_told`.
@@ -220,7 +220,7 @@ class FittedQ(BatchTD, Evaluator):
         ValueError
             If the former values are not a sum of these rules.
         """
-        super().continue_from(former, rows)
+        super().warm_start(former, rows)
         self._weights = [former._weights[row].copy() for row in rows]
         if former.rules.n_rules == self.rules.n_rules:
             self._gram = former._gram[rows]

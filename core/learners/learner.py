@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Mapping
 from pkgutil import resolve_name
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
@@ -36,6 +36,7 @@ CORE = __name__.rpartition(".learners")[0]
 class Learner(ABC):
     """Learns consequent weights from experience.
 
+    A subclass overrides `observe`, or `observe_decision` if it learns values of actions.
     Agents that share weights have one row of them in common. A learner is built with the row of
     every agent.
     """
@@ -45,11 +46,9 @@ class Learner(ABC):
     theta: FloatArray
     """``(n_rows, n_rules)`` consequent weights."""
 
-    @abstractmethod
-    def begin_episode(self) -> None:
+    def begin_episode(self) -> None:  # noqa: B027 - optional
         """Begin an episode: clear traces of the last one."""
 
-    @abstractmethod
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
         """Learn from the states entered; return the number of weights changed.
 
@@ -61,7 +60,13 @@ class Learner(ABC):
             Received on entering them: one number, or ``(n,)``.
         terminated
             Whether they are terminal.
+
+        Raises
+        ------
+        NotImplementedError
+            If the class overrides neither this method nor `observe_decision`.
         """
+        raise NotImplementedError(f"{type(self).__name__} has no method observe")
 
     def observe_decision(
         self,
@@ -85,19 +90,19 @@ class Learner(ABC):
         """
         return self.observe(states, reward, terminated)
 
-    @abstractmethod
     def end_episode(self) -> int:
         """Make the updates that follow an episode; return the number of weights changed."""
+        return 0
 
-    @abstractmethod
-    def arrays(self) -> dict[str, FloatArray]:
-        """Return everything that `restore` needs."""
+    def state_dict(self) -> dict[str, FloatArray]:
+        """Return the saved state; by default, the weights are all of it."""
+        return {"theta": self.theta}
 
-    @abstractmethod
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        self.theta = state["theta"].copy()
 
-    def continue_from(self, former: Self, rows: IntArray) -> None:
+    def warm_start(self, former: Self, rows: IntArray) -> None:
         """Start from the weights of a learner with the same settings that served other agents.
 
         Parameters

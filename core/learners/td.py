@@ -109,19 +109,19 @@ class Online(Learner):
         own = vars(self)
         return {name: own[name] for name in self.kept}
 
-    def arrays(self) -> dict[str, FloatArray]:
+    def state_dict(self) -> dict[str, FloatArray]:
         """Return weights, traces and the previous states with their rewards."""
         previous = self._previous if self._previous is not None else np.zeros((0, 0))
         return self._kept() | {"previous": previous, "rewards": self._rewards}
 
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
         for name, array in self._kept().items():
-            array[...] = arrays[name]
-        self._previous = arrays["previous"].copy() if arrays["previous"].size else None
-        self._rewards = arrays["rewards"].copy()
+            array[...] = state[name]
+        self._previous = state["previous"].copy() if state["previous"].size else None
+        self._rewards = state["rewards"].copy()
 
-    def continue_from(self, former: Self, rows: IntArray) -> None:
+    def warm_start(self, former: Self, rows: IntArray) -> None:
         """Start from the weights of another team, with zero traces."""
         others = former._kept()
         for name, own in self._kept().items():
@@ -144,13 +144,13 @@ class Frozen(Online):
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         return 0
 
-    def arrays(self) -> dict[str, FloatArray]:
+    def state_dict(self) -> dict[str, FloatArray]:
         """Return the weights."""
         return {"theta": self.theta}
 
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
-        super().restore({"previous": self.theta[:0], "rewards": self._rewards, **arrays})
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        super().load_state_dict({"previous": self.theta[:0], "rewards": self._rewards, **state})
 
 
 class TDLambdaSettings(LearnerSettings):

@@ -32,13 +32,13 @@ class Adaptive(ABC, Generic[P]):
         """Make the updates that follow an episode."""
 
     @abstractmethod
-    def arrays(self) -> dict[str, FloatArray]:
-        """Return everything that `restore` needs."""
+    def state_dict(self) -> dict[str, FloatArray]:
+        """Return the saved state."""
 
     @abstractmethod
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
 
     @abstractmethod
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Start from another model's state if both describe the same bodies."""

@@ -135,17 +135,17 @@ class Calibration(Adaptive[EmbodiedPrediction]):
         self._covariance = 0.5 * (covariance + covariance.T) + np.diag(known * settings.drift**2)
         self._root = np.linalg.cholesky(self._covariance)
 
-    def arrays(self) -> dict[str, FloatArray]:
+    def state_dict(self) -> dict[str, FloatArray]:
         """Return constants and covariance."""
         return {"constants": self.constants, "covariance": self._covariance}
 
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
-        self.constants[:] = arrays["constants"]
-        self._covariance = arrays["covariance"].copy()
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        self.constants[:] = state["constants"]
+        self._covariance = state["covariance"].copy()
         self._root = np.linalg.cholesky(self._covariance)
 
-    def continue_from(self, former: Calibration) -> None:
+    def warm_start(self, former: Calibration) -> None:
         """Start from another calibration if it measures the same kind of bodies."""
         if np.array_equal(self._units, former._units):
-            self.restore(former.arrays())
+            self.load_state_dict(former.state_dict())

@@ -282,19 +282,19 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         body, place = bodies.places
         return np.ascontiguousarray(np.moveaxis(moved[:, body, place], 0, 1))
 
-    def arrays(self) -> dict[str, FloatArray]:
+    def state_dict(self) -> dict[str, FloatArray]:
         """Return sums over all experience, and the weights computed from them."""
         return self.memory
 
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
-        self.memory = {name: np.array(arrays[name]) for name in self.memory}
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        self.memory = {name: np.array(state[name]) for name in self.memory}
 
-    def continue_from(self, former: LearnedPredictor) -> None:
+    def warm_start(self, former: LearnedPredictor) -> None:
         """Start from another predictor if its bodies have the same variables."""
         theirs = former.memory
         if all(theirs[name].shape == array.shape for name, array in self.memory.items()):
-            self.restore(theirs)
+            self.load_state_dict(theirs)
 
     def _apart(self, states: FloatArray, others: FloatArray) -> FloatArray:
         """Return differences of states ``(..., d)``; those of periodic variables are wrapped."""

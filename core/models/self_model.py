@@ -151,19 +151,19 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
             effect[row] += gain * innovation * unit
             covariance[row] -= np.outer(gain, carried)
 
-    def arrays(self) -> dict[str, FloatArray]:
+    def state_dict(self) -> dict[str, FloatArray]:
         """Return effects, covariances and ratios of innovations by body."""
         kept = {"effect": self.effects, "covariance": self._covariances, "ratio": self._ratios}
         return {f"{name}{r}": array for name in kept for r, array in enumerate(kept[name])}
 
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
-        for name, own in self.arrays().items():
-            own[:] = arrays[name]
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        for name, own in self.state_dict().items():
+            own[:] = state[name]
 
-    def continue_from(self, former: SelfModel) -> None:
+    def warm_start(self, former: SelfModel) -> None:
         """Start from another self-model if its bodies have the same geometry."""
         mine = self._nominal
         theirs = former._nominal
         if len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs)):
-            self.restore(former.arrays())
+            self.load_state_dict(former.state_dict())

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from ..interface.experience import Experience, Observation
-from ..interface.plain import as_prediction
 from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray
@@ -86,7 +85,7 @@ class TeamModel:
         if self.predictor is not None:
             return self.predictor.predict(seen.present)
         if self.self_model is None and self.calibration is None and errors is None:
-            return as_prediction(seen.scenario.predict())
+            return seen.scenario.predict()
         bodies = seen.scenario.embodiment()
         if bodies is None:
             raise ValueError(
@@ -109,7 +108,7 @@ class TeamModel:
         for part in self.adaptive.values():
             part.end_episode()
 
-    def continue_from(self, former: TeamModel) -> None:
+    def warm_start(self, former: TeamModel) -> None:
         """Start from the models of another team."""
         for name in self.adaptive.keys() & former.adaptive.keys():
-            self.adaptive[name].continue_from(former.adaptive[name])
+            self.adaptive[name].warm_start(former.adaptive[name])

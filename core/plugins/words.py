@@ -76,6 +76,25 @@ def expect(allowed: str, kind: type | UnionType, /, **arguments: object) -> None
             raise ValueError(f"{name} = {show(value)}, allowed: {allowed}")
 
 
+def must_inherit(key: str, thing: object, base: type) -> None:
+    """Refuse an object built from the settings of a key that does not inherit a base class.
+
+    Raises
+    ------
+    ValueError
+        If it does not; one line that names the key.
+
+    Examples
+    --------
+    >>> must_inherit("learner.kind", "td", int)
+    Traceback (most recent call last):
+    ValueError: learner.kind: str must inherit nested_agents.int
+    """
+    if not isinstance(thing, base):
+        name = type(thing).__name__
+        raise ValueError(f"{key}: {name} must inherit nested_agents.{base.__name__}")
+
+
 def expect_within(allowed: str, low: float, high: float, /, **arguments: float) -> None:
     """Refuse numbers outside a closed interval; NaN lies in none.
 

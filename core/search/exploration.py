@@ -30,7 +30,7 @@ def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
     return weights / weights.sum()
 
 
-def no_way_on(key: str, part: object, method: str = "continue_from") -> str:
+def no_way_on(key: str, part: object, method: str = "warm_start") -> str:
     """Return the message that a part cannot be warm-started from another team."""
     return (
         f"{key}: {type(part).__name__} has no {method}, which starting from another team requires"
@@ -57,7 +57,7 @@ class Explorer(ABC):
     def advance(self) -> None:  # noqa: B027
         """Prepare for the next step, after all agents have decided."""
 
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Start from the state of an explorer with the same settings that served other agents.
 
         Raises
@@ -100,7 +100,7 @@ class Boltzmann(Explorer):
         s = self.settings
         return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
 
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Continue the clock."""
         self.memory[:] = former.memory
 
@@ -224,7 +224,7 @@ class Bursts(Explorer):
         self.memory[0] += 1.0
         self.memory[1:] = 0.0
 
-    def continue_from(self, former: Self) -> None:
+    def warm_start(self, former: Self) -> None:
         """Continue the count of episodes."""
         self.memory[0] = former.memory[0]
 

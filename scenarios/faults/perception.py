@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.plain import as_prediction
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import StateSpace
@@ -144,7 +143,7 @@ class PerceivedScenario(Scenario):
 
     def predict(self) -> Prediction | None:
         """Return the predictions of the agents."""
-        prediction = as_prediction(self.scenario.predict())
+        prediction = self.scenario.predict()
         return None if prediction is None else PerceivedPrediction(prediction, self)
 
     def partners(self) -> Sequence[int] | None:

@@ -5,7 +5,6 @@ import zipfile
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from acting import fuzzy, joint_of, look
 
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop
-from nested_agents.core.agents.plain import as_explorer, as_learner
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.failures import AbsentAgents, LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
@@ -21,9 +19,10 @@ from nested_agents.core.interface.experience import Experience
 from nested_agents.core.interface.scenario import Members, carried_rows
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings
+from nested_agents.core.learners.learner import Learner
 from nested_agents.core.search.enumeration import ExactEnumeration, Sampling
-from nested_agents.core.search.evaluator import Counts, EvaluatorSettings
-from nested_agents.core.search.exploration import BurstExploration
+from nested_agents.core.search.evaluator import Counts, Evaluator, EvaluatorSettings
+from nested_agents.core.search.exploration import BurstExploration, Explorer
 from nested_agents.core.search.settings import DecisionSettings
 from tests.scenarios.test_examples import Tank
 
@@ -392,12 +391,14 @@ def test_weights_are_not_carried_where_they_mean_nothing(
 
 
 @pytest.mark.parametrize("part", ["learner", "explorer"])
-def test_parts_that_cannot_take_over_are_named(part: str, world) -> None:
+def test_parts_without_a_warm_start_are_named(part: str, world) -> None:
+    class CannotStartWarm(Learner if part == "learner" else Explorer):  # type: ignore[misc]
+        def choose(self, agent, values, rng) -> int:
+            return 0
+
     former, successor = team_of("batch-td", world), team_of("batch-td", world)
-    plain = SimpleNamespace(memory=np.zeros(1), observe=lambda states: 0)
-    door = {"learner": as_learner, "explorer": as_explorer}[part]
-    setattr(fuzzy(successor), part, door(plain))
-    with pytest.raises(ValueError, match=r"learner\..*kind: SimpleNamespace has no continue_from"):
+    setattr(fuzzy(successor), part, CannotStartWarm())
+    with pytest.raises(ValueError, match=r"learner\..*kind: CannotStartWarm has no warm_start"):
         successor.warm_start(former)
 
 
@@ -458,7 +459,7 @@ class SarsaSettings(LearnerSettings):
         return Sarsa(self, rules, rows)
 
 
-class Sarsa:
+class Sarsa(Learner):
     """Its ``theta`` holds a row of weights for every action, one behind the other."""
 
     def __init__(self, settings, rules, rows):
@@ -469,7 +470,7 @@ class Sarsa:
     def begin_episode(self):
         self.before = None
 
-    def observe(self, states, reward, terminated, left, joint_action):
+    def observe_decision(self, left, joint_action, states, reward, terminated):
         self.met.append((left, joint_action, states))
         features, every = self.rules.features(left), np.arange(len(left))
         weights = self.theta.reshape(len(left), 3, -1)
@@ -487,17 +488,8 @@ class Sarsa:
         steps = self.settings.step_size * (reward + ahead - values)
         weights[every, joint_action] += steps[:, None] * features
 
-    def end_episode(self):
-        return 0
 
-    def arrays(self):
-        return {"theta": self.theta}
-
-    def restore(self, arrays):
-        self.theta = arrays["theta"].copy()
-
-
-class StateActionValues:
+class StateActionValues(Evaluator):
     """Values actions by what has been learned of them in the present state."""
 
     class Settings(EvaluatorSettings):
@@ -527,7 +519,7 @@ def test_a_learner_that_asks_is_given_what_was_done_where() -> None:
         records = list(loop)
         if learn:
             for record, (left, taken, entered) in zip(
-                records, fuzzy(team).learner.plain.met, strict=True
+                records, fuzzy(team).learner.met, strict=True
             ):
                 np.testing.assert_array_equal(record.states, left)
                 np.testing.assert_array_equal(record.joint_action, taken)

@@ -166,7 +166,7 @@ def test_a_restored_learner_regresses_at_the_same_decisions() -> None:
     feed(learner, first)
     learner.begin_episode()
     learner.observe(second[0][0], float(second[1][0]), False)
-    restored.restore(learner.arrays())
+    restored.load_state_dict(learner.state_dict())
     for state, reward in zip(second[0][1:], second[1][1:], strict=True):
         changed = [each.observe(state, float(reward), False) for each in (learner, restored)]
         assert changed[0] == changed[1]

@@ -89,7 +89,7 @@ def test_an_interval_within_an_episode_changes_nothing_of_the_sums() -> None:
     once, often = made()[0], made(interval=2)[0]
     for learner in (once, often):
         feed(learner, lefts, acts, np.arange(9) / 100, True)
-    np.testing.assert_allclose(once.arrays()["gram"], often.arrays()["gram"], atol=1e-12)
+    np.testing.assert_allclose(once.state_dict()["gram"], often.state_dict()["gram"], atol=1e-12)
 
 
 def test_values_are_a_column_of_weights_for_each_action() -> None:
@@ -225,11 +225,11 @@ def test_a_team_goes_on_with_all_it_has_learned() -> None:
 def test_who_is_told_by_others_goes_on_by_name_of_variable() -> None:
     fewer, more = made(1)[0], made(2)[0]
     fewer.theta[1] = [1, 2, 3, 4, 5, 6, 10, 20, 30, 40, 50, 60]
-    more.continue_from(fewer, np.arange(2))
+    more.warm_start(fewer, np.arange(2))
     assert more.theta[1].tolist() == [1, 2, 3, 4, 5, 6, 10, 20, 30, 40, 50, 60, *[0] * 6]
     assert (more.theta[0] == 0).all()
     more.theta[1, -6:] = [100, 200, 300, 400, 500, 600]  # told2 is left, right, nobody
-    fewer.continue_from(more, np.arange(2))
+    fewer.warm_start(more, np.arange(2))
     # Where told2 was nobody there is left the sum, of which it does not matter whose part it is.
     values = fewer.theta[1].reshape(2, 3, 2)
     assert (values[0, :, None] + values[1]).tolist() == [
@@ -249,7 +249,7 @@ def test_values_are_carried_whoever_tells(order: int | str, numbers: tuple[int, 
     base = RuleBaseSettings(order=order)
     before, after = (made(n, rule_base=base)[0] for n in numbers)
     before.theta[:] = rng.normal(size=before.theta.shape)
-    after.continue_from(before, np.arange(2))
+    after.warm_start(before, np.arange(2))
     known = min(numbers)
     told = rng.integers(0, 3, (20, known)).astype(float)
     gaps, acts = rng.random((20, 1)), rng.integers(0, 2, (20, 1))
@@ -270,25 +270,25 @@ def test_experience_of_others_who_tell_is_that_of_nobody() -> None:
     former = made(1, **keys)[0]
     feed(former, lefts, acts, paid, True)
     feed(whole, padded, acts, paid, True)
-    carried.continue_from(former, np.arange(2))
-    np.testing.assert_allclose(carried.arrays()["gram"], whole.arrays()["gram"], atol=1e-12)
+    carried.warm_start(former, np.arange(2))
+    np.testing.assert_allclose(carried.state_dict()["gram"], whole.state_dict()["gram"], atol=1e-12)
     for learner in (carried, whole):
         feed(learner, padded[::-1], acts, paid, True)
     np.testing.assert_allclose(carried.theta, whole.theta, atol=1e-6)
     shorter = made(1, **keys)[0]
-    shorter.continue_from(whole, np.arange(2))
+    shorter.warm_start(whole, np.arange(2))
     assert shorter.states_of(0).shape == (14, 3)
     fresh = made(1, **keys)[0]
     feed(fresh, lefts, acts, paid, True)
     feed(fresh, lefts[::-1], acts, paid, True)
-    np.testing.assert_allclose(shorter.arrays()["gram"], fresh.arrays()["gram"], atol=1e-12)
+    np.testing.assert_allclose(shorter.state_dict()["gram"], fresh.state_dict()["gram"], atol=1e-12)
 
 
 def test_products_that_are_none_without_those_who_tell_are_refused() -> None:
     products = RuleBaseSettings(products=(("gap", "told1", "told2"),))
     before = made(2, rule_base=products)[0]
     with pytest.raises(ValueError, match="receives fewer messages than when it learned"):
-        made(1)[0].continue_from(before, np.arange(2))
+        made(1)[0].warm_start(before, np.arange(2))
 
 
 def test_a_topology_that_says_whom_agents_consider_is_remarked_on() -> None:

@@ -64,7 +64,7 @@ def test_fmq_written_out_and_restored():
         bonus = 5.0 * (paid == paid.max()).mean() * paid.max()
         assert learner.theta[0, action] == pytest.approx(q + bonus)
     other = FMQ(settings, TABLE, np.arange(1))
-    other.restore(learner.arrays())
+    other.load_state_dict(learner.state_dict())
     for each in (learner, other):
         each.observe(np.array([[1.0]]), 3.0, False)
         each.observe(np.array([[1.0]]), 3.0, False)

@@ -98,7 +98,7 @@ def test_shared_weights_are_restored_to_the_bit(name: str) -> None:
     for t in range(5):
         learner.observe(states[t], rewards[t], False)
     assert learner.theta.shape == (2, rules_of().n_rules)
-    restored.restore({key: array.copy() for key, array in learner.arrays().items()})
+    restored.load_state_dict({key: array.copy() for key, array in learner.state_dict().items()})
     for each in (learner, restored):
         feed(each, states[5:], rewards[5:], begun=True)
         feed(each, states[::-1], rewards)

@@ -320,7 +320,7 @@ def test_a_restored_learner_goes_on_with_the_same_bits(averaging: float) -> None
         learner_of(FUZZY, step_size=0.3, trace_decay=0.7, averaging=averaging) for _ in range(2)
     )
     feed(learner, states[:8], rewards[:8], False)
-    restored.restore({name: array.copy() for name, array in learner.arrays().items()})
+    restored.load_state_dict({name: array.copy() for name, array in learner.state_dict().items()})
     for each in (learner, restored):
         for state, reward in zip(states[8:], rewards[8:], strict=True):
             each.observe(state[None], float(reward), False)

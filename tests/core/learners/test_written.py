@@ -49,7 +49,7 @@ def test_it_never_learns() -> None:
     assert learner.end_episode() == 0
     assert (learner.theta == before).all()
     again = written({"gap": 5.0})
-    again.restore(learner.arrays())
+    again.load_state_dict(learner.state_dict())
     assert (again.theta == before).all()
 
 

@@ -12,7 +12,7 @@ SLOPES = np.array([[[0.03, 0.0, 0.2], [0.01, 0.0, 0.0]], [[0.0, 0.02, 0.0], [0.0
 
 
 def deviations(calibration):
-    return np.sqrt(np.diagonal(calibration.arrays()["covariance"]))
+    return np.sqrt(np.diagonal(calibration.state_dict()["covariance"]))
 
 
 def outcome(constants):
@@ -86,7 +86,7 @@ def test_nothing_becomes_less_certain_than_it_was_at_first():
 def test_it_continues_from_what_was_saved():
     one, other = Calibration(SETTINGS, 2, LEVERS), Calibration(SETTINGS, 2, LEVERS)
     taught(one, np.log([4.0, 0.5]), 10)
-    other.restore({name: array.copy() for name, array in one.arrays().items()})
+    other.load_state_dict({name: array.copy() for name, array in one.state_dict().items()})
     for calibration in (one, other):
         taught(calibration, np.log([2.0, 2.0]), 5, seed=1)
     np.testing.assert_array_equal(one.constants, other.constants)
@@ -104,7 +104,7 @@ def test_another_calibration_goes_on_with_bodies_alike_and_begins_anew_with_othe
         Calibration(settings, 1, other) for other in (levers, 2.0 * levers, np.ones(3))
     )
     for calibration in (alike, longer, more):
-        calibration.continue_from(former)
+        calibration.warm_start(former)
     assert alike.constants[0] == former.constants[0]
     assert deviations(alike)[0] == deviations(former)[0]
     assert longer.constants[0] == more.constants[0] == 0.0

@@ -245,11 +245,11 @@ def test_a_restored_team_goes_on_to_the_same_bits() -> None:
 def test_more_bodies_go_on_with_what_fewer_have_learned() -> None:
     predictor, _ = trained(Rails(2))
     larger = LearnedPredictor(LEARNED, Rails(4))
-    larger.continue_from(predictor)
+    larger.warm_start(predictor)
     ahead = larger.predict(np.zeros((4, 3))).states(0, np.array([[0, 0, 2, 2]]))
     assert ahead[0] == pytest.approx([0.5, 0.9 * 0.5 + 0.1 * 1.0, 1.0], abs=1e-4)
     of_others = LearnedPredictor(LEARNED, LineUpSettings(carts=2).build())
-    of_others.continue_from(predictor)
+    of_others.warm_start(predictor)
     assert not of_others.memory["gram"].any()
 
 

@@ -55,7 +55,7 @@ def test_robots_learn_each_on_their_own() -> None:
 def test_it_continues_from_what_was_saved() -> None:
     model, other = SelfModel(SETTINGS, [NOMINAL]), SelfModel(SETTINGS, [NOMINAL])
     taught(model, NOMINAL * [0.3, 1.0, 1.0], 10, noise=0.002)
-    other.restore({name: array.copy() for name, array in model.arrays().items()})
+    other.load_state_dict({name: array.copy() for name, array in model.state_dict().items()})
     for one in (model, other):
         taught(one, NOMINAL, 5)
     np.testing.assert_array_equal(model.effects[0], other.effects[0])
@@ -86,7 +86,7 @@ def test_innovations_larger_than_expected_are_owned_up_to() -> None:
             if step >= 100:
                 deviations = model.deviations[0]
                 if not surprise:
-                    ratios = np.sqrt(np.maximum(1.0, model.arrays()["ratio0"]))
+                    ratios = np.sqrt(np.maximum(1.0, model.state_dict()["ratio0"]))
                     deviations = deviations / ratios[:, None]
                 off = np.abs(model.effects[0] - NOMINAL)[:, :2]
                 inside.append((off < 2.0 * deviations[:, :2]).mean())
@@ -104,7 +104,7 @@ def test_another_model_goes_on_with_bodies_alike_and_begins_anew_with_others():
         for bodies in ([nominal], [2.0 * nominal], [nominal, nominal])
     )
     for model in (alike, longer, more):
-        model.continue_from(former)
+        model.warm_start(former)
     assert (alike.effects[0] == former.effects[0]).all()
     assert (longer.effects[0] == 2.0 * nominal).all()
     assert (more.effects[0] == nominal).all()

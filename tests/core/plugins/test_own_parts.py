@@ -12,6 +12,7 @@ from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import BatchTDSettings
@@ -21,11 +22,11 @@ from nested_agents.core.search.exploration import EXPLORATIONS
 
 MINE = """
 import numpy as np
-from nested_agents.core.search.evaluator import Counts, EvaluatorSettings
-from nested_agents.core.search.exploration import ExplorationSettings
-from nested_agents.core.learners.learner import LearnerSettings
+from nested_agents.core.search.evaluator import Counts, Evaluator, EvaluatorSettings
+from nested_agents.core.search.exploration import ExplorationSettings, Explorer
+from nested_agents.core.learners.learner import Learner, LearnerSettings
 
-class MonteCarlo:
+class MonteCarlo(Learner):
     '''Weights a step towards every reward.'''
 
     class Settings(LearnerSettings):
@@ -35,22 +36,10 @@ class MonteCarlo:
         self.settings, self.rules, self.rows = settings, rules, rows
         self.theta = np.zeros((int(rows.max()) + 1, rules.n_rules))
 
-    def begin_episode(self):
-        pass
-
     def observe(self, states, reward, terminated):
         step = self.settings.step_size * np.broadcast_to(reward, len(states))
         np.add.at(self.theta, self.rows, step[:, None] * self.rules.features(states))
         return self.theta.size
-
-    def end_episode(self):
-        return 0
-
-    def arrays(self):
-        return {"theta": self.theta}
-
-    def restore(self, arrays):
-        self.theta = arrays["theta"].copy()
 
 class Favourite(EvaluatorSettings):
     action: int = 1
@@ -58,7 +47,7 @@ class Favourite(EvaluatorSettings):
     def build(self, problem):
         return Fixed(np.eye(problem.n_actions)[self.action])
 
-class Fixed:
+class Fixed(Evaluator):
     def __init__(self, found):
         self.found, self.counts = found, Counts()
 
@@ -66,7 +55,7 @@ class Fixed:
         self.counts.joint_actions += 1
         return self.found
 
-class Least:
+class Least(Explorer):
     '''Takes the action of least value.'''
 
     class Settings(ExplorationSettings):
@@ -75,15 +64,9 @@ class Least:
     def __init__(self, settings, n_agents):
         self.memory = np.zeros(n_agents)
 
-    def begin_episode(self):
-        pass
-
     def choose(self, agent, values, rng):
         self.memory[agent] += 1
         return int(values.argmin())
-
-    def advance(self):
-        pass
 """
 TABLE = {
     "kind": "mine.py:MonteCarlo",
@@ -94,7 +77,7 @@ TABLE = {
 
 
 class FewMembers(Scenario):
-    """What a scenario must have, and no more: predictions give next states only."""
+    """Scenario with the necessary members only; its prediction gives next states only."""
 
     def __init__(self, world) -> None:
         self.agents, self.state_space = world.agents, world.state_space
@@ -107,8 +90,18 @@ class FewMembers(Scenario):
     def step(self, joint_action) -> Transition:
         return self._world.step(joint_action)
 
-    def predict(self) -> SimpleNamespace:
-        return SimpleNamespace(states=self._world.predict().states)
+    def predict(self) -> Prediction:
+        return StatesOnly(self._world.predict())
+
+
+class StatesOnly(Prediction):
+    """Prediction of next states, without rewards and tables."""
+
+    def __init__(self, complete: Prediction) -> None:
+        self._complete = complete
+
+    def states(self, agent, joint_actions) -> np.ndarray:
+        return self._complete.states(agent, joint_actions)
 
 
 def team_of(settings, scenario) -> Team:
@@ -127,7 +120,7 @@ def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:
     rewarded = np.zeros_like(fuzzy(team).learner.theta)
     for record in control_loop(world, team, episodes=2, steps=4, seed=3):
         assert record.joint_action.tolist() == [0, 0]  # the least of 0, 0, 0, 1
-        features = fuzzy(team).learner.plain.rules.features(record.transition.states)  # type: ignore[attr-defined]
+        features = fuzzy(team).learner.rules.features(record.transition.states)  # type: ignore[attr-defined]
         rewarded += 0.25 * record.transition.reward * features
     assert fuzzy(team).learner.theta == pytest.approx(rewarded, rel=0, abs=1e-15)
     assert fuzzy(team).explorer.memory.tolist() == [8, 8]
@@ -146,6 +139,40 @@ def test_values_of_other_than_all_actions_are_refused(line_world) -> None:
     world.reset(0)
     with pytest.raises(ValueError, match=r"^the evaluator returned 2 values for 4 actions$"):
         joint_of(team, world)
+
+
+@pytest.mark.parametrize(
+    ("table", "base"),
+    [
+        ({"kind": "plain.py:Plain"}, "learner.kind: Plain must inherit nested_agents.Learner"),
+        (
+            {"exploration": {"kind": "plain.py:Still"}},
+            "learner.exploration.kind: Still must inherit nested_agents.Explorer",
+        ),
+        (
+            {"decision": {"evaluator": {"kind": "plain.py:Zero"}}},
+            "learner.decision.evaluator: Zero must inherit nested_agents.Evaluator",
+        ),
+    ],
+)
+def test_parts_must_inherit_their_base_class(table: dict, base: str, line_world) -> None:
+    text = """
+import nested_agents as na
+class Plain:
+    class Settings(na.LearnerSettings): pass
+    def __init__(self, *given): pass
+class Still:
+    class Settings(na.ExplorationSettings): pass
+    def __init__(self, *given): pass
+class Zero:
+    class Settings(na.EvaluatorSettings): pass
+    def __init__(self, *given): pass
+"""
+    with Sources(texts={"plain.py": text}).active():
+        kind = table.get("kind", "batch-td")
+        settings = LEARNERS.model(kind).model_validate({**table, "kind": kind})
+        with pytest.raises(ValueError, match=base):
+            team_of(settings, line_world(carts=2, wheels=1))
 
 
 @pytest.mark.parametrize("name", ["auto", "exact", "sampling"])
@@ -177,13 +204,12 @@ def test_rewards_that_are_not_predicted_cannot_decide(rule: str, agents, line_wo
 @pytest.mark.parametrize("rule", ["reward", "reward-and-value"])
 def test_rewards_without_tables_decide_too(rule: str, line_world) -> None:
     world, few = line_world(carts=2, wheels=1), FewMembers(line_world(carts=2, wheels=1))
-    tables = few._world.predict
 
-    def predict() -> SimpleNamespace:
-        found = tables()
-        return SimpleNamespace(states=found.states, rewards=found.rewards, blocks=found.blocks)
+    class WithRewards(StatesOnly):
+        def rewards(self, joint_actions) -> np.ndarray:
+            return self._complete.rewards(joint_actions)
 
-    few.predict = predict  # type: ignore[method-assign]
+    few.predict = lambda: WithRewards(few._world.predict())  # type: ignore[method-assign]
     chosen = []
     for scenario in (world, few):
         team = team_of(BatchTDSettings.model_validate({"decision": {"rule": rule}}), scenario)

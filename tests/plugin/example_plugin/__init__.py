@@ -56,7 +56,7 @@ def heading_error(situation, robot):
     return (robot.heading - situation.course + np.pi) % (2 * np.pi) - np.pi
 
 
-class Counting:
+class Counting(na.Learner):
     """Values what it has met most often: no learning worth the name."""
 
     class Settings(na.LearnerSettings):
@@ -66,26 +66,14 @@ class Counting:
         self.settings, self.rules, self.rows = settings, rules, rows
         self.theta = np.zeros((rows.max() + 1, rules.n_rules))
 
-    def begin_episode(self):
-        pass
-
     def observe(self, states, reward, terminated):
         active, strengths = self.rules.active(states)
         for row, rule, strength in zip(self.rows, active, strengths, strict=True):
             np.add.at(self.theta[row], rule, self.settings.gain * strength)
         return self.theta.size
 
-    def end_episode(self):
-        return 0
 
-    def arrays(self):
-        return {"theta": self.theta}
-
-    def restore(self, arrays):
-        self.theta = arrays["theta"].copy()
-
-
-class OwnAction:
+class OwnAction(na.Evaluator):
     """Values the own action alone: all others are taken to maintain."""
 
     class Settings(na.EvaluatorSettings):
@@ -101,7 +89,7 @@ class OwnAction:
         return self.problem.rules.values(deliberation.own_weights, states)
 
 
-class Constant:
+class Constant(na.Explorer):
     """Explores at one rate for ever."""
 
     class Settings(na.ExplorationSettings):
@@ -109,12 +97,6 @@ class Constant:
 
     def __init__(self, settings, n_agents):
         self.settings, self.memory = settings, np.zeros(0)
-
-    def begin_episode(self):
-        pass
-
-    def advance(self):
-        pass
 
     def choose(self, agent, values, rng):
         explores = rng.random() < self.settings.rate

@@ -18,7 +18,7 @@ def name(request: pytest.FixtureRequest) -> str:
 def followed(former: Learner, name: str, rows: np.ndarray, goes_on: list[int]):
     """A learner for agents of these rows that takes over from `former`."""
     learner = learner_of(name, rows)
-    learner.continue_from(former, np.array(goes_on))
+    learner.warm_start(former, np.array(goes_on))
     return learner
 
 
@@ -54,7 +54,7 @@ def test_what_was_taken_over_is_restored_to_the_bit(name: str) -> None:
     learner = followed(former, name, np.array([0, 1]), [0, 1])
     feed(learner, states[:4, :2], rewards[:4, :2])
     restored = learner_of(name, np.array([0, 1]))
-    restored.restore({key: array.copy() for key, array in learner.arrays().items()})
+    restored.load_state_dict({key: array.copy() for key, array in learner.state_dict().items()})
     for each in (learner, restored):
         feed(each, states[4:, 1:], rewards[4:, 1:])
     assert (learner.theta == restored.theta).all()
@@ -71,7 +71,7 @@ def test_batch_td_regresses_on_all_experience_of_teams_of_any_size() -> None:
     for before, after in zip([None, *teams], teams, strict=False):
         n = len(after.members[0])
         if before is not None:
-            after.continue_from(before, np.array([0]))
+            after.warm_start(before, np.array([0]))
         feed(after, states[:, :n], rewards[:, :n])
     met = [i for n in (1, 3, 2) for i in range(n)]
     x = rules.features(np.concatenate([states[:, i] for i in met]))
@@ -85,5 +85,5 @@ def test_weights_that_never_learn_are_handed_on() -> None:
         Frozen(FrozenSettings(), rules_of(), rows) for rows in (ROLES, np.array([1, 0]))
     )
     former.theta[:] = [[1.0], [2.0]]
-    successor.continue_from(former, np.array([1, 0]))
+    successor.warm_start(former, np.array([1, 0]))
     assert successor.theta[:, 0].tolist() == [2.0, 1.0]
