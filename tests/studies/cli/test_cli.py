@@ -332,14 +332,6 @@ def test_a_damaged_database_is_one_line(study, tmp_path, capsys):
     assert re.fullmatch(r"nested-agents: error: [^\n]+\n", capsys.readouterr().err)
 
 
-def test_shells_are_told_how_a_line_goes_on(monkeypatch, capsys):
-    monkeypatch.setenv("_NESTED_AGENTS_COMPLETE", "bash_complete")
-    monkeypatch.setenv("COMP_WORDS", "nested-agents run --ba")
-    monkeypatch.setenv("COMP_CWORD", "2")
-    assert main([]) == 0
-    assert capsys.readouterr().out == "plain,--backend\n"
-
-
 def test_a_study_whose_trials_all_fail_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
