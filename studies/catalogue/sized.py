@@ -61,14 +61,7 @@ def draw_by_size(cases: Sequence[SizedCase], titles: Sequence[str]) -> "Figure":
     groups = distinct(case.group for case in cases)
     count = len(titles) * len(groups)
     columns = len(groups) if len(groups) > 1 else min(count, 3)
-    figure, panels = figures.grid(
-        count,
-        columns,
-        (2.8, 2.3),
-        (0.3, 0.8),
-        least=5.6,
-        sharex=True,
-    )
+    figure, panels = figures.grid(count, columns, (2.8, 2.3), (0.3, 0.8), least=5.6)
     for k, axes in enumerate(panels.flat[:count]):
         title = titles[k // len(groups)]
         group = groups[k % len(groups)]
@@ -90,6 +83,7 @@ def draw_by_size(cases: Sequence[SizedCase], titles: Sequence[str]) -> "Figure":
         elif title == "messages":
             axes.set_yscale("symlog", linthresh=LINEAR_UP_TO)
             axes.yaxis.set_major_formatter("{x:,.10g}")
+            axes.set_ylim(-0.3, 2.0 * max(case.values[title].value for case in cases) + 1.0)
         elif title != cases[0].main:
             figures.log_axis(axes)
     figures.name_lines(figure, names, "means over seeds, bars: 95% intervals")
