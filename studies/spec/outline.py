@@ -11,11 +11,10 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ...core.plugins.sources import Sources, meaning
+from ...core.plugins.sources import Sources
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..store.database import DATABASE, RESULTS_VERSION, SPEC_FILE
@@ -214,16 +213,9 @@ def present(
         digest = hashlib.sha256(text.encode()).hexdigest()[:16]
         if name in known and known[name][0] == digest:
             digests[name] = known[name]
-        else:  # this package is installed as a whole; parsing all of it would take half a second
-            digests[name] = digest, digest if _is_ours(name) else _meaning(text, name) or digest
+        else:
+            digests[name] = digest, digest
     return digests | {name: (version, version) for name, version in versions.items()}
-
-
-def _meaning(text: str, name: str) -> str | None:
-    """Return the digest of a module's syntax tree; None if it is a template or no Python."""
-    with suppress(ValueError):
-        return meaning(text, name)
-    return None
 
 
 def changed(known: Mapping[str, tuple[str, str]], here: Code) -> list[str]:
