@@ -6,6 +6,7 @@
 
 import sys
 from collections.abc import Iterable, Sequence
+from math import log10
 from pathlib import Path
 
 import matplotlib as mpl
@@ -444,6 +445,24 @@ SIZES = (
 """Lines of `success_by_size`: label, and (table, condition, number of robots) of each point."""
 
 
+def operations() -> Figure:
+    """Draw the operations of five ways to decide by the number of agents, from the formulas."""
+    names = {"single-agent": "one agent for all", "chain": "chain", "tree:2": "binary tree",
+             "best-response": "best responses", "independent": "independent agents"}  # fmt: skip
+    figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
+    axes = figure.subplots()
+    rows = na.cost_table(list(names), range(1, 17)).rows
+    for line, (name, label) in enumerate(names.items()):
+        own = [row for row in rows if row.topology == name]
+        counts = [row.single_agent if row.nested_exact is None else row.nested_exact for row in own]
+        color, style, marker = LINES[line]
+        axes.plot([row.agents for row in own], [log10(count) for count in counts],
+                  color=color, ls=style, marker=marker, ms=4, lw=1.6, label=label)  # fmt: skip
+    axes.set(xlabel="agents", ylabel="log10(operations)", xticks=range(2, 17, 2))
+    axes.legend(frameon=False)
+    return titled(figure, "Four nested agents take 2e12 operations, one agent 1e27")
+
+
 def success_by_size() -> Figure:
     """Draw evaluation success by number of robots."""
     figure = Figure(figsize=(WIDTH, 3.8), layout="constrained")
@@ -496,7 +515,7 @@ def ppo() -> Figure:
 ALL = (
     idea, communication_lookahead, nested_decision, perception, learner, predictions,
     learning_curves, hierarchies, broken_messages, ablation, games, wheel_failure,
-    success_by_size, ppo,
+    success_by_size, operations, ppo,
 )  # fmt: skip
 
 

@@ -38,6 +38,8 @@ EVALUATION = "evaluation:"
 SHOWN = "s = "
 """Before the size of errors in the name of an evaluation."""
 RESAMPLES = 4000
+TITLE = "Success falls as values disagree, with messages and without"
+"""Title of the figure."""
 SIDES = ("told", "silent")
 
 
@@ -171,8 +173,8 @@ def lines(every: list[Disagreement]) -> list[str]:
 
 
 def draw(every: list[Disagreement]) -> Figure:
-    """Return success by error, told and silent, a panel for each size."""
-    figure, panels = figures.panels(1, len(every), (3.4 * len(every) + 0.4, 2.9), sharey=True)
+    """Return success by error, with and without messages, a panel for each size."""
+    figure, panels = figures.panels(1, len(every), (2.2 * len(every) + 0.4, 3.0), sharey=True)
     for axes, own in zip(panels[0], every, strict=True):
         for index, side in enumerate(SIDES):
             values = own.success[side]
@@ -183,12 +185,10 @@ def draw(every: list[Disagreement]) -> Figure:
             ]
             style = figures.style(index)
             axes.errorbar(list(own.errors.values()), middle, yerr=errors, capsize=2, **style)
-        if own.threshold.value < max(own.errors.values()):
-            axes.axvline(float(own.threshold.value), color="#888888", lw=0.8, ls=":")
         axes.set_title(f"{own.robots} robots", loc="left")
-        axes.set_xlabel("error of each agent's weights [SD]")
+        axes.set_xlabel("error of the weights [SD]")
         figures.as_rates(axes)
-    figures.name_lines(figure, list(SIDES), "success; bars: 95%; dotted: the threshold")
+    figures.name_lines(figure, ["with messages", "without messages"], TITLE)
     return figure
 
 

@@ -16,6 +16,8 @@ the team back: weights that go on learning, or a model of the own body.
 # sees, and corrects what it believes its wheels to do. Beside every team a copy of it goes on that
 # has stopped learning.
 
+from itertools import pairwise
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -44,27 +46,32 @@ for note in study.notes:
 # %%
 # The picture
 # -----------
-# Success over episodes, a mean over seeds and over three episodes in a row.
+# Success over episodes: a mean over seeds and over three episodes in a row, before the failure and
+# after it.
 
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
 figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 without, with_model = study.conditions
 lines = {
-    "weights and self-model": (study.results.success(with_model), 0),
-    "weights alone": (study.results.success(without), 0),
-    "nothing adapts": (study.results.success(without, "weights kept"), FAILS),
+    "weights and self-model": (study.results.success(with_model), (0, FAILS, EPISODES)),
+    "weights alone": (study.results.success(without), (0, FAILS, EPISODES)),
+    "nothing adapts": (study.results.success(without, "weights kept"), (FAILS, EPISODES)),
 }
-for number, (name, (success, first)) in enumerate(lines.items()):
-    smooth = np.convolve(success.mean(axis=0), np.ones(3) / 3, mode="valid")
-    ax.plot(
-        first + 1 + np.arange(len(smooth)), smooth, color=COLOURS[number], marker="os^"[number],
-        linestyle=STYLES[number], linewidth=4, markersize=12, label=name,
-    )  # fmt: skip
+for number, (name, (success, ends)) in enumerate(lines.items()):
+    for begin, end in pairwise(ends):
+        means = success.mean(axis=0)[begin - ends[0] : end - ends[0]]
+        smooth = np.convolve(means, np.ones(3) / 3, mode="valid")
+        ax.plot(
+            begin + 1 + np.arange(len(smooth)), smooth, color=COLOURS[number],
+            marker="os^"[number], linestyle=STYLES[number], linewidth=4, markersize=12,
+            label=name if end == EPISODES else None,
+        )  # fmt: skip
 ax.axvline(FAILS - 0.5, color="k", linestyle=":", linewidth=3)
 ax.text(FAILS - 0.3, 1.02, "a wheel turns against its command")
 ax.set(xlabel="episode", ylabel="success", ylim=(-0.02, 1.1), xticks=range(0, EPISODES + 1, 2))
 ax.legend(loc="upper left")
+ax.set_title("A self-model brings success back after a wheel fails", loc="left", weight="bold")
 figure.savefig("out/course/wheel-failure.png", dpi=80)
 
 # %%

@@ -1,4 +1,4 @@
-"""Cost of a topology: by formula, counted in the running system, and timed.
+"""Cost of a topology: by formula, within a budget, and measured in the running system.
 
 The formulas (Eq. 18-23) count the operations of a sweep over all states, while the running system
 visits one state per step. Both depend on the number of joint actions that each agent tries,
@@ -13,13 +13,12 @@ Counts and times use the line-up scenario, because its prediction costs very lit
 membership functions, because all of their rules fire.
 """
 
-import tracemalloc
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 from fractions import Fraction
 from functools import cache
-from itertools import chain
 from statistics import median
+from typing import NamedTuple
 
 from ...core.agents.cost import Problem, below_counts
 from ...core.agents.joint import join_agents
@@ -30,12 +29,12 @@ from ...core.interface.agents import Counts
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
 from ...core.search.best_response import CUTS
+from ...core.search.budget import divide
 from ...core.search.coordination import MaxPlusSettings
 from ...core.search.settings import DecisionSettings
 from ...core.values.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
-from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 
 SINGLE_AGENT = "single-agent"
 """Name of the single agent of Eq. 23, which replaces a topology."""
@@ -75,13 +74,12 @@ MODEL_FREE = ("fitted-q", "hierarchy-ppo")
 MAX_OPERATIONS = 4 * 10**8
 """Maximum number of rule evaluations of a measured step, which take about a second."""
 MIN_SECONDS = 0.3
-"""Minimum time of each repeat [s]."""
+"""Minimum time of a measurement [s]."""
 MAX_STEPS = 100
-"""Maximum number of steps of each repeat."""
+"""Maximum number of steps of a measurement."""
 
 
-@dataclass(frozen=True)
-class StepCost:
+class StepCost(NamedTuple):
     """Cost of one step of the running system."""
 
     counted: Counts
@@ -90,15 +88,28 @@ class StepCost:
     """Median time of a decision [s]."""
     learning: float
     """Median time of learning from a step [s]."""
-    memory: int
-    """Peak memory of team and step [bytes]."""
-    repeats: tuple[float, ...]
-    """Time of a step in each repeat, with a new team each [s]."""
 
-    @property
-    def step(self) -> Estimate:
-        """Mean time of a step [s] with its 95% interval if there are several repeats."""
-        return bootstrap(self.repeats, bounds=NOT_NEGATIVE)
+
+class BudgetCost(NamedTuple):
+    """Cost if a team may try a limited number of joint actions in a decision."""
+
+    budget: int
+    joint_actions: int
+    """Joint actions that all agents try without the limit."""
+    tried: int
+    """Joint actions that they try within it."""
+    operations: int
+    """Operations by Eq. 18, or by Eq. 23 for the single agent, with the joint actions tried."""
+
+
+class NetworkCost(NamedTuple):
+    """Messages of one decision."""
+
+    messages: int
+    in_turn: int
+    """Number of messages that must be sent one after another."""
+    broadcast: int
+    """Number of states that agents send to all others in addition, for predictions."""
 
 
 @dataclass(frozen=True)
@@ -120,26 +131,15 @@ class CostRow:
     """Operations by Eq. 23."""
     memberships: int | None = None
     """Membership functions of each state variable, if they determine the rules."""
+    within_budget: BudgetCost | None = None
+    """Cost within the budget of a decision, if there is one."""
     formula: Counts | None = None
     """Counts of a step of the whole team by the formulas, if a measurement was requested."""
     measured: StepCost | None = None
-    network: tuple[int, int] | None = None
-    """Numbers of messages of a decision and of those sent in sequence, if requested."""
-    broadcast: int = 0
-    """Number of states that agents broadcast in addition."""
+    network: NetworkCost | None = None
+    """Messages, if requested."""
     free: int = 0
     """Maximum number of agents in one search; 0 for `DECISION_METHODS`."""
-
-    @property
-    def by_formula(self) -> dict[str, int | Fraction | None]:
-        """Results of the formulas by name."""
-        return {
-            "nested_exact": self.nested_exact,
-            "nested_closed_form": self.nested_closed_form,
-            "nested_asymptotic": self.nested_asymptotic,
-            "single_agent": self.single_agent,
-            "ratio": self.ratio,
-        }
 
     @property
     def ratio(self) -> Fraction | None:
@@ -148,41 +148,65 @@ class CostRow:
 
 
 def joint_actions(text: str, n: int, actions: int) -> list[int]:
-    """Return the number of joint actions that each of n agents tries in a decision."""
+    """Return the number of joint actions that each of n agents tries in a decision.
+
+    The single agent replaces all agents by one.
+    """
+    if text == SINGLE_AGENT:
+        return [actions**n]
     topology, tried = DECISION_METHODS.get(text, (text, None))
     if tried is not None:
         return tried(n, actions)
     return [actions ** (1 + below) for below in agents_below(topology, n)]
 
 
-def messages(text: str, n: int) -> tuple[int, int]:
-    """Return the number of messages of a decision, and of those sent one after another.
+def within_budget(text: str, n: int, problem: Problem, budget: int) -> BudgetCost:
+    """Return the cost of n agents that may try `budget` joint actions in a decision.
+
+    The budget is divided over the agents as in a running team.
+
+    Raises
+    ------
+    ValueError
+        If the budget is less than one joint action for each agent; one line.
+    """
+    needs = joint_actions(text, n, problem.actions)
+    if budget < len(needs):
+        raise ValueError(
+            f"budget = {budget}: {text} needs one joint action for each of {n} agents, allowed: "
+            f"{len(needs)} or more"
+        )
+    tried = divide(budget, needs)
+    operations = problem.sweep(tried)
+    if text == SINGLE_AGENT:
+        operations *= problem.rules ** (n - 1)
+    return BudgetCost(budget, sum(needs), sum(tried), operations)
+
+
+def messages(text: str, n: int) -> NetworkCost:
+    """Return the number of messages of a decision.
 
     A single agent collects the states of all others and sends their actions. In a chain each agent
     receives the actions of all above. Variable elimination passes a table from agent to agent and
     the best actions back. In max-plus, neighbors exchange messages in each round.
     """
     if text == SINGLE_AGENT:
-        return 2 * (n - 1), 2 * (n > 1)
+        return NetworkCost(2 * (n - 1), 2 * (n > 1), 0)
     hierarchy = _hierarchy(DECISION_METHODS.get(text, (text,))[0], n)
+    broadcast = n * (n - 1)
     if not hierarchy.neighbors:
-        return hierarchy.n_messages, hierarchy.depth - 1
-    rounds = MaxPlusSettings().rounds
-    return (rounds * hierarchy.n_messages, rounds) if text == "max-plus" else (2 * n - 2, 2 * n - 2)
-
-
-def broadcasts(text: str, n: int) -> int:
-    """Return the number of states that agents send to all others before a decision.
-
-    They are needed for predictions. The messages of a single agent include them.
-    """
-    return 0 if text == SINGLE_AGENT else n * (n - 1)
+        return NetworkCost(hierarchy.n_messages, hierarchy.depth - 1, broadcast)
+    if text == "max-plus":
+        rounds = MaxPlusSettings().rounds
+        return NetworkCost(rounds * hierarchy.n_messages, rounds, broadcast)
+    return NetworkCost(2 * n - 2, 2 * n - 2, broadcast)
 
 
 def _hierarchy(text: str, n: int) -> Hierarchy:
     return build(text, [f"agent{i + 1}" for i in range(n)], pairs(n))
 
 
+@cache
 def agents_below(text: str, n: int) -> Sequence[int]:
     """Return the number of agents below each of n agents in a topology.
 
@@ -209,46 +233,31 @@ def pairs(n: int) -> tuple[tuple[int, ...], ...]:
 
 def step_formula(text: str, n: int) -> Counts:
     """Return the counts of a step of the whole team by the formulas."""
-    if text == SINGLE_AGENT:
-        return Counts(ACTIONS**n, (ACTIONS * RULES) ** n, RULES**n)
     joint = sum(joint_actions(text, n, ACTIONS))
+    if text == SINGLE_AGENT:
+        return Counts(joint, joint * RULES**n, RULES**n)
     return Counts(joint, joint * RULES, n * RULES)
 
 
-def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
+def measure(text: str, n: int) -> StepCost | None:
     """Count and time a step of n agents; None if it would take too long."""
     if text in MODEL_FREE or step_formula(text, n).rule_evaluations > MAX_OPERATIONS:
         return None
     learner, scenario, hierarchy = _arrange(text, LineUpSettings(carts=n).build())
-    _warm_up()
-    tracemalloc.start()
-    try:
-        team = Team(learner, scenario, hierarchy, policy_seed(0))
-        _step(team, scenario)
-        memory = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    team = Team(learner, scenario, hierarchy, policy_seed(0))
+    _step(team, scenario)  # compiles everything
     before = astuple(team.counts)
-    times = [_time_steps(team, scenario)]
-    # An episode has two steps, and only the second one updates weights.
-    steps = 2 * len(times[0]), 2 * len(times[0]), len(times[0])
-    after = astuple(team.counts)
-    counted = (int(b - a) // n for a, b, n in zip(before, after, steps, strict=True))
-    for seed in range(1, repeats):
-        team = Team(learner, scenario, hierarchy, policy_seed(seed))
-        _step(team, scenario)
-        times.append(_time_steps(team, scenario))
-    deciding, learning = (median(part) for part in zip(*chain(*times), strict=True))
-    each = tuple(sum(map(median, zip(*taken, strict=True))) for taken in times)
-    return StepCost(Counts(*counted), deciding, learning, memory, each)
-
-
-def _time_steps(team: Team, scenario: Scenario) -> list[tuple[float, float]]:
-    """Return the times (decision, learning) of steps until `MIN_SECONDS` have passed [s]."""
     times = [_step(team, scenario)]
     while sum(map(sum, times)) < MIN_SECONDS and len(times) < MAX_STEPS:
         times.append(_step(team, scenario))
-    return times
+    # An episode has two steps, and only the second one updates weights.
+    steps = 2 * len(times), 2 * len(times), len(times)
+    counted = (
+        int(after - first) // count
+        for first, after, count in zip(before, astuple(team.counts), steps, strict=True)
+    )
+    deciding, learning = map(median, zip(*times, strict=True))
+    return StepCost(Counts(*counted), deciding, learning)
 
 
 def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hierarchy]:
@@ -267,15 +276,6 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
         evaluator = "exact"  # a single agent has no neighbors
     decision = DecisionSettings(rule="value", evaluator=evaluator)
     return LEARNER.model_copy(update={"decision": decision}), line_up, hierarchy
-
-
-@cache
-def _warm_up() -> None:
-    """Import and compile everything before memory and time are measured."""
-    line_up = LineUpSettings(carts=2).build()
-    for topology in ("chain", "independent"):
-        hierarchy = build(topology, line_up.agents)
-        _step(Team(LEARNER, line_up, hierarchy, policy_seed(0)), line_up)
 
 
 def _step(team: Team, scenario: Scenario) -> tuple[float, float]:

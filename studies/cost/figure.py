@@ -31,36 +31,6 @@ Looks = Mapping[str, Mapping[str, Any]]
 """Looks of lines by their labels."""
 
 
-def check(topologies: int, problems: int, path: Path) -> None:
-    """Refuse a figure that cannot be read, before anything is measured for it.
-
-    Parameters
-    ----------
-    topologies
-        Number of topologies, the single agent excluded.
-    problems
-        Number of pairs of rules and actions.
-    path
-        Path of the figure.
-
-    Raises
-    ------
-    ValueError
-        If the suffix of `path` is unknown, or there are too many series or panels; one line.
-    """
-    figures.check_suffix(path)
-    if topologies >= MAX_SERIES:
-        raise ValueError(
-            f"{path}: {topologies} topologies and the single agent, allowed in a figure: "
-            f"{MAX_SERIES} series; name fewer topologies"
-        )
-    if problems > MAX_PANELS:
-        raise ValueError(
-            f"{path}: {problems} pairs of rules and actions, allowed in a figure: {MAX_PANELS}, "
-            "one panel each"
-        )
-
-
 def draw(rows: Sequence[CostRow], path: Path) -> None:
     """Write the figure: SVG, PNG or PDF by the suffix of `path`.
 
@@ -72,11 +42,21 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
     Raises
     ------
     ValueError
-        See `check`.
+        If the suffix of `path` is unknown, or there are too many series or panels; one line.
     """
     problems = list(dict.fromkeys(row.problem for row in rows))
     names = list(dict.fromkeys(row.topology for row in rows if row.nested_exact is not None))
-    check(len(names), len(problems), path)
+    figures.check_suffix(path)
+    if len(names) >= MAX_SERIES:
+        raise ValueError(
+            f"{path}: {len(names)} topologies and the single agent, allowed in a figure: "
+            f"{MAX_SERIES} series; name fewer topologies"
+        )
+    if len(problems) > MAX_PANELS:
+        raise ValueError(
+            f"{path}: {len(problems)} pairs of rules and actions, allowed in a figure: "
+            f"{MAX_PANELS}, one panel each"
+        )
     looks: Looks = {**dict(zip(names, LOOKS, strict=False)), SINGLE_AGENT: SINGLE_LOOK}
     is_measured = any(row.measured is not None for row in rows)
     with figures.apply_style():

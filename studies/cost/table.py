@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from itertools import chain, product
 from math import prod
@@ -18,25 +18,24 @@ from .cost import (
     SINGLE_AGENT,
     CostRow,
     agents_below,
-    broadcasts,
     joint_actions,
     measure,
     messages,
     step_formula,
+    within_budget,
 )
 from .formats import VARIABLES, format_rows
 
-MAX_REPEATS = 1000
-"""A repeat takes a third of a second or more."""
 MAX_ROWS = 100_000
+MAX_COUNT = 10**15
+"""Maximum of iterations, rules and the budget."""
 RANGES = {
     "agents": (1, 10_000),  # the integers of a row then have some fifty thousand digits
     "memberships": (1, 1_000),
-    "rules": (1, 10**15),
+    "rules": (1, MAX_COUNT),
     "actions": (2, 10_000),
 }
 """Minimum and maximum of the numbers that a table may vary."""
-MAX_ITERATIONS = 10**15
 LABELED = re.compile(r"([\w -]+)=(.+)")
 """A topology with a label of its own."""
 
@@ -109,8 +108,7 @@ def problems(
             "memberships and rules are both given, allowed: one of them, because rules = "
             f"memberships ** {VARIABLES}"
         )
-    expect("a whole number", Integral, iterations=iterations)
-    expect_within(f"1 to {MAX_ITERATIONS:,}", 1, MAX_ITERATIONS, iterations=iterations)
+    _check_count("iterations", iterations)
     sizes: list[tuple[int | None, int]]
     if rules is not None:
         sizes = [(None, count) for count in _checked("rules", rules)]
@@ -121,6 +119,11 @@ def problems(
         (m, Problem(count, each, iterations))
         for (m, count), each in product(sizes, _checked("actions", actions))
     ]
+
+
+def _check_count(name: str, number: int) -> None:
+    expect("a whole number", Integral, **{name: number})
+    expect_within(f"1 to {MAX_COUNT:,}", 1, MAX_COUNT, **{name: number})
 
 
 def _checked(name: str, numbers: Iterable[int]) -> list[int]:
@@ -147,8 +150,8 @@ def cost_table(
     topologies: Sequence[str] = ("chain",),
     agents: Iterable[int] = (4,),
     *,
+    budget: int | None = None,
     measured: bool = False,
-    repeats: int = 1,
     network: bool = False,
     **quantities: Unpack[Quantities],
 ) -> CostTable:
@@ -161,10 +164,11 @@ def cost_table(
         ``max-plus``, ``fitted-q``, ``hierarchy-ppo``.
     agents
         Numbers of agents.
+    budget
+        Number of joint actions that the team may try in a decision, as with the spec key
+        ``learner.decision.budget``. The table then also has the cost within this budget.
     measured
         Whether to count and time steps of the running system, too.
-    repeats
-        Number of timings, each with a new team; two or more give an interval.
     network
         Whether to count the messages of a decision, and how many of them follow one another.
     **quantities
@@ -185,23 +189,44 @@ def cost_table(
     expect("names of topologies", Sequence | None, topologies=topologies)
     expect_each("names of topologies", str, topologies=topologies)
     numbers = _checked("agents", agents)
-    if not 1 <= repeats <= MAX_REPEATS:
-        raise ValueError(f"repeats = {repeats}, allowed: 1 to {MAX_REPEATS}")
     if not topologies:
         raise ValueError("topology = none, allowed: one or more, such as chain or tree:2")
+    if budget is not None:
+        _check_count("budget", budget)
     each = problems(**quantities)
     count = prod(map(len, (topologies, numbers, each)))
     if count > MAX_ROWS:
         raise ValueError(f"{count:,} rows, allowed: {MAX_ROWS:,}; name fewer numbers")
-    cases = product(_labeled(topologies), numbers)
-    times = repeats if measured else 0
-    by_case = [_rows(label, text, n, each, times, network) for (label, text), n in cases]
+    by_case = []
+    for (label, text), n in product(_labeled(topologies), numbers):
+        first = CostRow(n, label, PAPER, None, None, None, 0)
+        if measured:
+            first = replace(first, formula=step_formula(text, n), measured=measure(text, n))
+        if network:
+            first = replace(first, network=messages(text, n))
+        by_case.append([_row(first, text, m, problem, budget) for m, problem in each])
     return CostTable(tuple(chain.from_iterable(zip(*by_case, strict=True))))
 
 
-def count_hierarchies(topologies: Sequence[str]) -> int:
-    """Return how many of the topologies are not the single agent."""
-    return sum(text != SINGLE_AGENT for _, text in _labeled(topologies))
+def _row(
+    row: CostRow, text: str, memberships: int | None, problem: Problem, budget: int | None
+) -> CostRow:
+    """Return a row with the results of the formulas for a problem."""
+    n = row.agents
+    below = () if text in {SINGLE_AGENT, *DECISION_METHODS} else agents_below(text, n)
+    is_one = bool(below) and is_chain(below)
+    is_single = text == SINGLE_AGENT
+    return replace(
+        row,
+        problem=problem,
+        memberships=memberships,
+        nested_exact=None if is_single else problem.sweep(joint_actions(text, n, problem.actions)),
+        nested_closed_form=problem.chain_closed_form(n) if is_one else None,
+        nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
+        single_agent=problem.single_agent(n),
+        within_budget=None if budget is None else within_budget(text, n, problem, budget),
+        free=1 + max(below, default=-1),
+    )
 
 
 def _labeled(topologies: Sequence[str]) -> list[tuple[str, str]]:
@@ -213,41 +238,3 @@ def _labeled(topologies: Sequence[str]) -> list[tuple[str, str]]:
         if labels.count(label) > 1:
             raise ValueError(f"topology = {label!r} more than once; name each: LABEL={text}")
     return named
-
-
-def _rows(
-    label: str,
-    text: str,
-    n: int,
-    each: Sequence[tuple[int | None, Problem]],
-    repeats: int,
-    network: bool,
-) -> list[CostRow]:
-    """Return the rows of a topology over n agents; without repeats nothing is measured."""
-    below = () if text in {SINGLE_AGENT, *DECISION_METHODS} else agents_below(text, n)
-    is_one = bool(below) and is_chain(below)
-    formula = step_formula(text, n) if repeats else None
-    measured = measure(text, n, repeats) if repeats else None
-    sent = messages(text, n) if network else None
-    broadcast = broadcasts(text, n) if network else 0
-    free = 1 + max(below, default=-1)
-    rows = []
-    for memberships, problem in each:
-        tried = None if text == SINGLE_AGENT else joint_actions(text, n, problem.actions)
-        row = CostRow(
-            agents=n,
-            topology=label,
-            problem=problem,
-            memberships=memberships,
-            nested_exact=None if tried is None else problem.sweep(tried),
-            nested_closed_form=problem.chain_closed_form(n) if is_one else None,
-            nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
-            single_agent=problem.single_agent(n),
-            free=free,
-            formula=formula,
-            measured=measured,
-            network=sent,
-            broadcast=broadcast,
-        )
-        rows.append(row)
-    return rows

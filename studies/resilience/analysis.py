@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 from math import comb
 
+import numpy as np
+
 from ...core.interface.measures import Measure
 from ...core.numerics import pd
-from ..results.analysis import Summary
+from ..results.analysis import Summary, verdicts
 from ..results.comparison import mean_estimate
 from ..results.differences import Difference, Pair, differences, paired_difference
 from ..results.notation import format_estimate, format_number
@@ -55,6 +57,12 @@ class TeamLosses:
             if float(row_means(self.joined(sets)).mean()) <= HALF * self.intact_mean:
                 return n
         return None
+
+    @property
+    def loss(self) -> pd.Series:
+        """Mean loss of performance after any single failure, by seed."""
+        lost = row_means(self.joined(self.by_number[1]))
+        return row_means(self.intact)[lost.index] - lost
 
     def name(self, units: Sequence[int]) -> str:
         """Return the names of lost units."""
@@ -108,6 +116,46 @@ class Resilience:
         single = self.single[own.condition]
         return min(single, key=lambda d: float(d.estimate.value)) if single else None
 
+    @property
+    def loss_measure(self) -> Measure:
+        """Measure of `TeamLosses.loss`."""
+        least, greatest = self.measure.bounds
+        return replace(
+            self.measure,
+            name="loss",
+            title=f"loss in {self.measure.title} after any single failure",
+            better="lower",
+            is_rate=False,
+            least=least - greatest,
+            greatest=greatest - least,
+        )
+
+    @cached_property
+    def comparison(self) -> tuple[Difference, ...]:
+        """Differences of each condition from the first in the loss after any single failure.
+
+        Teams are paired by seed. p is adjusted over all conditions. If all seeds differ equally,
+        the interval combines those of the two changes (Zou and Donner 2008), because a bootstrap
+        interval would have no width.
+        """
+        first, *others = (own for own in self.teams if 1 in own.by_number)
+        title = self.loss_measure.title
+        pairs: list[Pair] = [(own.condition, title, own.loss, first.loss) for own in others]
+        (compared,) = differences({"": pairs}, self.loss_measure).values()
+        changes = {own.condition: self._single_change(own) for own in (first, *others)}
+        return tuple(
+            d
+            if not d.paired or np.ptp(d.sample) > 0.0
+            else replace(d, estimate=_combined(changes[first.condition], changes[d.condition]))
+            for d in compared
+        )
+
+    @property
+    def comparison_lines(self) -> list[str]:
+        """Comparison of the conditions in words; empty if there is nothing to compare."""
+        head = f"{self.loss_measure.heading}, minus that of {self.teams[0].condition}"
+        return verdicts({head: self.comparison}, self.loss_measure, "loss")
+
     @cached_property
     def summaries(self) -> tuple[Summary, ...]:
         """Lines of the table: intact teams, single losses by position, and more losses."""
@@ -134,6 +182,9 @@ class Resilience:
             "change": self._change(own, lost),
         }
         return Summary(f"{own.condition}, {label}", len(lost), estimates)
+
+    def _single_change(self, own: TeamLosses) -> Estimate:
+        return self._change(own, own.joined(own.by_number[1]))
 
     def _change(self, own: TeamLosses, lost: pd.DataFrame) -> Estimate:
         with_losses, intact = row_means(lost), row_means(own.intact)
@@ -183,6 +234,17 @@ class Resilience:
             "measure": self.measure.name,
             "tolerance": self.tolerance,
             "teams": [self._team_to_dict(own) for own in self.teams],
+            "comparison": [
+                {
+                    "condition": d.condition,
+                    "reference": self.teams[0].condition,
+                    "seeds": d.seeds,
+                    "paired": d.paired,
+                    "difference_in_loss": d.estimate.to_json(),
+                    "p": d.p,
+                }
+                for d in self.comparison
+            ],
             "sentences": list(self.sentences),
         }
 
@@ -216,3 +278,12 @@ class Resilience:
                 for n, sets in own.by_number.items()
             ],
         }
+
+
+def _combined(first: Estimate, second: Estimate) -> Estimate:
+    """Return the first estimate minus the second one as if they were independent."""
+    value = first.value - second.value
+    low = value - np.hypot(first.value - first.low, second.high - second.value)
+    return Estimate(
+        value, low, value + np.hypot(first.high - first.value, second.value - second.low)
+    )

@@ -30,7 +30,9 @@ class ResilienceReport:
     def notes(self) -> tuple[str, ...]:
         """Explanation and findings, in lines."""
         texts = (*self.analysis.legend, *self.analysis.sentences)
-        return tuple(line for text in texts for line in wrapped(text))
+        lines = [line for text in texts for line in wrapped(text)]
+        compared = self.analysis.comparison_lines
+        return (*lines, "", *compared) if compared else tuple(lines)
 
     @property
     def json(self) -> str:

@@ -1,7 +1,5 @@
 """Tasks of VMAS: each world by its seed, many at once as one by itself, what is refused."""
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -10,6 +8,8 @@ from nested_agents.scenarios import SCENARIOS
 from nested_agents.studies.catalogue.experience import measure
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
+
+pytest.importorskip("vmas", reason="extra vmas")
 
 COUNT = 5
 
@@ -22,12 +22,6 @@ def seeds(first, count=COUNT):
     return [np.random.SeedSequence(3, spawn_key=(0, first + k)) for k in range(count)]
 
 
-@pytest.fixture
-def _vmas():
-    pytest.importorskip("vmas", reason="extra vmas")
-
-
-@pytest.mark.usefixtures("_vmas")
 @pytest.mark.parametrize("task", ["navigation", "dispersion"])
 def test_many_worlds_are_each_by_itself(task):
     many = build(task).environments(COUNT)
@@ -44,7 +38,6 @@ def test_many_worlds_are_each_by_itself(task):
             assert np.allclose(*begun, rtol=0.0, atol=1e-6)
 
 
-@pytest.mark.usefixtures("_vmas")
 def test_an_episode_follows_from_its_seed_and_ends():
     first, second = build("balance", most_decisions=3), build("balance", most_decisions=3)
     second.reset(7)
@@ -55,7 +48,6 @@ def test_an_episode_follows_from_its_seed_and_ends():
     assert build("balance", options={"n_agents": 5}).agents[-1] == "agent_4"
 
 
-@pytest.mark.usefixtures("_vmas")
 def test_a_return_is_a_success_if_it_is_said_to_be():
     world = build("navigation", success_return=-1000.0)
     world.reset(0)
@@ -64,7 +56,6 @@ def test_a_return_is_a_success_if_it_is_said_to_be():
     assert "not set, so studies compare returns" in warning
 
 
-@pytest.mark.usefixtures("_vmas")
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
@@ -80,13 +71,6 @@ def test_bad_input_is_one_line(keys, message):
     assert "\n" not in str(refusal.value)
 
 
-def test_without_the_extra_it_says_so(monkeypatch):
-    monkeypatch.setitem(sys.modules, "vmas", None)
-    with pytest.raises(ValueError, match=r"VMAS is not installed; pip install"):
-        build("balance")
-
-
-@pytest.mark.usefixtures("_vmas")
 def test_networks_train_in_it_to_the_same_rows():
     learner = {"kind": "mappo", "environments": 8, "rollout": 10, "batch_size": 80, "epochs": 1}
     table = {

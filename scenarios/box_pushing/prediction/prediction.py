@@ -22,8 +22,10 @@ from ..states.situations import SituationBatch
 from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
 from ..world.geometry import BoxShape
-from ..world.settings import InfraredSettings, Task, reward
-from .push import PushBelief, PushModel, mean_twists, outcomes, push
+from ..world.reward import Task, reward
+from ..world.settings import InfraredSettings
+from .calibration import PushBelief, mean_twists, outcomes
+from .push import PushModel, push
 from .responses import Outlook, respond
 from .wheel_commands import (
     WheelCommands,
@@ -324,9 +326,9 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         return self._rewards(batch)[row]
 
     def _rewards(self, batch: SituationBatch) -> FloatArray:
-        gaps = batch.gaps.T
+        gaps = np.ascontiguousarray(batch.gaps.T)
         contact = gaps < CONTACT_GAP
         readings = self.premises.infrared.reading(gaps)
         distance, approach, turn = progress_of(batch)
-        gained = reward(self.premises.task, distance, -approach, turn, contact, readings)
+        gained = reward(self.premises.task, distance, approach, turn, contact, readings)
         return gained.mean(axis=1)

@@ -43,12 +43,10 @@ def push_model(
 ) -> PushModel:
     """Return the model of a predictor, with the given errors of constants."""
     model = PushModel(
-        edges=box.outline.edges,
-        rounding=box.outline.rounding,
+        shape=box.shape,
         radii=np.array([robot.radius for robot in robots]),
         compliance=np.stack([compliance(robot) for robot in robots]) / belief.stiffness,
         friction_force=box.friction_force * belief.load,
-        friction_radius=box.friction_radius,
         contact_friction=box.contact_friction * belief.contact_friction,
     )
     if predictor == "rigid":

@@ -146,15 +146,13 @@ def several(name: str, default: str, text: str) -> options.Decorator:
 @several("--actions", "4", "|A|, actions of one agent.")
 @options.number("--iterations", "N", 450, "L, iterations (steps) of an epoch.")
 @click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
+@click.option("--network/--no-network", help="Also count the messages of a decision.")
 @click.option(
-    "--repeats",
+    "--budget",
     type=int,
     metavar="N",
-    help="Number of measurements, each with a new team; two or more give times an interval.",
-)
-@click.option(
-    "--network/--no-network",
-    help="Also count messages, and how long a decision waits for them at 1 and 10 ms each.",
+    help="Also show the cost if the team may try N joint actions in a decision, as with the key "
+    "learner.decision.budget.",
 )
 @options.formats("table", "json", "csv", "latex")
 @options.plot
@@ -162,8 +160,8 @@ def cost(
     agents: tuple[str, ...],
     topology: tuple[str, ...],
     measured: bool,
-    repeats: int | None,
     network: bool,
+    budget: int | None,
     form: CostForm,
     plot: Path | None,
     **typed: Unpack[QuantityOptions],
@@ -185,21 +183,19 @@ def cost(
             quantities["memberships"] = numbers("memberships", typed["memberships"])
         if typed["rules"]:
             quantities["rules"] = numbers("rules", typed["rules"])
-        if plot is not None:
-            from ...cost.figure import check, draw
-
-            check(costs.count_hierarchies(topology), len(costs.problems(**quantities)), plot)
-        if measured := measured or repeats is not None:
+        if measured:
             say("measuring, first compiling what is not: no steps of more than a second or so")
         rows = costs.cost_table(
             topology,
             numbers("agents", agents),
+            budget=budget,
             measured=measured,
-            repeats=1 if repeats is None else repeats,
             network=network,
             **quantities,
         ).rows
         if plot is not None:
+            from ...cost.figure import draw
+
             draw(rows, plot)
     print_data(f"{format_rows(rows, form)}\n")
     return 0

@@ -45,6 +45,9 @@ def test_the_shown_table_is_what_is_printed(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_the_shown_costs_are_exact(capsys: pytest.CaptureFixture[str]) -> None:
-    (shown,) = re.findall(r"```text\n( *n  topology.*?)```", PAGES["cost"], re.DOTALL)
+    shown, budget = re.findall(r"```text\n( *n  topology.*?)```", PAGES["cost"], re.DOTALL)
     assert main(["cost", "--agents", "1:8", "--topology", "chain"]) == 0
     assert capsys.readouterr().out.strip() == shown.strip()
+    topologies = ["chain", "tree:2", "single-agent"]
+    assert main(["cost", "--agents", "4,8", "--topology", *topologies, "--budget", "256"]) == 0
+    assert budget in capsys.readouterr().out

@@ -14,8 +14,8 @@ from nested_agents.core.values.rule_base import RuleBase
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import team as explain
-from nested_agents.studies.explain import text as explain_text
-from nested_agents.studies.explain.team import labels, rules_table, take_apart
+from nested_agents.studies.explain.functions import labels, take_apart
+from nested_agents.studies.explain.text import _table
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE, RESULTS_VERSION
 from nested_agents.studies.store.store import Store
@@ -70,9 +70,9 @@ def test_the_first_trial_in_words_and_figures(study, capsys):
     assert status == 0
     out = said.out
     assert out.startswith("order 1, seed 3: the team after 3 episodes\n")
-    assert "so that the functions below add up to f" in " ".join(out.split())
-    assert "IF gap is touching" in out
-    assert "before the first failure, after all training" in " ".join(out.split())
+    assert "Interactions of variables" not in out
+    assert "IF gap is touching (0 m):" in out
+    assert "SELF-MODEL" in out
     folder = study / "explain" / "order-1-seed3"
     assert {path.name for path in folder.iterdir()} == {
         "explanation.txt",
@@ -190,7 +190,7 @@ def test_an_agent_for_each_robot(tmp_path, capsys):
     status, said = run(capsys, tmp_path)
     assert status == 0
     assert "Not drawn: the scenario has no method show_policy for agents such as these." in said.out
-    assert "turning built" in said.out
+    assert "SELF-MODEL" in said.out
 
 
 def test_folders_of_conditions_differ(tmp_path):
@@ -202,14 +202,6 @@ def test_folders_of_conditions_differ(tmp_path):
         for name in names
     ]
     assert folders == ["condition1-seed0", "condition2-seed0", "x-seed0", "condition4-seed0"]
-
-
-def test_percents_stay_with_their_numbers():
-    sentence = "x" * 76 + " 3%, y"
-    assert [line.strip() for line in explain_text._wrapped(sentence).splitlines()] == [
-        "x" * 76,
-        "3%, y",
-    ]
 
 
 PARTITIONS = [
@@ -275,26 +267,12 @@ def test_words_for_membership_functions():
     assert labels(VARIABLES[1], even) == ("low", "medium", "high")
 
 
-def test_rules_in_words():
-    rules = base(1)
-    theta = np.zeros((2, rules.n_rules))
-    theta[:, 2:5] = [[0.02, 0.0, -0.02], [0.04, 0.0, -0.04]]
-    parts = [take_apart(rules, row) for row in theta]
-    agents = ["robot1.left", "robot1.front-right"]
-    lines = rules_table(rules, VARIABLES, agents, parts).splitlines()
-    assert [line.split() for line in lines[:2]] == [["robot1", "robot1"], ["left", "front-right"]]
-    assert lines[2].split() == ["gap,", "share", "of", "the", "variance", "100%", "100%"]
-    assert lines[3].split() == ["IF", "gap", "is", "touching,", "0", "m:", "+2.00", "+4.00"]
-    assert lines[5].split() == ["IF", "gap", "is", "far,", "1", "m:", "-2.00", "-4.00"]
-
-
-def test_many_agents_stand_in_blocks():
-    rules = base(1)
-    parts = [take_apart(rules, theta_for(rules))] * 12
+def test_columns_that_do_not_fit_follow_below():
     names = [f"robot{i}.middle-right" for i in range(12)]
-    table = rules_table(rules, VARIABLES, names, parts)
+    table = _table([["+1.25"] * 12] * 2, ["IF gap is near:", "IF gap is far:"], names)
     assert max(len(line.rstrip()) for line in table.splitlines()) <= 80
     assert table.count("robot") == 12
+    assert table.count("IF gap is near:") > 1
 
 
 def test_agents_of_the_same_rules_have_one_column(tmp_path) -> None:
@@ -304,15 +282,8 @@ def test_agents_of_the_same_rules_have_one_column(tmp_path) -> None:
         learner = {"kind": "fitted-q", "weights": weights}
         kept = na.run(table | {"learner": learner}, tmp_path / weights, jobs=1)
         texts.append(" ".join(kept.explain().text.split()))
-    assert "have one column, named after the first: agent1 = agent2 = agent3." in texts[0]
+    assert "have one column: agent1 = agent2 = agent3." in texts[0]
     assert "one column" not in texts[1]
-
-
-def test_names_stay_with_their_shares():
-    sentence = " ".join(f"variable_{k} {k + 10} %," for k in range(12))
-    lines = explain_text._wrapped(sentence).splitlines()
-    assert len(lines) > 1
-    assert all(line.startswith("variable_") and line.endswith("%,") for line in lines)
 
 
 @pytest.mark.parametrize("condition", ["fitted-q", "random"])

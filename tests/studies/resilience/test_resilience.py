@@ -134,7 +134,10 @@ def test_rows_are_by_position_and_number(arm):
 def test_kept_teams_are_evaluated_with_losses(arm, tmp_path, capsys):
     assert main(["resilience", str(arm), "--format", "json", "--jobs", "1"]) == 0
     own = json.loads(capsys.readouterr().out)
-    chain, _ = own["teams"]
+    chain, other = own["teams"]
+    (compared,) = own["comparison"]
+    assert (compared["condition"], compared["reference"]) == (other["condition"], "chain")
+    assert compared["paired"]
     assert [one["position"] for one in chain["single"]] == ["root", "middle", "leaf"]
     assert chain["intact"][0] == pytest.approx(
         na.load(arm).results.means("chain", "evaluation").mean()
@@ -183,3 +186,49 @@ def test_seeds_are_paired_whatever_their_order():
     shuffled = own.lost[0,].iloc[np.random.default_rng(0).permutation(12)]
     own.lost[0,] = shuffled
     assert float(analysis.single["chain"][0].estimate.value) == pytest.approx(-0.1)
+
+
+def compared(lost, reference_lost):
+    """Compare an independent team with a chain, by successes of 10 after each single loss."""
+    teams = [
+        TeamLosses(name, CHAIN, rates(*(10,) * 12), {(i,): rates(*own) for i in range(3)})
+        for name, own in (("chain", reference_lost), ("independent", lost))
+    ]
+    return Resilience("absent", SUCCESS, "success", 0.1, tuple(teams))
+
+
+def test_losses_of_hierarchies_are_compared_by_seed():
+    analysis = compared((9, 8) * 6, (5, 4, 5, 3, 5, 4) * 2)
+    (difference,) = analysis.comparison
+    sample = np.array([0.1, 0.2] * 6) - np.array([0.5, 0.6, 0.5, 0.7, 0.5, 0.6] * 2)
+    assert difference.sample == pytest.approx(sample)
+    assert float(difference.estimate.value) == pytest.approx(sample.mean())
+    assert difference.paired
+    assert difference.estimate.high < -0.3
+    assert difference.p == pytest.approx(2 / 2**12)
+    lines = analysis.comparison_lines
+    assert lines[0] == "loss in success after any single failure, minus that of chain:"
+    assert lines[1].startswith("  better: independent, -0.")
+
+
+def test_losses_are_paired_by_the_name_of_the_seed():
+    analysis = compared((0, 3, 5, 7, 9, 10) * 2, (0, 3, 5, 7, 9, 10) * 2)
+    chain, other = analysis.teams
+    for units, frame in other.lost.items():
+        other.lost[units] = frame.iloc[::-1]
+    assert analysis.comparison[0].sample == pytest.approx(np.zeros(12))
+    assert chain.loss[3] == other.loss[3]
+
+
+def test_equal_losses_of_all_seeds_have_an_interval():
+    (difference,) = compared((10,) * 12, (10,) * 12).comparison
+    value, low, high = map(float, difference.estimate)
+    assert value == 0.0
+    assert low < 0.0 < high
+    assert low == pytest.approx(-high)
+
+
+def test_one_hierarchy_is_not_compared():
+    analysis, _ = resilience({(i,): (9, 8) * 6 for i in range(3)})
+    assert analysis.comparison == ()
+    assert analysis.comparison_lines == []
