@@ -110,6 +110,7 @@ def _start_server(parent: int) -> tuple[subprocess.Popen[bytes], Connection]:
 def serve(descriptor: int) -> None:
     """Fork a process for each requested trial, until the connection closes."""
     worker = Connection(descriptor)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent may ignore it; waitpid needs it
     importlib.import_module("nested_agents.studies.trials.session")
     known = LoadedCode((), ())
     while True:
