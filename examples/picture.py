@@ -25,7 +25,6 @@ FAILURE = {"kind": "seized", "wheels": "robot1.front-left", "step": 6}
 env = BoxPushingEnv(
     {"start": "easy", "robot": "four-wheel", "box": BOX, "failures": [FAILURE]},
     render_mode="rgb_array",
-    sensors=True,
 )
 env.reset(seed=1)
 speed_up = [0] * len(env.scenario.agents)

@@ -151,14 +151,13 @@ def pushing_points(box: BoxSpec, count: int, gap: float) -> FloatArray:
     >>> pushing_points(BOXES["square"], 8, 0.05).round(2)[1:3].tolist()
     [[0.07, 0.15, -1.57], [-0.07, 0.15, -1.57]]
     """
-    radius = box.outline.rounding
-    solid = Point(0, 0).buffer(radius, ARC) if box.polygon is None else box.polygon
+    solid = Point(0, 0).buffer(box.radius, ARC) if box.polygon is None else box.polygon
     around = orient(Polygon(Polygon(solid.exterior).buffer(gap, ARC).exterior)).exterior
     first = around.project(Point(4.0 * (box.reach + gap), 0.0))
     poses = np.empty((count, 3))
     for k in range(count):
         place = around.interpolate((first + (k + 0.5) / count * around.length) % around.length)
-        _, nx, ny, _, _ = surface(box.outline.edges, radius, place.x, place.y)
+        _, nx, ny = surface(box.shape, place.x, place.y)
         poses[k] = place.x, place.y, atan2(-ny, -nx)
     return poses
 

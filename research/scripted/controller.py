@@ -99,14 +99,11 @@ class ScriptedController:
             slots = self._slots(side, box, error)
             costs = np.array(
                 [
-                    paths(
-                        np.ascontiguousarray(pose[None]), slot, box, self._model.edges,
-                        self._model.rounding, radius + CLEARANCE, self.box.reach,
-                    )[0]
+                    paths(pose[None], slot, box, self.box, radius + CLEARANCE)[0]
                     for pose, radius in zip(robots, self._radii, strict=True)
                     for slot in slots
                 ]
-            ).reshape(len(robots), -1)  # fmt: skip
+            ).reshape(len(robots), -1)
             rows, columns = linear_sum_assignment(costs)
             # Past a right angle pushing leads away from the goal.
             steer = abs(error) + 4.0 * max(abs(error) - 1.2, 0.0)

@@ -178,14 +178,8 @@ class Crowd:
         self, robots: FloatArray, box: FloatArray, slots: FloatArray
     ) -> tuple[float, IntArray]:
         """Return the mean way to slots [m] and the slot of each robot, the ways being shortest."""
-        poses = np.ascontiguousarray(robots)
-        ways = [
-            paths(
-                poses, slot[:2], box, self._model.edges, self._model.rounding,
-                self._radius + CLEARANCE, self.box.reach,
-            )
-            for slot in slots
-        ]  # fmt: skip
+        margin = self._radius + CLEARANCE
+        ways = [paths(robots, slot[:2], box, self.box, margin) for slot in slots]
         costs = np.stack(ways, axis=1)
         rows, columns = linear_sum_assignment(costs)
         return float(costs[rows, columns].mean()), columns

@@ -69,7 +69,7 @@ def behind(box: BoxSpec, direction: float, aside: float, gap: float) -> tuple[fl
     """
     origin = -aside * sin(direction), aside * cos(direction)
     x, y = approach(box, origin, direction + pi, gap)
-    _, nx, ny, _, _ = surface(box.outline.edges, box.outline.rounding, x, y)
+    _, nx, ny = surface(box.shape, x, y)
     return hypot(x - origin[0], y - origin[1]), -(nx * cos(direction) + ny * sin(direction))
 
 
@@ -110,7 +110,7 @@ def _edges(polygon: Polygon) -> Iterator[Side]:
 
 def _stand(box: BoxSpec, direction: float, robots: int, span: float) -> Side | None:
     """Return where robots push a concave box in a direction: far apart, around the centre."""
-    ends = box.outline.edges[:, :2] @ np.array([-sin(direction), cos(direction)])
+    ends = box.shape.edges[:, :2] @ np.array([-sin(direction), cos(direction)])
     low, high = float(ends.min()), float(ends.max())
     places = np.linspace(low, high, GRID)
     square = np.array([behind(box, direction, float(y), span)[1] > SQUARE for y in places])

@@ -51,7 +51,7 @@ from the goal, the distance by which the push misses it, the gap, and the angle 
 class BoxTaskSettings(ScenarioSettings):
     """Robots, box, task and servo layer, common to all scenarios of box pushing."""
 
-    player: ClassVar[str] = f"{__package__}.pictures.rendering"
+    player: ClassVar[str] = f"{__package__}.pictures.player"
     robots: Annotated[int, Field(ge=1), team_size(7.5e-7, agents=2)] = 2
     """Number of robots, as many as memory and time allow by estimate."""
     robot: str | RobotSettings = "e-puck"

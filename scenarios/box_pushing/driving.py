@@ -13,10 +13,11 @@ from math import log, pi
 
 import numpy as np
 
-from ...core.numerics import BoolArray, FloatArray, IntArray, njit, wrap
+from ...core.numerics import BoolArray, FloatArray, IntArray, wrap
 from .prediction.predictors import push_model
 from .scenario import BoxPushing
-from .world.geometry import surface
+from .world.boxes import BoxSpec
+from .world.geometry import distances
 from .world.robots import nominal_effect
 from .world.settings import RobotSettings
 
@@ -108,15 +109,7 @@ class Drivers:
                 poses = move(poses, twists, self.seconds / 2)
                 apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
                 cost = cost + 10.0 * np.maximum(span - apart, 0.0).sum(axis=1)
-                path = paths(
-                    poses,
-                    target[:2],
-                    box,
-                    self.model.edges,
-                    self.model.rounding,
-                    self.robot.radius + CLEARANCE,
-                    self.box.reach,
-                )
+                path = paths(poses, target[:2], box, self.box, self.robot.radius + CLEARANCE)
                 turn = np.abs(wrap(poses[:, 2] - target[2]))
                 left = path + 0.06 * turn * np.exp(-path / 0.05)
                 cost = cost + 0.1 * left
@@ -144,48 +137,30 @@ def move(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:
     turn = twists[:, 2] * seconds
     middle = poses[:, 2] + turn / 2
     chord = seconds * np.sinc(turn / (2 * pi))
-    cosine = np.cos(middle)
-    sine = np.sin(middle)
-    x = poses[:, 0] + chord * (cosine * twists[:, 0] - sine * twists[:, 1])
-    y = poses[:, 1] + chord * (sine * twists[:, 0] + cosine * twists[:, 1])
+    cos, sin = np.cos(middle), np.sin(middle)
+    x = poses[:, 0] + chord * (cos * twists[:, 0] - sin * twists[:, 1])
+    y = poses[:, 1] + chord * (sin * twists[:, 0] + cos * twists[:, 1])
     return np.stack([x, y, poses[:, 2] + turn], axis=1)
 
 
-@njit(cache=True)
 def paths(
-    poses: FloatArray,
-    target: FloatArray,
-    box: FloatArray,
-    edges: FloatArray,
-    rounding: float,
-    margin: float,
-    reach: float,
+    poses: FloatArray, target: FloatArray, box_pose: FloatArray, box: BoxSpec, margin: float
 ) -> FloatArray:
-    """Return about how far ``(m,)`` it is from poses to a target, around the box.
+    """Return the approximate lengths ``(m,)`` of paths from poses to a target, around the box.
 
-    Straight if all of the way keeps `margin` from the box, else along a circle around it. Standing
-    too close to the box is penalised.
+    A path is straight if all of it keeps `margin` from the box, and otherwise follows a circle
+    around the box. Positions too close to the box are penalized.
     """
-    out = np.empty(len(poses))
-    cos_, sin_ = np.cos(box[2]), np.sin(box[2])
-    tx, ty = target[0] - box[0], target[1] - box[1]
-    ring = reach + margin + 0.01
-    for i in range(len(poses)):
-        x, y = poses[i, 0] - box[0], poses[i, 1] - box[1]
-        here = surface(edges, rounding, cos_ * x + sin_ * y, cos_ * y - sin_ * x)[0]
-        near = max(margin - here, 0.0)
-        blocked = False
-        for k in range(1, 9):
-            px, py = x + (tx - x) * k / 8, y + (ty - y) * k / 8
-            gap = surface(edges, rounding, cos_ * px + sin_ * py, cos_ * py - sin_ * px)[0]
-            if gap < min(margin, here):
-                blocked = True
-                break
-        if blocked:
-            rho = np.sqrt(x * x + y * y)
-            turn = np.arctan2(x * ty - y * tx, x * tx + y * ty)
-            out[i] = ring * abs(turn) + abs(rho - ring) + abs(np.sqrt(tx * tx + ty * ty) - ring)
-        else:
-            out[i] = np.sqrt((tx - x) ** 2 + (ty - y) ** 2)
-        out[i] += 20.0 * near
-    return out
+    cos, sin = np.cos(box_pose[2]), np.sin(box_pose[2])
+    to_frame = np.array([[cos, -sin], [sin, cos]])  # of row vectors
+    x, y = ((poses[:, :2] - box_pose[:2]) @ to_frame).T
+    target_x, target_y = (target - box_pose[:2]) @ to_frame
+    shares = np.linspace(0.0, 1.0, 9)[:, None]
+    along_x, along_y = x + (target_x - x) * shares, y + (target_y - y) * shares
+    gaps = distances(along_x.ravel(), along_y.ravel(), box.shape).reshape(along_x.shape)
+    is_blocked = (gaps[1:] < np.minimum(margin, gaps[0])).any(axis=0)
+    ring = box.reach + margin + 0.01
+    turn = np.abs(np.arctan2(x * target_y - y * target_x, x * target_x + y * target_y))
+    detour = ring * turn + np.abs(np.hypot(x, y) - ring) + abs(np.hypot(target_x, target_y) - ring)
+    straight = np.hypot(target_x - x, target_y - y)
+    return np.where(is_blocked, detour, straight) + 20.0 * np.maximum(margin - gaps[0], 0.0)

@@ -35,8 +35,6 @@ class _Boxes(Environment):
         Most steps of an episode.
     render_mode
         ``None`` or ``"rgb_array"``, of which `gymnasium.wrappers.HumanRendering` makes a window.
-    sensors
-        Whether pictures show the rays of the infrared sensors.
     by_wheel
         Whether an agent observes the state of every wheel in a row of its own.
     **keys
@@ -56,14 +54,12 @@ class _Boxes(Environment):
         *,
         steps: int = 450,
         render_mode: str | None = None,
-        sensors: bool = False,
         by_wheel: bool = False,
         **keys: Any,
     ) -> None:
         table = dict(settings or {})
         if keys or not isinstance(settings, BoxPushingSettings):
             settings = BoxPushingSettings(**{**table, **keys})
-        self.sensors = sensors
         super().__init__(
             BoxPushing(settings), steps=steps, render_mode=render_mode, by_agent=by_wheel
         )
@@ -72,7 +68,7 @@ class _Boxes(Environment):
         """Return a picture of where a recording ends."""
         from .pictures.rendering import picture
 
-        return picture(dict(recording), len(recording["box_pose"]) - 1, sensors=self.sensors)
+        return picture(recording, len(recording["box_pose"]) - 1)
 
 
 class WheelsEnv(_Boxes, AgentsEnv):

@@ -23,16 +23,17 @@ from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES, Measurements
-from .prediction.prediction import BoxPrediction, Premises, PresentState
+from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap, model_of
+from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
-from .prediction.push import APART, CONSTANTS, PushBelief, believing, least_gap, mean_twists
 from .prediction.settings import BeliefSettings
 from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
 from .states.variables import progress_of
 from .world.boxes import box_for, growth
+from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for
-from .world.settings import CONTROL_PERIOD, Task, reward
+from .world.settings import CONTROL_PERIOD
 from .world.starts import place
 from .world.stepping import step_address
 from .world.world import TOUCHING, WheelFailures, World
@@ -108,21 +109,21 @@ class BoxPushing(Scenario, Embodiment):
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = WheelFailures(settings.failures, self.agents, self._limits)
         reward_settings = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
-        self.task = Task(
+        self.task = Task.of(
             reward_settings, self._unit * settings.tolerance, settings.orientation_tolerance
         )
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
-        self._premises = Premises(
-            self._belief,
-            self.space,
-            self.action_set,
-            settings.speed_increment,
-            self._limits,
-            self.task,
-            settings.infrared,
-            self.box.shape,
-            settings.period,
-            settings.prediction_horizon * CONTROL_PERIOD,
+        self._prediction = PredictionSettings(
+            groups=self.groups,
+            belief=self._belief,
+            space=self.space,
+            action_set=self.action_set,
+            increments=self._unit_speeds,
+            limits=self._limits,
+            task=self.task,
+            infrared=settings.infrared,
+            period=settings.period,
+            horizon=settings.prediction_horizon * CONTROL_PERIOD,
         )
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
         # Robots that do not fit around the box are refused now, not in the middle of a study.
@@ -176,13 +177,13 @@ class BoxPushing(Scenario, Embodiment):
         moved = perf_counter()
         present = self._present(before[0])
         states = self.states_at(present, self._speeds[None])[0]
-        readings = self.world.infrared()[0]
+        readings = self.world.infrared()
         if self._is_noisy:
             readings = self.settings.infrared.noisy(readings, self._sensing)
         distance, approach, turn = progress_of(present)
         contact = self.world.contact[None]
         strongest = np.maximum.reduce(readings, axis=1)[None]
-        gained = reward(self.task, distance, -approach, turn, contact, strongest)[0]
+        gained = reward(self.task, distance, approach, turn, contact, strongest)[0]
         received = gained[self.body] if self._pays_robots else float(gained[0])
         away = float(distance[0])
         measured = self._measured(away, float(turn[0]))
@@ -225,15 +226,14 @@ class BoxPushing(Scenario, Embodiment):
             self._goal,
             self._speeds,
             tuple(effects),
-            self.groups,
         )
-        model = self._model if constants is None else believing(self._belief, constants)
+        model = self._model if constants is None else model_of(self._belief, constants)
         if self._playground is None or self._saved is None:
-            return BoxPrediction(situation, model, self._premises)
+            return BoxPrediction(situation, model, self._prediction)
         future = Future(
             self._playground, self._saved, self._failures, self._step, self.settings.action_repeat
         )
-        return ExactPrediction(situation, model, self._premises, future)
+        return ExactPrediction(situation, model, self._prediction, future)
 
     def with_exact_prediction(self) -> BoxPushing:
         """Return an equal scenario that predicts one decision period by simulation."""
@@ -275,8 +275,7 @@ class BoxPushing(Scenario, Embodiment):
         from .pictures.policy import policy_of
 
         self.reset(0)
-        robots = list(self.world.robots)
-        return policy_of(choose, predict(), self.box, robots, self.settings.start)
+        return policy_of(choose, predict(), self.world)
 
     def _save(self) -> None:
         # After every step, asked for or not, as saving costs the world its order of contacts.
@@ -409,7 +408,7 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
         states = one.states_at(batch, self._speeds)
         away, approach, turn = progress_of(batch)
         reached = one.task.reached(away, turn)
-        paid = reward(one.task, away, -approach, turn, gaps < TOUCHING, readings)
+        paid = reward(one.task, away, approach, turn, gaps < TOUCHING, readings)
         if one.settings.reward.of == "robot":
             paid = paid[:, one.body]
         rewards = np.broadcast_to(paid, joint_actions.shape)
@@ -422,5 +421,5 @@ def _twists(before: FloatArray, after: FloatArray, seconds: float, radius: float
     If two robots were close, the twist of the box is left out: they may have pushed each other.
     """
     twists = mean_twists(before, after, seconds)
-    close = min(least_gap(before[1:], radius), least_gap(after[1:], radius)) <= APART
+    close = min(min_gap(before[1:], radius), min_gap(after[1:], radius)) <= APART
     return twists[1:] if close else twists

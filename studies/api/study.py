@@ -39,7 +39,7 @@ from ..results.joining import join_sizes
 from ..results.notation import wrapped
 from ..results.results import Results, read
 from ..spec.conditions import ConditionSettings
-from ..spec.controls import LEARN_NOTHING, control_lines, control_of
+from ..spec.controls import control_lines
 from ..spec.outline import StudyOutline, older_results, other_spec, sources_of
 from ..spec.tables import SpecTable, TomlTable
 from ..store import durable
@@ -155,25 +155,6 @@ class StudyResults:
         """Remarks on controls, and on learners that are below them, in lines."""
         there = {c: self._settings[c] for c in self.conditions if c in self._settings}
         return (*control_lines(there), *below_random(self.results, there))
-
-    @property
-    def unlearned(self) -> tuple[str, ...]:
-        """Conditions that learn, but have neither more success nor return than frozen weights.
-
-        In evaluation; known where a frozen condition decides alike in the same scenario.
-        """
-        evaluations = self.results.episodes.query("phase == 'evaluation'")
-        columns = ["condition", SUCCESS.name, "return"]
-        means = evaluations.reindex(columns=columns).groupby("condition").mean()
-        names = means.index.intersection(list(self._settings), sort=False)
-        settings = {name: self._settings[name] for name in names}
-        unlearned: list[str] = []
-        for condition, own in settings.items():
-            if own["learner"]["kind"] not in LEARN_NOTHING:
-                control = control_of(condition, settings)
-                if control is not None and (means.loc[condition] <= means.loc[control]).all():
-                    unlearned.append(condition)
-        return tuple(unlearned)
 
     @property
     def power(self) -> tuple[str, ...]:

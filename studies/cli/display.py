@@ -114,9 +114,7 @@ def show_results(
     int
         1 if any trial failed, else 0.
     """
-    from ...topologies.builders import join_names
     from ..presentation.progress import count, say
-    from ..spec.controls import TROUBLESHOOTING
 
     directory = study.directory
     print_study(study)
@@ -127,14 +125,6 @@ def show_results(
         folder = directory / "figures"
         folder.mkdir(exist_ok=True)
         print_text(*(f"figure  {path}" for path in save(study.figures, folder, formats)))
-    if study.unlearned:
-        names = join_names(study.unlearned, 3)
-        print_wrapped(
-            f"{names}: no better than frozen weights in evaluation. What to try, and in which "
-            f"order: {TROUBLESHOOTING}; {command_line('tune')} tries it for you.",
-            first="hint    ",
-            indent=8,
-        )
     print_text(f"rows    {command_line('results', directory, '--format', 'csv')}")
     print_text(f"report  {report or command_line('report', directory)}")
     if study.failed:

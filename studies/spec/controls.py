@@ -80,20 +80,9 @@ def _decision_of(settings: Settings) -> object:
     return settings["topology"], decision, learner.get("predictor")
 
 
-def control_remark(settings: Mapping[str, Settings]) -> str | None:
-    """Return what must be said of the controls of some conditions, in one sentence; None: nothing.
-
-    Parameters
-    ----------
-    settings
-        Of all conditions, by label.
-    """
-    return planning_remark(settings) or _same_remark(settings)
-
-
 def control_lines(settings: Mapping[str, Settings]) -> tuple[str, ...]:
-    """Return `control_remark` in lines that fit a terminal; none if there is nothing to say."""
-    remark = control_remark(settings)
+    """Return `planning_remark` in lines that fit a terminal; none if there is nothing to say."""
+    remark = planning_remark(settings)
     return () if remark is None else tuple(wrap(remark, WIDTH, subsequent_indent="  "))
 
 
@@ -125,21 +114,6 @@ def planning_remark(settings: Mapping[str, Settings]) -> str | None:
     return f"{names}: {why}; judge learning by the difference to {join_names(controls, MOST_NAMES)}"
 
 
-def _same_remark(settings: Mapping[str, Settings]) -> str | None:
-    """Return that frozen and random conditions of one scenario are one control, if it is so."""
-    frozen: list[str] = []
-    drawn: list[str] = []
-    for condition, own in settings.items():
-        if own["learner"]["kind"] == "frozen":
-            rule = own["learner"]["decision"]["rule"]
-            if rule in ("value", "random"):
-                (drawn if rule == "random" else frozen).append(condition)
-    if not frozen or not drawn:
-        return None
-    names = f"{join_names(frozen, MOST_NAMES)} and {join_names(drawn, MOST_NAMES)}"
-    return f"{names} are one control: frozen weights make all values equal, and ties are random"
-
-
 def for_control(control: SpecTable, user: SpecTable) -> SpecTable:
     """Return tables of a user without the keys that tune learning, if a learner is a control.
 
@@ -161,19 +135,14 @@ def for_control(control: SpecTable, user: SpecTable) -> SpecTable:
     return {**user, "learner": kept}
 
 
-def without_learning(point: Mapping[str, object]) -> dict[str, object]:
-    """Return values by dotted key without those that tune learning.
+def tuning_keys(keys: Iterable[str]) -> list[str]:
+    """Return the dotted keys that tune learning, sorted.
 
     Examples
     --------
-    >>> without_learning({"learner.ridge": 3.0, "learner.decision.rule": "reward-and-value"})
-    {'learner.decision.rule': 'reward-and-value'}
+    >>> tuning_keys(["learner.ridge", "learner.decision.rule"])
+    ['learner.ridge']
     """
-    return {key: value for key, value in point.items() if not _tunes_learning(key)}
-
-
-def tuning_keys(keys: Iterable[str]) -> list[str]:
-    """Return the dotted keys that tune learning, sorted."""
     return sorted({key for key in keys if _tunes_learning(key)})
 
 

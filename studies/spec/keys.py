@@ -1,29 +1,22 @@
-"""Keys of specs, read from the settings models and the docstrings of their fields.
+"""Keys of specs, read from the JSON schema of the models that validate specs.
 
-Types, defaults and allowed values come from the models that validate a spec, descriptions and units
-from the docstrings of their fields. Registered scenarios, learners and so on are included.
+Registered scenarios, learners and so on are included.
 """
 
-import inspect
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, NamedTuple
-
-from pydantic.fields import FieldInfo
+from typing import NamedTuple
 
 from ...core.functions.settings import FunctionSettings
-from ...core.plugins.models import kinds_at, models_of
-from ...core.plugins.registry import Plugged, SettingsRegistry
 from ...core.plugins.settings import Settings
 from ...core.plugins.words import expect, near
 from .conditions import ConditionSettings, Override, StageSettings
-from .docstrings import field_docstring
 from .presets import PRESETS
-from .schema import Schema, SpecSchema
+from .schema import REGISTRIES, KeySchema, Schema
 from .spec import Spec
-from .tables import SpecTable
+from .tables import flat
 
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 """Unit in the docstring of a field."""
@@ -38,6 +31,8 @@ TYPES = {
 """Types of JSON schemas in words."""
 BOUNDS = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
 """Bounds of JSON schemas in words."""
+NESTED_LISTS = "/Members"
+"""End of the reference to the only schema that refers to itself."""
 OWN_FUNCTION = "file.py:decide"
 """Placeholder for functions of users; their keyword-only parameters are further keys."""
 MAX_BOUND = 10**9
@@ -77,10 +72,10 @@ class Table(NamedTuple):
     """The ``kind`` of the table with these keys; empty for any."""
     within: str
     """The ``kind`` of the table above it; empty for any."""
+    model: str
+    """Name of the settings model; empty for the keys that several models have in common."""
     summary: str
-    """The first line of the docstring of its model."""
-    model: type[Settings]
-    """The settings model."""
+    """The first paragraph of the docstring of the model."""
     keys: tuple[Key, ...]
     """Keys of the table."""
 
@@ -97,8 +92,9 @@ class Table(NamedTuple):
         return (f"[{self.name}]" if self.name else "top of the spec") + kind + within
 
 
+@cache
 def tables() -> tuple[Table, ...]:
-    """Return every table of a spec: its own keys, then those of conditions, kind by kind.
+    """Return every table of a spec, and of each of its kinds.
 
     Examples
     --------
@@ -106,14 +102,19 @@ def tables() -> tuple[Table, ...]:
     >>> [key.name for key in by_name["scenario", "line-up"].keys]
     ['carts']
     """
-    own = (("", Spec), ("overrides", Override), ("curriculum", StageSettings))
-    heads = [_table(name, ("", ""), model, {}) for name, model in own]
-    return (*heads, *_below(ConditionSettings, "", "", set(), ()))
+    whole = _schema(ConditionSettings)
+    walk = _Walk(whole["$defs"])
+    return (
+        _table("", "", "", _schema(Spec)),
+        _table("overrides", "", "", _schema(Override)),
+        _table("curriculum", "", "", _schema(StageSettings)),
+        *walk.below("", "", whole, ()),
+        _table("learner", OWN_FUNCTION, "", _schema(FunctionSettings)),
+    )
 
 
-def of_functions() -> Table:
-    """Return the table of a learner that is a user's function."""
-    return _table("learner", (OWN_FUNCTION, ""), FunctionSettings, {})
+def _schema(model: type[Settings]) -> Schema:
+    return model.model_json_schema(schema_generator=KeySchema)
 
 
 def outline() -> dict[str, list[str]]:
@@ -136,7 +137,7 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
     """
     expect("a dotted prefix of keys", str, prefix=prefix)
     below = []
-    for table in (*tables(), of_functions()):
+    for table in tables():
         kept = tuple(
             key
             for key, name in zip(table.keys, table.full_names, strict=True)
@@ -147,111 +148,6 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
     return tuple(below)
 
 
-def _below(
-    model: type[Settings],
-    name: str,
-    within: str,
-    seen: set[tuple[str, type[Settings]]],
-    above: tuple[SettingsRegistry, ...],
-) -> Iterator[Table]:
-    """Yield the tables that the fields of a model hold, at any depth, each once.
-
-    Things of a registry are not listed again inside things of the same registry, as the learners of
-    the parts of a team are.
-    """
-    for field, info in model.model_fields.items():
-        place = f"{name}.{field}" if name else field
-        registry = registry_of(info)
-        if registry in above:
-            continue
-        inside = above if registry is None else (*above, registry)
-        for kind, held, inherited in _held(info):
-            if (place, held) in seen:
-                continue
-            seen.add((place, held))
-            table = _table(place, (kind, within), held, inherited)
-            if not kind and (kinds := kinds_of(info)):
-                table = table._replace(keys=(_kind(info, kinds), *table.keys))
-            if table.keys or kind:
-                yield table
-            yield from _below(held, place, kind or within, seen, inside)
-
-
-def settings_of(info: FieldInfo) -> list[type[Settings]]:
-    """Return the settings models that a field's annotation allows, in order."""
-    return [model for model in models_of(info.annotation) if issubclass(model, Settings)]
-
-
-def registry_of(info: FieldInfo) -> SettingsRegistry | None:
-    """Return the registry of a field, or None."""
-    mark = kinds_at(info)
-    return mark.registry if isinstance(mark, Plugged) else None
-
-
-def kinds_of(info: FieldInfo) -> dict[str, type[Settings]]:
-    """Return the models of a field by kind."""
-    registry = registry_of(info)
-    if registry is not None:
-        return {kind: registry.model(kind) for kind in registry.built_in}
-    models = settings_of(info)
-    return {m.model_fields["kind"].default: m for m in models if "kind" in m.model_fields}
-
-
-def _held(info: FieldInfo) -> Iterator[tuple[str, type[Settings], Mapping[str, FieldInfo]]]:
-    """Yield kind, model and inherited fields for each model of a field, the base model first."""
-    registry = registry_of(info)
-    kinds = kinds_of(info)
-    inherited: Mapping[str, FieldInfo] = {}
-    if registry is not None or kinds:
-        base = registry.base if registry is not None else _base(list(kinds.values()))
-        inherited = base.model_fields
-        yield "", base, {}
-    for kind, model in kinds.items():
-        yield kind, model, inherited if issubclass(model, base) else {}
-    if registry is None:
-        yield from (("", m, {}) for m in settings_of(info) if "kind" not in m.model_fields)
-
-
-def _base(models: Sequence[type[Settings]]) -> type[Settings]:
-    """Return the nearest common base class of models."""
-    ancestors = (cls for cls in models[0].__mro__[1:] if issubclass(cls, Settings))
-    return next(cls for cls in ancestors if all(issubclass(m, cls) for m in models))
-
-
-def _kind(info: FieldInfo, kinds: Iterable[str]) -> Key:
-    """Return the key ``kind`` of a table."""
-    own = "; or your own, file.py:NAME" if registry_of(info) is not None else ""
-    default = "required"
-    value = None if info.is_required() else info.get_default(call_default_factory=True)
-    if isinstance(value, Settings):
-        default = json.dumps(value.model_dump().get("kind", ""))
-    meaning = "Kind of the table; the other keys depend on it."
-    return Key("kind", "text", default, ", ".join(kinds) + own, "", meaning, "")
-
-
-def _table(
-    name: str, kinds: tuple[str, str], model: type[Settings], base: Mapping[str, FieldInfo]
-) -> Table:
-    laid = _laid_by_preset(name, kinds[0])
-    keys = tuple(
-        _key(model, field, laid.get(field))
-        for field, info in model.model_fields.items()
-        if field != "kind" and not (field in base and base[field].default == info.default)
-    )
-    summary = (inspect.getdoc(model) or "").partition("\n\n")[0]
-    return Table(name, *kinds, " ".join(summary.split()), model, keys)
-
-
-def _laid_by_preset(name: str, kind: str) -> SpecTable:
-    """Return a table of the preset `default` if it has this kind."""
-    table: Any = PRESETS["default"].table
-    for part in name.split("."):
-        table = table.get(part) if isinstance(table, Mapping) else None
-    if not isinstance(table, Mapping) or (kind and table.get("kind") != kind):
-        return {}
-    return table
-
-
 def nearest(prefix: str) -> str:
     """Return a hint at the keys that an unknown prefix may mean.
 
@@ -260,56 +156,130 @@ def nearest(prefix: str) -> str:
     >>> nearest("teammates")
     "did you mean 'learner.decision.teammates'?"
     """
-    all_tables = tables()
-    full = dict.fromkeys(name for table in all_tables for name in table.full_names)
-    names = [*dict.fromkeys(table.name for table in all_tables if table.name), *full]
+    full = dict.fromkeys(name for table in tables() for name in table.full_names)
     ending = [name for name in full if name.endswith(f".{prefix}")]
     if ending:
         return f"did you mean {' or '.join(map(repr, ending))}?"
+    names = [*dict.fromkeys(table.name for table in tables() if table.name), *full]
     tops = sorted({name.partition(".")[0] for name in full})
     return near(prefix, names) or f"known: {', '.join(tops)}"
 
 
-def _key(model: type[Settings], name: str, laid: object) -> Key:
-    """Return a key of a model; `laid` is its value in the preset, or None."""
-    info = model.model_fields[name]
-    meaning = field_docstring(model, name)
-    registry = registry_of(info)
-    default = _default(info)
+class _Walk:
+    """Walk over the tables in a JSON schema, each of which is yielded once.
+
+    Parameters
+    ----------
+    definitions
+        Schemas by the name to which ``$ref`` refers.
+    """
+
+    def __init__(self, definitions: Schema) -> None:
+        self._definitions = definitions
+        self._seen: set[tuple[str, str]] = set()
+
+    def below(
+        self, name: str, within: str, table: Schema, above: tuple[str, ...]
+    ) -> Iterator[Table]:
+        """Yield the tables that the keys of a table hold, at any depth.
+
+        Things of a registry are not listed again inside things of the same registry, as the
+        learners of the parts of a team are.
+        """
+        for key, schema in table["properties"].items():
+            registry = schema.get("title", "")
+            if registry not in above:
+                place = f"{name}.{key}".lstrip(".")
+                inside = (*above, registry) if registry in REGISTRIES else above
+                yield from self._tables(place, within, schema, inside)
+
+    def _tables(
+        self, name: str, within: str, schema: Schema, above: tuple[str, ...]
+    ) -> Iterator[Table]:
+        new = [own for own in self._objects(schema) if (name, repr(own)) not in self._seen]
+        self._seen |= {(name, repr(own)) for own in new}
+        kinds = [own for own in new if "const" in own["properties"].get("kind", ())]
+        common: Schema = {}
+        if kinds:
+            properties = [own["properties"] for own in kinds]
+            common = {
+                key: value
+                for key, value in properties[0].items()
+                if key != "kind" and all(own.get(key) == value for own in properties)
+            }
+            table = _table(name, "", within, {"properties": common})
+            names = [own["properties"]["kind"]["const"] for own in kinds]
+            yield table._replace(keys=(_kind(schema, names), *table.keys))
+        for own in new:
+            rest = {key: v for key, v in own["properties"].items() if key not in common}
+            kind = own["properties"]["kind"]["const"] if own in kinds else ""
+            if rest:
+                yield _table(name, kind, within, {**own, "properties": rest})
+            yield from self.below(name, kind or within, own, above)
+
+    def _objects(self, schema: Schema) -> Iterator[Schema]:
+        """Yield the schemas of the tables that a key may hold."""
+        if "$ref" in schema:
+            if schema["$ref"].endswith(NESTED_LISTS):
+                return
+            schema = self._definitions[schema["$ref"].rpartition("/")[2]]
+        if "properties" in schema and "title" in schema:
+            yield schema
+        inner = [schema.get(word) for word in ("items", "additionalProperties")]
+        for one in [*schema.get("anyOf", ()), *inner]:
+            if isinstance(one, Mapping):
+                yield from self._objects(dict(one))
+
+
+def _kind(schema: Schema, kinds: Sequence[str]) -> Key:
+    """Return the key ``kind`` of a table."""
+    own = "; or your own, file.py:NAME" if schema.get("title") in REGISTRIES else ""
+    default = json.dumps((schema.get("default") or {}).get("kind", kinds[0]))
+    meaning = "Kind of the table; the other keys depend on it."
+    return Key("kind", "text", default, ", ".join(kinds) + own, "", meaning, "")
+
+
+def _table(name: str, kind: str, within: str, schema: Schema) -> Table:
+    preset = dict(flat(PRESETS["default"].table))
+    if kind not in ("", preset.get(f"{name}.kind")):
+        preset = {}
+    required = schema.get("required", ())
+    keys = []
+    for key, own in schema["properties"].items():
+        if key == "kind":
+            continue
+        place = f"{name}.{key}"
+        value = preset.get(place, preset.get(f"{place}.kind"))
+        keys.append(_key(key, own, value, is_required=key in required))
+    summary = schema.get("description", "").partition("\n\n")[0]
+    return Table(
+        name, kind, within, schema.get("title", ""), " ".join(summary.split()), tuple(keys)
+    )
+
+
+def _key(name: str, schema: Schema, preset: object, *, is_required: bool) -> Key:
+    """Return a key with a schema; `preset` is its value in the preset, or None."""
+    meaning = schema.get("description", "")
     unit = UNIT.search(meaning)
-    if registry is not None:
+    default = "required" if is_required else _default(schema.get("default", {}))
+    shown = "" if preset is None or json.dumps(preset) == default else json.dumps(preset)
+    if schema.get("title") in REGISTRIES:
+        kinds = [one["properties"]["kind"].get("const") for one in schema["anyOf"][:-2]]
         type_ = "table"
-        allowed = f"kind: {', '.join(registry.built_in)}"
+        allowed = f"kind: {', '.join(kinds)}"
     else:
-        own = _properties(model)[name]
-        type_ = _type(own)
-        allowed = ", ".join(dict.fromkeys(_allowed(own)))
-    if isinstance(laid, Mapping):
-        laid = laid.get("kind")  # its other keys stand in a table of their own
-    preset = "" if laid is None else json.dumps(laid)
-    preset = "" if preset == default else preset
-    return Key(name, type_, default, allowed, unit[1] if unit else "", meaning, preset)
+        type_ = _type(schema)
+        allowed = ", ".join(dict.fromkeys(_allowed(schema)))
+    return Key(name, type_, default, allowed, unit[1] if unit else "", meaning, shown)
 
 
-@cache
-def _properties(model: type[Settings]) -> Schema:
-    """Return the JSON schema of each key of a model."""
-    schema = model.model_json_schema(schema_generator=SpecSchema)
-    name = schema.get("$ref", "").rpartition("/")[2]  # a model that may hold itself is a reference
-    properties: Schema = (schema["$defs"][name] if name else schema)["properties"]
-    return properties
-
-
-def _default(info: FieldInfo) -> str:
-    if info.is_required():
-        return "required"
-    value = info.get_default(call_default_factory=True)
+def _default(value: object) -> str:
+    """Return a default as text."""
     if value is None:
         return "none"
-    if isinstance(value, Settings):
-        kind = value.model_dump().get("kind")
-        return json.dumps(kind) if kind else "{}"
-    if value == tuple(range(8)):
+    if isinstance(value, Mapping):
+        return json.dumps(value["kind"]) if "kind" in value else "{}"
+    if value == list(range(8)):
         return "8"  # the seeds, which are written as their number
     return json.dumps(value)
 
@@ -320,7 +290,7 @@ def _type(schema: Schema) -> str:
         names = [_type(one) for one in schema["anyOf"] if one != {"type": "null"}]
         return " or ".join(dict.fromkeys(names))
     if "$ref" in schema:
-        return "nested lists of text" if schema["$ref"].endswith("/Members") else "table"
+        return "nested lists of text" if schema["$ref"].endswith(NESTED_LISTS) else "table"
     if "prefixItems" in schema:
         return f"pair of {_type(schema['prefixItems'][0])}"
     if schema.get("type") == "array":

@@ -1,9 +1,8 @@
 """Outline of a kept study, read without running any code that it names.
 
-The installed code that computes results is noted, too, so that an edit of it is reported. Each
-module on which a trial's numbers depend has a digest of its text, to see at once whether it may
-have changed, and one of its syntax tree, to see whether it has: comments and layout do not count.
-These are modules of this package, of packages that offer things to it, and those in `foreign_code`.
+The installed code that computes results is noted, too, so that an edit of it is reported: a digest
+of each module on which a trial's numbers depend. These are modules of this package, of packages
+that offer things to it, and those in `foreign_code`.
 """
 
 from __future__ import annotations
@@ -11,11 +10,10 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ...core.plugins.sources import Sources, meaning
+from ...core.plugins.sources import Sources
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..store.database import DATABASE, RESULTS_VERSION, SPEC_FILE
@@ -133,9 +131,7 @@ def other_spec(store: Store) -> str | None:
 
             copy = tomllib.loads(dumps(Spec.of(copy, sources_of(store)).table()))
             own = tomllib.loads(dumps(own))  # without what is None
-    except OSError as error:
-        return f"{path}: is not the spec of {DATABASE} in its folder: {error.strerror or error}"
-    except (ValueError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         return f"{path}: is not the spec of {DATABASE} in its folder: {error}"
     for key in sorted(own.keys() | copy.keys()):
         here = copy.get(key, "absent")
@@ -164,8 +160,8 @@ SILENT = ("checking", "pictures", "environments.py", "figure.py", "drawing.py")
 GROUPS = "nested_agents."
 """Prefix of the names of entry-point groups."""
 
-Code = dict[str, tuple[str, str]]
-"""Digests of the text and of the syntax tree of each module; of this package twice the text's."""
+Code = dict[str, str]
+"""Digest of each module, and version of each library."""
 
 
 def modules() -> dict[str, str]:
@@ -192,54 +188,29 @@ def _offering() -> list[str]:
     return sorted(packages - {__name__.partition(".")[0]})
 
 
-def present(
-    known: Mapping[str, tuple[str, str]] | None, table: SpecTable, texts: Mapping[str, str]
-) -> Code:
+def present(table: SpecTable, texts: Mapping[str, str]) -> Code:
     """Return digests of the code that computes a study, and versions of libraries.
 
     Parameters
     ----------
-    known
-        Digests of earlier code; a module with the same text is not parsed again.
     table
         The spec as a table.
     texts
         Texts of the users' files that it names.
     """
-    digests: Code = {}
-    known = known or {}
     files, versions = foreign_code(table, texts)
     read = {n: p.read_text(encoding="utf-8", errors="replace") for n, p in files.items()}
-    for name, text in (modules() | read).items():
-        digest = hashlib.sha256(text.encode()).hexdigest()[:16]
-        if name in known and known[name][0] == digest:
-            digests[name] = known[name]
-        else:  # this package is installed as a whole; parsing all of it would take half a second
-            digests[name] = digest, digest if _is_ours(name) else _meaning(text, name) or digest
-    return digests | {name: (version, version) for name, version in versions.items()}
+    digests = {
+        name: hashlib.sha256(text.encode()).hexdigest()[:16]
+        for name, text in (modules() | read).items()
+    }
+    return digests | versions
 
 
-def _meaning(text: str, name: str) -> str | None:
-    """Return the digest of a module's syntax tree; None if it is a template or no Python."""
-    with suppress(ValueError):
-        return meaning(text, name)
-    return None
-
-
-def changed(known: Mapping[str, tuple[str, str]], here: Code) -> list[str]:
+def changed(known: Mapping[str, str], here: Code) -> list[str]:
     """Return the modules and libraries that differ from known ones, or are new or gone."""
-    edited = [name for name in here if name in known and here[name][1] != known[name][1]]
-    return sorted(known.keys() ^ here.keys()) + edited
-
-
-def fingerprint(code: Mapping[str, tuple[str, str]]) -> str:
-    """Return one digest of what all modules of this package mean; of other packages none."""
-    own = [f"{name} {code[name][1]}" for name in sorted(code) if _is_ours(name)]
-    return hashlib.sha256("\n".join(own).encode()).hexdigest()[:32]
-
-
-def _is_ours(name: str) -> bool:
-    return name.partition("/")[0] in {pattern.partition("/")[0] for pattern in COMPUTING}
+    names = sorted(known.keys() | here.keys())
+    return [name for name in names if known.get(name) != here.get(name)]
 
 
 def older_results(store: Store) -> str | None:
@@ -256,8 +227,7 @@ def outdated(store: Store) -> str | None:
     """Return one line if this code does not continue a study, else None."""
     if store.is_older:
         return older_results(store)
-    known = store.code()
-    modules = changed(known, present(known, store.spec(), store.sources()))
+    modules = changed(store.code(), present(store.spec(), store.sources()))
     if not modules:
         return None
     more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"

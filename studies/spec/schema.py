@@ -20,13 +20,13 @@ from .studies import STUDIES
 Schema = dict[str, Any]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-NAMES = ("scenario", "topology", "learner", "exploration", "evaluator")
+REGISTRIES = ("scenario", "topology", "learner", "exploration", "evaluator")
 """Registries of tables with kinds."""
 LISTS: Schema = {"$ref": "#/$defs/lists"}
 """Lists of values by dotted key, or by table."""
 
 
-class SpecSchema(GenerateJsonSchema):
+class KeySchema(GenerateJsonSchema):
     """Generator of the schema of settings, with the docstrings of their fields."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> Schema:
@@ -41,6 +41,10 @@ class SpecSchema(GenerateJsonSchema):
         """Return the schema of tables of several kinds; the kind may be left out."""
         union = super().tagged_union_schema(schema)
         return {"anyOf": union["oneOf"]}
+
+
+class SpecSchema(KeySchema):
+    """Generator of the schema of the tables of a spec."""
 
     def field_is_required(self, field: object, total: bool) -> bool:
         """Return False: a preset may have the key."""
@@ -101,7 +105,7 @@ def _share(part: Any, shared: Schema) -> Any:
         if key != "title" or isinstance(value, dict)
     }
     name = part.get("title")
-    if name not in NAMES or "anyOf" not in plain:
+    if name not in REGISTRIES or "anyOf" not in plain:
         return plain
     shared.setdefault(name, {"anyOf": plain.pop("anyOf")})
     return plain | {"$ref": f"#/$defs/{name}"}

@@ -102,13 +102,13 @@ class StudyNotes:
     """Measures of an episode."""
     planned: Sequence[Planned] = ()
     """All trials of the study."""
-    code: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """Two digests of the installed code, by module."""
+    code: Mapping[str, str] = field(default_factory=dict)
+    """Digests of the installed code, by module."""
 
     @property
     def code_digest(self) -> str:
         """One short digest of all modules."""
-        text = "".join(f"{name} {tree} " for name, (_, tree) in sorted(self.code.items()))
+        text = "".join(f"{name} {digest} " for name, digest in sorted(self.code.items()))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

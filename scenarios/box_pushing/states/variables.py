@@ -372,5 +372,5 @@ _PROGRESS = np.array([_INDEX[name] for name in ("box_distance", "approach", "box
 
 def progress_of(batch: SituationBatch) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return distance [m], approach [m] and turn [rad] of the box ``(m,)`` in all situations."""
-    distance, nearer, turn = evaluate(batch, _FIRST, _PROGRESS)[0].T
-    return distance, nearer, turn
+    distance, approach, turn = np.ascontiguousarray(evaluate(batch, _FIRST, _PROGRESS)[0].T)
+    return distance, approach, turn

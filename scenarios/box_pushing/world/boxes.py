@@ -21,14 +21,15 @@ from shapely.geometry import Point, Polygon
 
 from ....core.numerics import FloatArray
 from ....core.plugins.words import closest
-from .geometry import BoxShape, Moments, Outline, moments
+from .geometry import BoxShape
 from .polygons import (
     LEAST_PIECE,
+    Moments,
     Vertices,
     box2d_area,
-    centred_polygon,
+    checked_polygon,
     convex_pieces,
-    nearby_origin,
+    moments,
     polygon_edges,
 )
 from .settings import GRAVITY, BoxSettings
@@ -58,7 +59,7 @@ class BoxSpec:
     name: str
     """Name in specs."""
     vertices: Vertices = ()
-    """Outline [m], anywhere in the plane; the frame of the box is centred afterwards."""
+    """Outline [m]; the frame of the box is centered afterwards."""
     holes: tuple[Vertices, ...] = ()
     """Outlines of holes [m]."""
     radius: float = 0.0
@@ -81,25 +82,24 @@ class BoxSpec:
         _ = self.polygon  # what cannot be one is refused at once
 
     @cached_property
-    def _centred(self) -> tuple[Polygon, FloatArray]:
+    def _centered(self) -> tuple[Polygon, FloatArray]:
         """The polygon around its centroid, and the center of mass ``(2,)`` in its frame."""
-        polygon, centroid = centred_polygon(self.name, self.vertices, self.holes)
-        if self.center_of_mass is None:
-            return polygon, np.zeros(2)
-        center = np.array(self.center_of_mass) - centroid
-        if not polygon.convex_hull.contains(Point(center)):
+        polygon = checked_polygon(self.name, self.vertices, self.holes)
+        centroid = np.array(polygon.centroid.coords[0])
+        center = np.zeros(2) if self.center_of_mass is None else self.center_of_mass - centroid
+        if not polygon.convex_hull.contains(Point(centroid + center)):
             raise ValueError(
                 f"box {self.name!r}: center_of_mass = {self.center_of_mass}, must be within its "
                 "outline, or the box would tip over"
             )
-        return polygon, center
+        return translate(polygon, *-centroid), center
 
     @cached_property
     def polygon(self) -> Polygon | None:
         """The polygon in the frame of the box; None for a disc."""
         if not self.vertices:
             return None
-        polygon, center = self._centred
+        polygon, center = self._centered
         return translate(polygon, *-center)
 
     @cached_property
@@ -109,13 +109,6 @@ class BoxSpec:
             angles = np.linspace(0, 2 * pi, 65)
             return [self.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)]
         return [np.array(ring.coords) for ring in (self.polygon.exterior, *self.polygon.interiors)]
-
-    @cached_property
-    def outline(self) -> Outline:
-        """The surface, in the frame of the box."""
-        if self.polygon is None:
-            return Outline(np.zeros((1, 4)), self.radius)
-        return Outline(polygon_edges(self.polygon))
 
     @cached_property
     def fixtures(self) -> tuple[FloatArray, ...]:
@@ -141,8 +134,8 @@ class BoxSpec:
         if self.polygon is None:
             area = pi * self.radius**2
             quarter = pi * self.radius**4 / 4
-            return Moments(area, np.zeros(2), quarter * np.eye(2), area * self.radius * 2 / 3)
-        return moments(polygon_edges(self._centred[0]))
+            return Moments(area, quarter * np.eye(2), area * self.radius * 2 / 3)
+        return moments(polygon_edges(self._centered[0]))
 
     @property
     def area(self) -> float:
@@ -156,8 +149,8 @@ class BoxSpec:
 
     @cached_property
     def reach(self) -> float:
-        """Distance from the centre within which all of the box lies [m]."""
-        return self.outline.radius
+        """Distance from the center within which all of the box lies [m]."""
+        return float(np.linalg.norm(np.vstack(self.rings), axis=1).max())
 
     @property
     def friction_force(self) -> float:
@@ -166,7 +159,7 @@ class BoxSpec:
 
     @property
     def friction_radius(self) -> float:
-        """Mean distance of the area from the centre [m].
+        """Mean distance of the area from the center [m].
 
         Ground friction resists pure turning with `friction_force` times this lever.
         """
@@ -175,8 +168,8 @@ class BoxSpec:
     @cached_property
     def shape(self) -> BoxShape:
         """Outline and friction radius, for kernels."""
-        outline = self.outline
-        return BoxShape(outline.edges, outline.rounding, self.friction_radius)
+        edges = np.zeros((1, 4)) if self.polygon is None else polygon_edges(self.polygon)
+        return BoxShape(edges, self.radius, self.friction_radius)
 
     @cached_property
     def friction_points(self) -> FloatArray:
@@ -192,24 +185,24 @@ class BoxSpec:
 
     @cached_property
     def width(self) -> tuple[float, float]:
-        """Least and greatest y of the box [m]: how broad it looks from behind."""
-        ends = self.outline.edges.reshape(-1, 2)[:, 1]
-        return float(ends.min()) - self.outline.rounding, float(ends.max()) + self.outline.rounding
+        """Minimum and maximum y of the box [m]."""
+        ys = np.vstack(self.rings)[:, 1]
+        return float(ys.min()), float(ys.max())
 
     def scaled(self, factor: float) -> BoxSpec:
         """Return the box with mass and lengths, or those that grow, multiplied by `factor`."""
         along = 1.0 if self.grows == "width" else factor
-        x0, y0 = nearby_origin(self.vertices) if self.vertices else (0.0, 0.0)
-        centers: Vertices = () if self.center_of_mass is None else (self.center_of_mass,)
-        outline, centers, *holes = [
+        x0, y0 = self.vertices[0] if self.vertices else (0.0, 0.0)
+        center: Vertices = () if self.center_of_mass is None else (self.center_of_mass,)
+        vertices, center, *holes = [
             tuple((along * (x - x0), factor * (y - y0)) for x, y in points)
-            for points in (self.vertices, centers, *self.holes)
+            for points in (self.vertices, center, *self.holes)
         ]
         return replace(
             self,
-            vertices=outline,
+            vertices=vertices,
             holes=tuple(holes),
-            center_of_mass=centers[0] if centers else None,
+            center_of_mass=center[0] if center else None,
             radius=along * self.radius,
             mass=factor * self.mass,
         )

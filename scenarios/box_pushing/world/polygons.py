@@ -1,28 +1,27 @@
 """Simple polygons, concave or with holes, as outlines of boxes.
 
 Box2D takes convex polygons of at most 8 vertices and silently gets others wrong. Every polygon is
-therefore checked, centered on its centroid and cut into convex pieces here.
+therefore checked and cut into convex pieces here.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import shapely
-from shapely.affinity import translate
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
-from ....core.numerics import FloatArray
-from .geometry import moments, ring_edges
+from ....core.numerics import FloatArray, quadrature
 
 Vertices = Sequence[tuple[float, float]]
 
 UNIT = 10.0
-"""Box2D units per metre."""
+"""Box2D units per meter."""
 MAX_VERTICES = 8
 """Maximum number of vertices of a convex piece in Box2D, b2_maxPolygonVertices."""
 MOST_VERTICES = 1000
@@ -31,15 +30,43 @@ LEAST_EDGE = 1e-6
 """Shortest edge [m]."""
 LEAST_PIECE = 1.1921e-9
 """Smallest area of a convex piece [m2]: Box2D takes none below the epsilon of single precision."""
-LARGEST = 100.0
-"""Maximum distance between two vertices [m]."""
-FAR = 10.0
-"""Distance from the origin, in lengths of a polygon, beyond which its vertices are taken relative
-to its first one: moments about a far origin lose all digits."""
-RESOLUTION = 1e-7
-"""Coarsest spacing of floating-point coordinates, in lengths of a polygon."""
+FARTHEST = 100.0
+"""Maximum coordinate of a vertex [m]."""
 STRAIGHT = 1e-9
 """Sine of the angle between edges that counts as straight on."""
+
+
+class Moments(NamedTuple):
+    """Moments of an area about the origin."""
+
+    area: float
+    """Area [m2]."""
+    second: FloatArray
+    """``(2, 2)`` integrals of the products of coordinates [m4]."""
+    radial: float
+    """Integral of the distance from the origin [m3]."""
+
+
+def moments(edges: FloatArray) -> Moments:
+    """Return the moments of the area within directed edges ``(n, 4)``, material on the left.
+
+    They are sums over the signed triangles between the origin and each edge, exact except for
+    `radial`, which is a 64-point Gauss-Legendre quadrature along each edge.
+    """
+    a = edges[:, :2]
+    b = edges[:, 2:]
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    second = sum(np.einsum("n,ni,nj->ij", cross, p, p) for p in (a, b, a + b)) / 24
+    nodes, weights = quadrature(64)
+    t = (nodes + 1) / 2
+    points = a[:, None] + t[:, None] * (b - a)[:, None]
+    mean_distance = np.hypot(points[..., 0], points[..., 1]) @ weights / 2
+    return Moments(float(cross.sum() / 2), second, float((cross * mean_distance).sum() / 3))
+
+
+def ring_edges(vertices: FloatArray) -> FloatArray:
+    """Return the edges ``(n, 4)`` of a closed ring of vertices ``(n, 2)``."""
+    return np.hstack([vertices, np.roll(vertices, -1, axis=0)])
 
 
 def polygon_edges(polygon: Polygon) -> FloatArray:
@@ -48,29 +75,36 @@ def polygon_edges(polygon: Polygon) -> FloatArray:
     return np.vstack([ring_edges(np.asarray(ring.coords)[:-1]) for ring in rings])
 
 
-def centred_polygon(
-    name: str, vertices: Vertices, holes: Sequence[Vertices] = ()
-) -> tuple[Polygon, FloatArray]:
-    """Return a checked polygon around its centroid, and where the centroid was ``(2,)`` [m].
+def checked_polygon(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Polygon:
+    """Return an oriented polygon.
 
     A clockwise outline is reversed with a warning.
 
     Raises
     ------
     ValueError
-        If the polygon has more than `MOST_VERTICES`, is too large, has two vertices at one place,
-        crosses or touches itself, has no area, or a vertex is not finite or too far away for its
-        floating-point coordinates. Fewer than 3 vertices are refused by `BoxSettings`.
+        If the polygon has more than `MOST_VERTICES`, a vertex is not finite or too far away, two
+        vertices are at one place, or it crosses or touches itself or has no area.
     """
+    points = [*vertices, *(point for hole in holes for point in hole)]
+    if len(points) > MOST_VERTICES:
+        raise ValueError(f"box {name!r}: {len(points)} vertices, allowed: {MOST_VERTICES} or fewer")
+    for x, y in points:
+        if not max(abs(x), abs(y)) <= FARTHEST:
+            raise ValueError(
+                f"box {name!r}: vertex ({x:g}, {y:g}), coordinates must be at most {FARTHEST:g} m"
+            )
     for ring in (vertices, *holes):
-        _check_ring(f"box {name!r}", ring)
-    if (count := sum(map(len, (vertices, *holes)))) > MOST_VERTICES:
-        raise ValueError(f"box {name!r}: {count} vertices, allowed: {MOST_VERTICES} or fewer")
+        for k, (x, y) in enumerate(ring):
+            before = ring[k - 1]
+            if np.hypot(x - before[0], y - before[1]) < LEAST_EDGE:
+                raise ValueError(
+                    f"box {name!r}: two vertices at the same place ({x:g}, {y:g}), allowed: each "
+                    "once, the first not again at the end"
+                )
     polygon = Polygon(vertices, holes)
     if not polygon.is_valid:
         raise ValueError(f"box {name!r}: not a simple polygon: {explain_validity(polygon)}")
-    origin = nearby_origin(vertices)
-    polygon = translate(polygon, *-origin)
     if not polygon.area > 1e-6 * polygon.length**2:
         raise ValueError(
             f"box {name!r}: area {polygon.area:.3g} m2 within {polygon.length:.3g} m of outline, "
@@ -78,43 +112,7 @@ def centred_polygon(
         )
     if not polygon.exterior.is_ccw:
         warnings.warn(f"box {name!r}: clockwise outline, was reversed", stacklevel=2)
-    polygon = orient(polygon)
-    area = moments(polygon_edges(polygon))
-    centroid = area.first / area.area
-    return translate(polygon, *-centroid), origin + centroid
-
-
-def nearby_origin(vertices: Vertices) -> FloatArray:
-    """Return the point ``(2,)`` that vertices are taken relative to: the first if all are far."""
-    ring = np.asarray(vertices, dtype=float)
-    is_far = np.abs(ring).max() > FAR * np.ptp(ring, axis=0).max()
-    return ring[0] if is_far else np.zeros(2)
-
-
-def _check_ring(box: str, vertices: Vertices) -> None:
-    """Refuse an outline that no body can have."""
-    ring = np.asarray(vertices, dtype=float)
-    if not np.isfinite(ring).all():
-        raise ValueError(f"{box}: a vertex that is not finite, allowed: numbers in metres")
-    # Halved before they are subtracted: the difference of two numbers may overflow.
-    extent = 2 * float(np.ptp(ring / 2, axis=0).max())
-    if extent > LARGEST:
-        raise ValueError(f"{box}: is {extent:.3g} m long, allowed: up to {LARGEST:g} m")
-    spacing = float(np.spacing(np.abs(ring).max()))
-    if spacing > RESOLUTION * extent > 0:
-        raise ValueError(
-            f"{box}: coordinates of {np.abs(ring).max():.3g} m are {spacing:.2g} m apart, too "
-            f"coarse for {extent:.3g} m of outline, allowed: coordinates from a point nearby"
-        )
-    edges = np.roll(ring, -1, axis=0) - ring
-    short = np.flatnonzero(np.hypot(edges[:, 0], edges[:, 1]) < LEAST_EDGE)
-    if len(short):
-        first = short[0] + 1
-        second = (short[0] + 1) % len(ring) + 1
-        raise ValueError(
-            f"{box}: vertices {first} and {second} are at the same place {vertices[short[0]]}, "
-            "allowed: each once, the first not again at the end"
-        )
+    return orient(polygon)
 
 
 def _turns(ring: FloatArray) -> FloatArray:

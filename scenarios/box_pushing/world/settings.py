@@ -1,28 +1,15 @@
-"""The settings of robots, boxes, sensors and failures; the reward (Section VI, Eq. 15-17).
+"""Settings of the reward, of robots, boxes, sensors and failures."""
 
-The paper's five conditions overlap: two robots in contact are also within range, and if no robot
-is within range then some robot is not. They are tested from the most specific to the least:
-C1 and C2 (all in contact), C3 (all within range), C5 (none), C4 (some not). The paper has one
-penalty term per robot, R2 and R3 for its two; here every robot has one, with the same constants.
-
-In a large team nearly always some robot is out of contact, and the conditions do not distinguish
-it from the others. Therefore each robot can be rewarded separately (`RewardSettings.of`): the
-conditions then apply to its own contact and its own reading.
-
-A learner treats a terminal state as if it lasted forever. If the goal is reached while one robot is
-out of contact, the conditions would punish this forever. Therefore reaching the goal always pays
-c1, the value of R1 there (`RewardSettings.pays_at_goal`).
-"""
-
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, Self, Union, get_args
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, Union, get_args
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ....core.numerics import BoolArray, FloatArray, njit
+from ....core.numerics import FloatArray
 from ....core.plugins.settings import Names, NonNegative, Positive, Settings
 from ....core.plugins.sources import active
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
+from .infrared import Response, readings_at
 
 GRAVITY = 9.81
 """Standard acceleration of free fall [m/s2], rounded."""
@@ -233,18 +220,14 @@ class InfraredSettings(Settings):
         return self
 
     @property
-    def index(self) -> int:
-        """Index of the normalisation, by which kernels know it."""
-        return get_args(Normalisation).index(self.normalisation)
+    def response(self) -> Response:
+        """Constants of the response, for kernels."""
+        return Response(self.reach, self.decay, get_args(Normalisation).index(self.normalisation))
 
     def reading(self, distance: FloatArray) -> FloatArray:
         """Return the readings at distances [m] straight ahead; negative distances touch."""
-        distance = np.maximum(distance, 0.0)
-        if self.normalisation == "exponential":
-            near = np.exp(-distance / self.decay)
-        else:
-            near = 1.0 - distance / self.reach if self.normalisation == "linear" else 1.0
-        return np.where(distance < self.reach, near, 0.0)
+        readings: FloatArray = readings_at(np.ravel(distance), self.response)
+        return readings.reshape(np.shape(distance))
 
     def noisy(self, readings: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return readings with their error; without noise nothing is drawn."""
@@ -256,114 +239,3 @@ class InfraredSettings(Settings):
 def label(thing: str | Settings) -> str:
     """Return the name of a thing, or what it consists of, as text that can be read back."""
     return thing if isinstance(thing, str) else thing.model_dump_json()
-
-
-class Task(NamedTuple):
-    """Task of the robots: reward, and tolerances of the goal."""
-
-    reward: RewardSettings
-    tolerance: float
-    """Distance from the goal that counts as reached [m]."""
-    orientation_tolerance: float | None
-    """Orientation error that still counts as reached [rad]; none: any."""
-
-    def reached(self, distance: FloatArray, orientation: FloatArray) -> BoolArray:
-        """Return whether the goal is reached ``(m,)``; parameters as of `reward`."""
-        near = distance <= self.tolerance
-        most = self.orientation_tolerance
-        return near if most is None else near & (np.abs(orientation) <= most)
-
-
-def reward(
-    task: Task,
-    distance: FloatArray,
-    approach: FloatArray,
-    orientation: FloatArray,
-    contact: BoolArray,
-    readings: FloatArray,
-) -> FloatArray:
-    """Return the reward of ``m`` situations: ``(m, 1)`` of the team, or ``(m, M)`` of every robot.
-
-    Parameters
-    ----------
-    task
-        The constants, and what counts as reached.
-    distance
-        ``(m,)`` of the box from the goal [m].
-    approach
-        ``(m,)`` change of that distance since the last decision [m]; negative: nearer.
-    orientation
-        ``(m,)`` orientation error of the box [rad].
-    contact
-        ``(m, M)`` whether each robot touches the box.
-    readings
-        ``(m, M)`` strongest infrared reading of the box by each robot, 0 when out of range.
-
-    Examples
-    --------
-    Out of range of both robots (Condition 5):
-
-    >>> ones, none = np.ones(1), np.zeros((1, 2))
-    >>> task = Task(RewardSettings(), tolerance=0.05, orientation_tolerance=None)
-    >>> reward(task, ones, ones, ones, none.astype(bool), none).tolist()
-    [[-0.002]]
-    """
-    settings = task.reward
-    penalties = settings.c2 * np.exp(-settings.r2 * readings)
-    if settings.of == "team":
-        penalties = np.add.reduce(penalties, axis=1, keepdims=True)
-    nearness = settings.c1 * np.exp(-settings.r1 * distance)[:, None]
-    attraction = nearness if settings.attraction_without_contact else 0.0
-    return _gained(
-        nearness - penalties - settings.c4 * np.abs(orientation)[:, None],
-        attraction - penalties,
-        approach < -settings.least_approach,
-        task.reached(distance, orientation) & settings.pays_at_goal,
-        np.ascontiguousarray(contact),
-        np.ascontiguousarray(readings > 0.0),
-        _Constants(
-            settings.c1, settings.receding, settings.some_out_of_range, settings.all_out_of_range
-        ),
-    )
-
-
-class _Constants(NamedTuple):
-    """Constant rewards at the goal and under Conditions 2, 4 and 5."""
-
-    at_goal: float
-    receding: float
-    some_out: float
-    all_out: float
-
-
-@njit(cache=True)
-def _gained(
-    pushing: FloatArray,
-    within_range: FloatArray,
-    nearer: BoolArray,
-    there: BoolArray,
-    contact: BoolArray,
-    within: BoolArray,
-    constants: _Constants,
-) -> FloatArray:
-    """Return the reward ``(m, parties)`` by the conditions; see `reward`.
-
-    A party is the team, or each robot. `pushing` and `within_range` are the rewards ``(m,
-    parties)`` under Conditions 1 and 3, `contact` and `within` are ``(m, M)``, the others ``(m,)``.
-    """
-    n_situations, n_parties = pushing.shape
-    members = contact.shape[1] // n_parties
-    out = np.empty((n_situations, n_parties))
-    for s in range(n_situations):
-        for party in range(n_parties):
-            touch = contact[s, party * members : (party + 1) * members].all()
-            near = within[s, party * members : (party + 1) * members]
-            if there[s]:
-                out[s, party] = constants.at_goal
-            elif touch:
-                out[s, party] = pushing[s, party] if nearer[s] else constants.receding
-            elif near.all():
-                out[s, party] = within_range[s, party]
-            else:
-                out[s, party] = constants.some_out if near.any() else constants.all_out
-    return out

@@ -113,14 +113,13 @@ def approach(
 
     If there are several, as in a hollow, it is the outermost: bracketed on a grid, then bisected.
     """
-    outline = box.outline
     dx = cos(azimuth)
     dy = sin(azimuth)
 
     def clear(t: float) -> bool:
         x = origin[0] + t * dx
         y = origin[1] + t * dy
-        return surface(outline.edges, outline.rounding, x, y)[0] >= gap
+        return surface(box.shape, x, y)[0] >= gap
 
     step = 2 * (box.reach + gap) / GRID
     low = max((i * step for i in range(GRID) if not clear(i * step)), default=0.0)

@@ -17,7 +17,8 @@ import numpy as np
 from Box2D import _Box2D
 
 from ....core.numerics import FloatArray, IntArray, njit
-from .geometry import InfraredSensors, gaps, infrared_readings
+from .geometry import BoxShape, gaps
+from .infrared import InfraredSensors, infrared_readings
 from .robots import WheelModel, wheel_wrenches
 
 if TYPE_CHECKING:
@@ -56,9 +57,8 @@ class Physics(NamedTuple):
     """Units of Box2D per metre."""
     wheels: WheelModel
     """Wheels, in units of Box2D."""
-    edges: FloatArray
-    """Outline of the box, as what follows."""
-    rounding: float
+    shape: BoxShape
+    """Outline of the box."""
     radii: FloatArray
     """``(M,)`` radii of the robots [m]."""
     touching: float
@@ -118,7 +118,7 @@ def advance(
             poses[r, 0] = load(bodies[r] + POSITION) / unit
             poses[r, 1] = load(bodies[r] + POSITION + 4) / unit
             poses[r, 2] = load(bodies[r] + ANGLE)
-        apart = gaps(poses[1:], poses[:1], physics.edges, physics.rounding, physics.radii)
+        apart = gaps(poses[1:], poses[0], physics.shape, physics.radii)
         for r in range(n_robots):
             touched[r] += apart[r] < physics.touching
     return poses, apart, touched / len(speeds)
@@ -149,11 +149,10 @@ def advance_many(
     for w in range(count):
         held[:] = speeds[w]
         poses[w], apart[w], _ = advance(physics, addresses[w], held, last[w], wrenches[w])
-        readings = infrared_readings(
-            poses[w, 1:], poses[w, 0], physics.edges, physics.rounding, sensors
-        )
+        robots = poses[w, 1:]
+        readings = infrared_readings(robots, poses[w, 0], apart[w], physics.shape, sensors)
         for r in range(n_bodies - 1):
-            strongest[w, r] = readings[0, r].max()
+            strongest[w, r] = readings[r].max()
     return poses, apart, strongest
 
 

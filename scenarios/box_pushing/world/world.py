@@ -26,7 +26,8 @@ import numpy as np
 from ....core.numerics import BoolArray, FloatArray, IntArray
 from ...faults.settings import Failures, FailureSettings, Free
 from .boxes import BoxSpec
-from .geometry import InfraredSensors, gaps, infrared_readings
+from .geometry import gaps
+from .infrared import InfraredSensors, infrared_readings
 from .polygons import UNIT
 from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
@@ -117,11 +118,7 @@ class World:
         self.dt = CONTROL_PERIOD / SUBSTEPS
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
         self._sensors = InfraredSensors(
-            self._radii,
-            sensor_directions(robots),
-            self.sensor.reach,
-            self.sensor.decay,
-            self.sensor.index,
+            self._radii, sensor_directions(robots), self.sensor.response
         )
         self.set_grip(np.ones(self.n_wheels))
         around = 2.0 * box.reach * np.arange(1, len(robots) + 1)
@@ -135,15 +132,13 @@ class World:
         self._grip: FloatArray = np.array(grip, dtype=float)
         if self._grip.shape != (self.n_wheels,) or not (self._grip >= 0).all():
             raise ValueError(f"grip: {grip}, must be {self.n_wheels} numbers >= 0")
-        outline = self.box.outline
         self._physics = Physics(
             step_address() or 0,
             SUBSTEPS,
             self.dt,
             UNIT,
             wheel_model(self.robots, self.dt, self._grip, UNIT),
-            outline.edges,
-            outline.rounding,
+            self.box.shape,
             self._radii,
             TOUCHING,
         )
@@ -269,14 +264,9 @@ class World:
         return np.array(velocities) / (UNIT, UNIT, 1.0)
 
     def infrared(self) -> FloatArray:
-        """Return the noise-free readings of the infrared sensors ``(2, M, S)``.
-
-        The first are of the box alone, the second of the other robots alone; a sensor reads the
-        maximum of both.
-        """
-        outline = self.box.outline
+        """Return the noise-free readings of the box by all infrared sensors ``(M, S)``."""
         return infrared_readings(
-            self.robot_poses, self.box_pose, outline.edges, outline.rounding, self._sensors
+            self.robot_poses, self.box_pose, self.gaps, self.box.shape, self._sensors
         )
 
     def _step(self, speeds: FloatArray) -> None:
@@ -292,10 +282,9 @@ class World:
 
     def _observe(self) -> None:
         """Read poses and find contacts."""
-        outline = self.box.outline
         poses = np.array([(*body.position, body.angle) for body in (self._box, *self._bodies)])
         poses /= UNIT, UNIT, 1.0
-        self.gaps = gaps(poses[1:], poses[:1], outline.edges, outline.rounding, self._radii)
+        self.gaps = gaps(poses[1:], poses[0], self.box.shape, self._radii)
         self._know(poses)
 
     def _know(self, poses: FloatArray) -> None:

@@ -136,7 +136,7 @@ class TuneOptions(Budget, options.RunOptions):
 def tune(
     spec: Path, out: Path, trust: bool, changes: tuple[str, ...], **choice: Unpack[TuneOptions]
 ) -> int:
-    """Look for better settings of a spec, on seeds that no report uses; again, it continues.
+    """Search for better settings of a spec on separate seeds; the same command resumes it.
 
     SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
     configurations are tried on two seeds, the better half on four, and so on.
@@ -183,7 +183,7 @@ class Supposed(TypedDict):
 @options.trust
 @options.changes
 def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Unpack[Supposed]) -> int:
-    """Estimate the time and memory of a study, and the differences that it can detect.
+    """Estimate the time of a study, and the differences that it can detect.
 
     SPEC.toml is the spec of the study. Every condition runs some pilot episodes; nothing is kept.
     """

@@ -47,7 +47,7 @@ def pushing_points(sources: Sources):
 def test_points_are_as_far_from_the_box_as_is_said_and_face_it(pushing_points, box) -> None:
     points = pushing_points(box, 8, GAP)
     for x, y, direction in points:
-        gap, nx, ny, _, _ = surface(box.outline.edges, box.outline.rounding, x, y)
+        gap, nx, ny = surface(box.shape, x, y)
         assert gap == pytest.approx(GAP, abs=1e-3)  # arcs have corners
         assert np.cos(direction) * nx + np.sin(direction) * ny == pytest.approx(-1.0)
     assert len({(round(x, 6), round(y, 6)) for x, y, _ in points}) == 8

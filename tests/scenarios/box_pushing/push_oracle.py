@@ -11,8 +11,14 @@ import numpy as np
 from world_oracles import surface_numpy
 
 from nested_agents.core.numerics import FloatArray
-from nested_agents.scenarios.box_pushing.prediction.push import SUBSTEPS, SWEEPS, PushModel
-from nested_agents.scenarios.box_pushing.prediction.push_lanes import CREEP, MARGIN, START_SPEED
+from nested_agents.scenarios.box_pushing.prediction.push import (
+    CREEP,
+    MARGIN,
+    START_SPEED,
+    SUBSTEPS,
+    SWEEPS,
+    PushModel,
+)
 
 
 @dataclass
@@ -68,7 +74,7 @@ def _near(
     """Return distance, outward normal and nearest point from the box's centre, world frame."""
     turn = np.array([[np.cos(box[2]), -np.sin(box[2])], [np.sin(box[2]), np.cos(box[2])]])
     x, y = turn.T @ (pose[:2] - box[:2])
-    distance, nx, ny, px, py = surface_numpy(model.edges, model.rounding, x, y)
+    distance, nx, ny, px, py = surface_numpy(model.shape, x, y)
     return distance, turn @ [nx, ny], turn @ [px, py]
 
 
@@ -98,7 +104,7 @@ def _contact(
 
 def _solve(contacts: list[_Contact], model: PushModel) -> FloatArray:
     """Find the contact forces by Gauss-Seidel sweeps; return the velocity of the box."""
-    per_wrench = np.array([1.0, 1.0, model.friction_radius**-2])
+    per_wrench = np.array([1.0, 1.0, model.shape.friction_radius**-2])
     mobility = START_SPEED / model.friction_force
     velocity: FloatArray = np.zeros(3)
     for _ in range(SWEEPS):

@@ -52,9 +52,9 @@ def test_constant_twists_lead_along_arcs() -> None:
 
 def test_ways_lead_around_the_box() -> None:
     box = BOXES["square"]
-    edges, target = box.outline.edges, np.array([0.0, 0.3])
+    target = np.array([0.0, 0.3])
     poses = np.array([[0.2, 0.3, 0.0], [0.0, -0.3, 0.0], [0.0, 0.12, 0.0]])
-    free, around, near = paths(poses, target, np.zeros(3), edges, 0.0, 0.04, box.reach)
+    free, around, near = paths(poses, target, np.zeros(3), box, 0.04)
     assert free == pytest.approx(0.2)
     ring = box.reach + 0.05
     assert around == pytest.approx(np.pi * ring + 2 * (0.3 - ring))

@@ -16,7 +16,7 @@ from nested_agents.core.models.self_model import SelfModelSettings
 from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.push import mean_twists
+from nested_agents.scenarios.box_pushing.prediction.calibration import mean_twists
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build, parse
 
@@ -174,7 +174,7 @@ def test_a_task_in_units_of_the_box() -> None:
     assert near["distance_m"] == pytest.approx(1.0)
     assert far["distance_m"] == pytest.approx(4.0)
     assert similar.task.tolerance == pytest.approx(4 * fixed.task.tolerance)
-    assert similar.task.reward.r1 == pytest.approx(fixed.task.reward.r1 / 4)
+    assert similar.task.r1 == pytest.approx(fixed.task.r1 / 4)
     # 2 m further from the goal the fixed task is broken off, the similar one is not yet.
     for scenario, expected in ((fixed, True), (similar, False)):
         box = scenario.measure()["goal_pose"] - [3.0, 0.0, 0.0]

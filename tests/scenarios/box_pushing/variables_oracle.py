@@ -32,7 +32,7 @@ def _inward(batch: SituationBatch, points: FloatArray) -> FloatArray:
     for (x, y), (box_x, box_y, turn) in zip(points, batch.boxes.T, strict=True):
         cos, sin, dx, dy = np.cos(turn), np.sin(turn), x - box_x, y - box_y
         local = cos * dx + sin * dy, cos * dy - sin * dx
-        _, nx, ny, _, _ = surface(batch.shape.edges, batch.shape.rounding, *local)
+        _, nx, ny = surface(batch.shape, *local)
         directions.append(turn + np.arctan2(-ny, -nx))
     return np.array(directions)
 

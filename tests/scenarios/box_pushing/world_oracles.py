@@ -3,15 +3,15 @@
 import numpy as np
 
 from nested_agents.core.numerics import BoolArray, FloatArray
-from nested_agents.scenarios.box_pushing.world.geometry import ON_SURFACE, Outline
+from nested_agents.scenarios.box_pushing.world.geometry import ON_SURFACE_M, BoxShape
+from nested_agents.scenarios.box_pushing.world.reward import Task
 from nested_agents.scenarios.box_pushing.world.robots import WheelModel
-from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings, Task
+from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
 
 
-def surface_numpy(
-    edges: FloatArray, rounding: float, x: float, y: float
-) -> tuple[float, float, float, float, float]:
-    """Return what `surface` returns, by array operations on all edges at once."""
+def surface_numpy(shape: BoxShape, x: float, y: float) -> tuple[float, float, float, float, float]:
+    """Return distance, outward normal and nearest surface point, by operations on all edges."""
+    edges, radius = shape.edges, shape.radius
     point = np.array([x, y])
     start, along = edges[:, :2], edges[:, 2:] - edges[:, :2]
     length2 = (along**2).sum(axis=1)
@@ -27,17 +27,15 @@ def surface_numpy(
     side = -1.0 if inside else 1.0
     distance = float(np.sqrt(squares[i]))
     normal = np.array([1.0, 0.0])
-    if distance > ON_SURFACE:
+    if distance > ON_SURFACE_M:
         normal = side * (point - closest[i]) / distance
     elif length2[i] > 0:
         normal = np.array([along[i, 1], -along[i, 0]]) / np.sqrt(length2[i])
-    px, py = closest[i] + rounding * normal
-    return side * distance - rounding, float(normal[0]), float(normal[1]), float(px), float(py)
+    px, py = closest[i] + radius * normal
+    return side * distance - radius, float(normal[0]), float(normal[1]), float(px), float(py)
 
 
-def ray_numpy(
-    edges: FloatArray, rounding: float, x: float, y: float, dx: float, dy: float, reach: float
-) -> float:
+def ray_numpy(shape: BoxShape, x: float, y: float, dx: float, dy: float, reach: float) -> float:
     """Return what `ray` returns, by marching the signed distance of `surface_numpy`.
 
     A step as long as the distance to the surface never passes through it, so the march converges
@@ -45,7 +43,7 @@ def ray_numpy(
     """
     travelled = 0.0
     for _ in range(2000):
-        distance = surface_numpy(edges, rounding, x + travelled * dx, y + travelled * dy)[0]
+        distance = surface_numpy(shape, x + travelled * dx, y + travelled * dy)[0]
         if distance <= 1e-10:
             break
         travelled += distance
@@ -59,26 +57,24 @@ def infrared_readings_numpy(
     radii: FloatArray,
     sensors: FloatArray,
     box: FloatArray,
-    outline: Outline,
+    shape: BoxShape,
     spec: InfraredSettings,
 ) -> FloatArray:
     """Return what `infrared_readings` returns, every ray by `ray_numpy`."""
-    out = np.zeros((2, *sensors.shape))
+    out = np.zeros(sensors.shape)
     turn = np.array([[np.cos(box[2]), np.sin(box[2])], [-np.sin(box[2]), np.cos(box[2])]])
     for r, k in np.ndindex(sensors.shape):
         angle = robots[r, 2] + sensors[r, k]
         along = np.array([np.cos(angle), np.sin(angle)])
         eye = robots[r, :2] + radii[r] * along
         (x, y), (dx, dy) = turn @ (eye - box[:2]), turn @ along
-        hit = ray_numpy(outline.edges, outline.rounding, x, y, dx, dy, spec.reach)
-        out[0, r, k] = spec.reading(np.array(hit))
-        point = np.zeros((1, 4))
-        hits = [
-            ray_numpy(point, radius, x, y, along[0], along[1], spec.reach)
-            for o, (radius, (x, y)) in enumerate(zip(radii, eye - robots[:, :2], strict=True))
-            if o != r
-        ]
-        out[1, r, k] = spec.reading(np.array(min(hits, default=spec.reach)))
+        distance = ray_numpy(shape, x, y, dx, dy, spec.reach)
+        near = {
+            "exponential": np.exp(-distance / spec.decay),
+            "linear": 1.0 - distance / spec.reach,
+            "binary": 1.0,
+        }
+        out[r, k] = near[spec.normalisation] if distance < spec.reach else 0.0
     return out
 
 
@@ -125,24 +121,23 @@ def reward_numpy(
     readings: FloatArray,
 ) -> FloatArray:
     """Return what `reward` returns, condition by condition, from the least specific on."""
-    settings = task.reward
-    at = np.s_[:, None] if settings.of == "team" else np.s_[:, :, None]
+    at = np.s_[:, :, None] if task.by_robot else np.s_[:, None]
     contact, readings = contact[at], readings[at]  # (m, parties, members)
-    r1 = settings.c1 * np.exp(-settings.r1 * distance[:, None])
-    r2_r3 = np.add.reduce(settings.c2 * np.exp(-settings.r2 * readings), axis=2)
-    r4 = settings.c4 * np.abs(orientation[:, None])
-    nearer = approach[:, None] < -settings.least_approach
-    there = task.reached(distance, orientation)[:, None] & settings.pays_at_goal
-    gained = np.full(r2_r3.shape, settings.some_out_of_range)
+    r1 = task.c1 * np.exp(-task.r1 * distance[:, None])
+    r2_r3 = (task.c2 * np.exp(-task.r2 * readings)).sum(axis=2)
+    r4 = task.c4 * np.abs(orientation[:, None])
+    nearer = approach[:, None] > task.least_approach
+    there = task.reached(distance, orientation)[:, None] & task.pays_at_goal
+    gained = np.full(r2_r3.shape, task.some_out_of_range)
     for condition, pay in (
-        (~(readings > 0.0).any(axis=2), settings.all_out_of_range),
+        (~(readings > 0.0).any(axis=2), task.all_out_of_range),
         (
             (readings > 0.0).all(axis=2),
-            -r2_r3 + (r1 if settings.attraction_without_contact else 0.0),
+            -r2_r3 + (r1 if task.attraction_without_contact else 0.0),
         ),
-        (contact.all(axis=2), settings.receding),
+        (contact.all(axis=2), task.receding),
         (contact.all(axis=2) & nearer, r1 - r2_r3 - r4),
-        (there, settings.c1),
+        (there, task.c1),
     ):
         gained = np.where(condition, pay, gained)
     return gained

@@ -46,7 +46,6 @@ def test_the_best_is_a_spec_with_seeds_of_its_own(tuned) -> None:
     assert best["success"] == found.configurations.query("seeds == 3")["success"].max()
     assert na.Spec.load(out / "best.toml") == found.best
     assert f"Best of 4 configurations: {best['name']}" in str(found)
-    assert found.control == "frozen", "zero weights do not plan"
 
 
 def test_what_was_interrupted_goes_on_and_runs_nothing_twice(tuned, tmp_path, monkeypatch) -> None:
@@ -72,19 +71,6 @@ def test_what_was_interrupted_goes_on_and_runs_nothing_twice(tuned, tmp_path, mo
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
     na.tune(SPEC, tmp_path, **budget)
     assert len(ran) == len(set(ran))
-
-
-def test_the_best_is_beside_the_control_that_decides_as_it_does(tmp_path) -> None:
-    spec = {**SPEC, "learner": {"decision": {"rule": "reward-and-value"}}}
-    found = na.tune(spec, tmp_path, trials=2, seeds=2, jobs=1, progress=False)
-    assert found.control == "frozen, as given", "the spec's own and the other decide alike"
-    assert {"frozen", found.control} <= {*found.study.conditions}
-    assert f"learning by the difference to {found.control!r}." in found.lines
-    (best,) = found.best.conditions()
-    with Store.open(tmp_path) as store:
-        control = store.settings()[found.control]
-    assert control["learner"]["kind"] == "frozen"
-    assert control["learner"]["decision"]["rule"] == best.settings.learner.decision.rule
 
 
 def test_the_same_draw_gives_the_same_configurations() -> None:

@@ -1,7 +1,7 @@
 import base64
 import json
 
-from nested_agents.scenarios.box_pushing.pictures import rendering
+from nested_agents.scenarios.box_pushing.pictures import player
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.studies.report.replays import replays
 from nested_agents.studies.results import results
@@ -41,13 +41,13 @@ def test_damaged_and_foreign_recordings_are_named(kept, tmp_path, monkeypatch):
     assert len(found.remarks) == 1
     assert found.remarks[0].startswith("Not shown because the recording is missing or damaged: ")
     monkeypatch.delattr(BoxPushing, "animate")
-    monkeypatch.setattr(rendering, "NEEDED", ("hat",))
+    monkeypatch.setattr(player, "NEEDED", ("hat",))
     assert "the scenario cannot draw it" in "".join(read(directory).remarks)
 
 
 def test_what_the_canvas_cannot_play_is_drawn_by_its_scenario(kept, tmp_path, monkeypatch):
     directory = kept(tmp_path, steps=4)
-    monkeypatch.setattr(rendering, "NEEDED", ("hat",))
+    monkeypatch.setattr(player, "NEEDED", ("hat",))
     found = read(directory)
     assert [(film.condition, film.seed) for film in found.films] == [("default", 0), ("frozen", 0)]
     assert all(base64.b64decode(film.data).startswith(b"GIF89a") for film in found.films)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.spec.controls import control_lines, control_of, control_remark
+from nested_agents.studies.spec.controls import control_of, planning_remark
 from nested_agents.studies.spec.spec import Spec
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -79,13 +79,13 @@ def test_where_zero_weights_plan_one_remark_says_so(name: str, controls: str) ->
     (remark,) = [line for line in spec.warnings() if "plan" in line]
     assert remark.startswith(f"{name}: untrained weights plan by the reward under rule = ")
     assert remark.endswith(controls)
-    assert control_remark(settings_of(spec)) == remark
+    assert planning_remark(settings_of(spec)) == remark
 
 
 def test_a_missing_control_of_the_same_rule_is_asked_for() -> None:
     other = {"name": "frozen", "learner": {"kind": "frozen", "decision": {"rule": "value"}}}
     spec = Spec.of({**PLANNING, "overrides": [{"name": "trained"}, other]})
-    remark = control_remark(settings_of(spec))
+    remark = planning_remark(settings_of(spec))
     assert "no control learns nothing under the same" in remark
     assert "preset = 'frozen' with the same learner.decision" in remark
 
@@ -109,14 +109,6 @@ def test_what_tunes_learning_may_be_swept_beside_a_control() -> None:
 def test_equal_teams_are_refused_and_it_is_said_what_to_do() -> None:
     with pytest.raises(SpecError, match="'a' and 'b' are the same: leave one out, or give it"):
         Spec.of({"seeds": 2, "overrides": [{"name": "a"}, {"name": "b"}]})
-
-
-def test_frozen_and_random_are_said_to_be_one_control() -> None:
-    spec = Spec.of({"seeds": 2, "sweep": {"preset": ["default", "frozen", "random"]}})
-    lines = control_lines(settings_of(spec))
-    assert " ".join(lines).startswith("frozen and random are one control: ")
-    assert max(map(len, lines)) <= 80
-    assert control_lines(settings_of(Spec.of({"seeds": 2}))) == ()
 
 
 def test_the_control_of_a_team_decides_as_it_does() -> None:

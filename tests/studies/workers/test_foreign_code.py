@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.core.isolation import restore_child_signal
 from nested_agents.core.plugins import trust
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.studies.cli.main import main
@@ -122,7 +121,6 @@ def test_a_module_runs_as_a_file_does_whatever_surrounds_it(installed, capsys):
     ("name", "text", "is_told"),
     [
         ("helping.py", "import json\n\nN = 2\n", True),
-        ("helping.py", "import json\n\nN = 1  # one\n", False),
         ("robots/arm.py", ARM.replace("0.1", "0.2"), True),
         ("robots/__init__.py", "X = 1\n", True),
         ("robots/new.py", "", True),
@@ -133,16 +131,16 @@ def test_a_module_runs_as_a_file_does_whatever_surrounds_it(installed, capsys):
 @pytest.mark.parametrize("table", [TABLE, {}])
 def test_a_change_of_what_a_study_imports_is_told(name, text, is_told, table, installed):
     texts = {} if table else {"mine.py": "from robots import arm\n"}
-    before = present(None, table, texts)
+    before = present(table, texts)
     (installed / name).write_text(text)
-    assert changed(before, present(before, table, texts)) == ([name] if is_told else [])
+    assert changed(before, present(table, texts)) == ([name] if is_told else [])
 
 
 def test_another_version_of_a_library_is_told(monkeypatch):
-    before = present(None, {}, {"mine.py": "import numpy, pandas"})
-    assert before["pandas"] == (foreign_code._version("pandas"),) * 2
+    before = present({}, {"mine.py": "import numpy, pandas"})
+    assert before["pandas"] == foreign_code._version("pandas")
     monkeypatch.setattr(foreign_code, "version", lambda name: f"9.{name}")
-    here = present(before, {}, {"mine.py": "import numpy, pandas"})
+    here = present({}, {"mine.py": "import numpy, pandas"})
     assert {*changed(before, here)} == {*foreign_code.LIBRARIES, "pandas"}
 
 
@@ -178,15 +176,6 @@ def test_code_of_users_does_not_move_this_process(tmp_path, monkeypatch):
         assert Path.cwd() == tmp_path
         os.chdir("/")
     assert Path.cwd() == tmp_path
-
-
-def test_an_ignored_signal_of_children_is_restored():
-    usual = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
-    try:
-        restore_child_signal()
-        assert signal.getsignal(signal.SIGCHLD) is signal.SIG_DFL
-    finally:
-        signal.signal(signal.SIGCHLD, usual)
 
 
 def test_without_a_home_nothing_is_noted_and_everything_works(monkeypatch):

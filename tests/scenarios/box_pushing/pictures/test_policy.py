@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from acting import fuzzy, joint_of
 
-from nested_agents.scenarios.box_pushing.pictures.policy import Field
+from nested_agents.scenarios.box_pushing.pictures.policy import MotionField
 from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.trials.arrangement import arrange
 
@@ -23,13 +23,12 @@ def test_a_team_that_likes_the_box_drives_to_it(slope, to_the_box):
     assert len(fields) == 2
     for field in fields:
         far = np.hypot(*field.points[:, :2].T) > 0.25
-        toward = np.array([move == "to the box" for move in field.moves])[far]
+        toward = np.array([kind == "to the box" for kind in field.kinds])[far]
         assert toward.mean() > 0.9 if to_the_box else toward.mean() < 0.1
 
 
-def test_sides_are_named_counter_clockwise():
-    points = np.array([[-1, 0.1, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0], [-1, -0.1, 0]])
-    zeros = np.zeros(5)
-    field = Field(0, points, np.zeros((5, 2)), zeros, np.zeros((0, 2)))
-    assert field.sides == ["behind", "right", "ahead", "left", "behind"]
-    assert field.moves == ["rests"] * 5
+def test_kinds_of_motion():
+    points = np.zeros((4, 3))
+    motions = np.array([[0.01, 0.0, 0.3], [-0.01, 0.0, 0.0], [0.001, 0.0, -0.2], [0.0, 0.0, 0.01]])
+    field = MotionField(points, motions, np.zeros((0, 2)))
+    assert field.kinds == ["to the box", "away", "turns", "rests"]

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.pictures.rendering import (
-    HIT_COLOUR,
     SIDES,
     animate,
     picture,
     snapshot,
 )
-from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, InfraredSettings, label
+from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 
 
 @pytest.fixture
@@ -62,22 +61,6 @@ def test_a_replay_of_all_moments(recording, tmp_path: Path, suffix: str) -> None
 def test_other_formats_are_refused(recording, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"'\.avi' of replay\.avi, allowed \.gif or \.mp4"):
         animate(recording, tmp_path / "replay.avi")
-
-
-def shows(pixels: np.ndarray, colour: str) -> bool:
-    """Return whether a colour occurs in a picture."""
-    rgb = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
-    return bool((np.abs(pixels.astype(int) - rgb).max(axis=2) < 12).any())
-
-
-def test_rays_are_an_option(recording) -> None:
-    recording["robot_poses"][:, 0] = [-0.14, 0.05, 0.0]
-    plain, rays = picture(recording, 4), picture(recording, 4, sensors=True)
-    assert (shows(plain, HIT_COLOUR), shows(rays, HIT_COLOUR)) == (False, True)
-    recording["infrared"] = np.array(label(InfraredSettings(reach=0.002)))
-    short = picture(recording, 4, sensors=True)
-    assert not shows(short, HIT_COLOUR)
-    assert (short != plain).any(axis=2).sum() < (rays != plain).any(axis=2).sum() / 2
 
 
 def test_holes_are_holes(recording) -> None:

@@ -14,11 +14,11 @@ from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.models.calibration import CalibrationSettings
 from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.push import (
+from nested_agents.scenarios.box_pushing.prediction.calibration import (
     CONSTANTS,
-    believing,
-    least_gap,
     mean_twists,
+    min_gap,
+    model_of,
     outcomes,
     push,
 )
@@ -62,12 +62,12 @@ def test_believed_are_the_worlds_own_constants_times_the_factors():
 def test_constants_are_factors_of_what_is_believed(robot):
     world = scenario(robot=robot)
     belief = world._belief
-    same = believing(belief, np.zeros(3))
+    same = model_of(belief, np.zeros(3))
     np.testing.assert_allclose(same.compliance, world._model.compliance, rtol=1e-12, atol=1e-15)
-    twice = believing(belief, np.log([2.0, 2.0, 3.0]))
+    twice = model_of(belief, np.log([2.0, 2.0, 3.0]))
     np.testing.assert_allclose(twice.compliance, 2.0 * same.compliance, rtol=1e-12, atol=1e-15)
     assert twice.contact_friction == pytest.approx(3.0 * same.contact_friction)
-    ahead = believing(belief, np.log([2.0, 1.0, 1.0])).compliance
+    ahead = model_of(belief, np.log([2.0, 1.0, 1.0])).compliance
     assert ahead[0, 0, 0] == pytest.approx(2.0 * same.compliance[0, 0, 0])
     assert ahead[0, 1, 1] == pytest.approx(same.compliance[0, 1, 1])
 
@@ -78,7 +78,7 @@ def test_only_ratios_of_forces_can_be_told_by_moving():
     heavier = scenario(belief={"load": 3.0})
     constants = np.log([3.0, 3.0, 1.0])
     np.testing.assert_allclose(
-        pushed(heavier._model), pushed(believing(usual._belief, constants)), atol=1e-12
+        pushed(heavier._model), pushed(model_of(usual._belief, constants)), atol=1e-12
     )
     assert abs(pushed(heavier._model) - pushed(usual._model)).max() > 0.005
 
@@ -90,14 +90,14 @@ def test_outcomes_are_the_twists_of_the_push(turning: float):
     found = outcomes(ROBOTS, np.zeros(3), twists, 0.512, belief, constants)
     before = np.vstack([np.zeros(3), ROBOTS])
     for row, own in zip(found, constants, strict=True):
-        expected = mean_twists(before, pushed(believing(belief, own), twists), 0.512)
+        expected = mean_twists(before, pushed(model_of(belief, own), twists), 0.512)
         np.testing.assert_allclose(row, expected, rtol=0, atol=1e-12)
 
 
-def test_the_least_gap_between_robots():
+def test_the_min_gap_between_robots():
     robots = np.array([[0.0, 0.0, 0.0], [0.3, 0.4, 1.0], [3.0, 4.0, 0.0]])
-    assert least_gap(robots, 0.2) == pytest.approx(0.1)
-    assert least_gap(robots[:1], 0.2) == np.inf
+    assert min_gap(robots, 0.2) == pytest.approx(0.1)
+    assert min_gap(robots[:1], 0.2) == np.inf
 
 
 @pytest.mark.parametrize("believed", ["soft", "stiff"])

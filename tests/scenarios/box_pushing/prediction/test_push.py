@@ -4,22 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from push_oracle import push_one
 
 from nested_agents.core.numerics import FloatArray, IntArray
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction import push as kernels
 from nested_agents.scenarios.box_pushing.prediction.push import PushModel
-from nested_agents.scenarios.box_pushing.prediction.push_lanes import (
-    BOX_SIZE,
-    COS,
-    LANES,
-    PSI,
-    SIN,
-    head,
-)
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, compliance
@@ -31,12 +21,10 @@ BEHIND = -0.1 - ROBOT.radius
 def model(n: int, *, rigid: bool = False) -> PushModel:
     yielding = np.zeros((3, 3)) if rigid else compliance(ROBOT)
     return PushModel(
-        edges=BOX.outline.edges,
-        rounding=BOX.outline.rounding,
+        shape=BOX.shape,
         radii=np.full(n, ROBOT.radius),
         compliance=np.stack([yielding] * n),
         friction_force=BOX.friction_force,
-        friction_radius=BOX.friction_radius,
         contact_friction=0.0 if rigid else BOX.contact_friction,
     )
 
@@ -106,11 +94,11 @@ def test_a_push_off_the_centre_turns_the_box_away() -> None:
 @pytest.mark.parametrize("rigid", [False, True])
 def test_the_lanes_compute_what_is_written(name: str, rigid: bool) -> None:
     rng = np.random.default_rng(0)
-    outline = BOXES[name].outline
-    believed = model(3, rigid=rigid)._replace(edges=outline.edges, rounding=outline.rounding)
+    box_spec = BOXES[name]
+    believed = model(3, rigid=rigid)._replace(shape=box_spec.shape)
     for count in (1, 37):
         angles = rng.uniform(-np.pi, np.pi, 3)
-        distances = rng.uniform(0.8, 1.2, 3) * (outline.radius + ROBOT.radius)
+        distances = rng.uniform(0.8, 1.2, 3) * (box_spec.reach + ROBOT.radius)
         robots = np.stack([distances * np.cos(angles), distances * np.sin(angles), angles + 3], 1)
         box = np.array([0.0, 0.0, rng.uniform(-9, 9)])
         twists = rng.uniform(-0.1, 0.13, (3, 5, 3)) * [1, 0.2, 9]
@@ -125,9 +113,9 @@ def test_the_lanes_compute_what_is_written(name: str, rigid: bool) -> None:
 @pytest.mark.parametrize("name", ["square", "pentagon", "L"])
 def test_a_joint_action_has_the_same_bits_alone_and_among_others(name: str) -> None:
     rng = np.random.default_rng(0)
-    outline = BOXES[name].outline
-    believed = model(3)._replace(edges=outline.edges)
-    robots = rng.uniform(-1.2, 1.2, (3, 3)) * [outline.radius, outline.radius, np.pi]
+    reach = BOXES[name].reach
+    believed = model(3)._replace(shape=BOXES[name].shape)
+    robots = rng.uniform(-1.2, 1.2, (3, 3)) * [reach, reach, np.pi]
     box = np.array([0.01, 0.02, 0.3])
     twists = rng.uniform(-0.1, 0.13, (3, 40, 3)) * [1, 0.2, 9]
     choices = rng.integers(40, size=(70, 3))
@@ -137,16 +125,6 @@ def test_a_joint_action_has_the_same_bits_alone_and_among_others(name: str) -> N
         alone = push(robots, box, twists, choices[c : c + 1], 0.512, believed)
         for a, b in zip(alone, among, strict=True):
             np.testing.assert_array_equal(a[0], b[c])
-
-
-@given(st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=LANES))
-def test_headings_are_exact_to_the_last_bit_but_one(angles: list[float]) -> None:
-    rows = np.zeros((2, BOX_SIZE))
-    rows[1, PSI : PSI + len(angles)] = angles
-    head(rows, 1)
-    for row, function in ((COS, np.cos), (SIN, np.sin)):
-        found = rows[1, row : row + len(angles)]
-        np.testing.assert_allclose(found, function(angles), rtol=0, atol=3e-16)
 
 
 def test_it_predicts_the_world_within_millimetres() -> None:

@@ -67,7 +67,7 @@ def test_variables_of_crowds_by_hand() -> None:
     # A square of 20 cm, turned by 0.3; robot 1 touches its back, low on it, robot 2 is far away.
     turn = np.array([np.cos(0.3), np.sin(0.3)])
     left = np.array([-turn[1], turn[0]])
-    low = -0.1 * turn - 0.08 * left
+    low = -(0.1 + 1e-9) * turn - 0.08 * left  # just outside
     batch = situation([[*low, 0.1], [0.0, 0.9, -pi / 2]], [0.0, 0.0, 0.3], [0.0, 0.77])
     first = shared(batch, 0)
     assert first["face_bearing"] == pytest.approx(0.2)

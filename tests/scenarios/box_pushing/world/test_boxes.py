@@ -21,8 +21,12 @@ from nested_agents.scenarios.box_pushing.world.boxes import (
     box_for,
     growth,
 )
-from nested_agents.scenarios.box_pushing.world.geometry import moments
-from nested_agents.scenarios.box_pushing.world.polygons import UNIT, Vertices, polygon_edges
+from nested_agents.scenarios.box_pushing.world.polygons import (
+    UNIT,
+    Vertices,
+    moments,
+    polygon_edges,
+)
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 from nested_agents.scenarios.box_pushing.world.world import World
@@ -62,15 +66,15 @@ def test_friction_radius_of_known_shapes() -> None:
 def test_every_box(name: str) -> None:
     box = BOXES[name]
     assert box.area == pytest.approx(AREA, rel=1e-12)
-    np.testing.assert_allclose(box.moments.first, 0, atol=1e-15)
+    if box.polygon is not None:
+        np.testing.assert_allclose(box.polygon.centroid.coords[0], 0, atol=1e-15)
     lever = np.linalg.norm(box.friction_points, axis=1)
     np.testing.assert_allclose(lever, box.friction_radius, rtol=1e-12)
     np.testing.assert_allclose(box.friction_points.mean(axis=0), 0, atol=1e-15)
     # The back is straight, or round, and lies towards -x.
-    least = box.outline.edges[:, 0].min() - box.outline.rounding
-    if name == "circle":
-        assert least == pytest.approx(-np.sqrt(AREA / np.pi), rel=1e-3)
-    assert sum(x < least + 1e-9 for x in box.outline.edges[:, 0]) in (0, 2)
+    xs = box.shape.edges[:, 0]
+    assert box.radius == 0.0 or box.radius == pytest.approx(np.sqrt(AREA / np.pi))
+    assert sum(xs < xs.min() + 1e-9) == (1 if name == "circle" else 2)
 
 
 @pytest.mark.parametrize("name", BOXES)
@@ -107,8 +111,7 @@ def test_pieces_make_up_the_polygon(seed: int, corners: int, window: bool, angle
     parts = [moments(polygon_edges(Polygon(piece))) for piece in box.fixtures]
     area = sum(part.area for part in parts)
     assert area == pytest.approx(geometry.area, rel=1e-9)
-    centre = sum((part.first for part in parts), np.zeros(2)) / area
-    np.testing.assert_allclose(centre, 0, atol=1e-9 * box.reach)
+    np.testing.assert_allclose(box.polygon.centroid.coords[0], 0, atol=1e-9 * box.reach)
     inertia = sum(float(np.trace(part.second)) for part in parts) * box.mass / area
     assert inertia == pytest.approx(box.inertia, rel=1e-9)
     assert inertia == pytest.approx(_inertia(geometry) * box.mass / area, rel=1e-9)
@@ -167,13 +170,13 @@ def test_clockwise_is_turned_around_with_a_word() -> None:
         ({"vertices": ((0, 0), (1, 0), (2, 0))}, "simple|degenerate"),
         ({"vertices": ((0, 0), (1, 0), (0.5, 1e-7))}, "degenerate"),
         ({"vertices": FRAME, "radius": 0.1}, "either"),
-        ({"vertices": (*FRAME, FRAME[0])}, r"vertices \d+ and 1 are at the same place"),
-        ({"vertices": (FRAME[0], *FRAME)}, "vertices 1 and 2 are at the same place"),
+        ({"vertices": (*FRAME, FRAME[0])}, "two vertices at the same place"),
+        ({"vertices": (FRAME[0], *FRAME)}, "two vertices at the same place"),
         (
             {"vertices": ((0, 0), (1e300, 0), (0, 1e300))},
-            r"is 1e\+300 m long, allowed: up to 100 m",
+            r"vertex \(1e\+300, 0\), coordinates must be at most 100 m",
         ),
-        ({"vertices": ((-1e308, 0), (1e308, 0), (0, 1))}, "allowed: up to 100 m"),
+        ({"vertices": ((-1e308, 0), (1e308, 0), (0, 1))}, "coordinates must be at most 100 m"),
         ({"vertices": FRAME, "holes": [((0, 0), (1e-9, 0), (0, 1e-9))]}, "at the same place"),
         ({"vertices": regular(1001)}, "1001 vertices, allowed: 1000 or fewer"),
         ({}, "either"),
@@ -202,7 +205,7 @@ def test_a_piece_too_small_for_the_physics_is_refused_before_it(vertices: Vertic
         _ = box.fixtures
 
 
-@pytest.mark.parametrize("far", [10.0, 1e3, 1e5, 1e6, 2e7])
+@pytest.mark.parametrize("far", [1.0, 90.0])
 @pytest.mark.parametrize("rings", [(FRAME,), (L_SHAPE,), (FRAME, WINDOW)])
 @pytest.mark.parametrize("growth", [1.0, 32.0])
 def test_a_box_is_the_same_anywhere(rings: tuple[Vertices, ...], growth: float, far: float) -> None:
@@ -216,15 +219,8 @@ def test_a_box_is_the_same_anywhere(rings: tuple[Vertices, ...], growth: float, 
         assert box.inertia == pytest.approx(near.inertia, rel=resolution)
         assert box.area == pytest.approx(near.area, rel=resolution)
         assert box.friction_radius == pytest.approx(near.friction_radius, rel=resolution)
-        np.testing.assert_allclose(
-            box.outline.edges, near.outline.edges, atol=resolution * near.reach
-        )
+        np.testing.assert_allclose(box.shape.edges, near.shape.edges, atol=resolution * near.reach)
         assert len(box.fixtures) == len(near.fixtures)
-
-
-def test_coordinates_that_are_too_coarse_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"coordinates of 1e\+10 m are 1\.9e-06 m apart"):
-        BoxSpec("far", ((1e10, 0), (1e10 + 0.2, 0), (1e10 + 0.2, 0.2)))
 
 
 def slivers(count: int) -> Iterator[Vertices]:
@@ -241,7 +237,7 @@ def slivers(count: int) -> Iterator[Vertices]:
         )[k % 5]
 
 
-@pytest.mark.parametrize("far", [0.0, 1e5, 3e6])
+@pytest.mark.parametrize("far", [0.0, 99.0])
 def test_a_nearly_degenerate_box_is_simulated_or_refused_in_one_line(far: float) -> None:
     simulated = 0
     for outline in slivers(150):
@@ -284,7 +280,7 @@ def test_a_box_may_grow_along_its_width_only() -> None:
     assert wide.width == pytest.approx((-0.4, 0.4))
     assert wide.area == pytest.approx(4 * square.area)
     assert wide.mass == 4 * square.mass
-    assert np.ptp(wide.outline.edges[:, 0]) == pytest.approx(0.2)
+    assert np.ptp(wide.shape.edges[:, 0]) == pytest.approx(0.2)
 
 
 def test_size_grows_with_the_number_of_robots() -> None:
@@ -309,7 +305,7 @@ def test_a_center_of_mass_moves_the_frame_but_not_mass_or_friction() -> None:
     assert loaded.scaled(2.0).center_of_mass == pytest.approx((0.1, 0.2))
     assert loaded.scaled(2.0).reach == pytest.approx(2.0 * loaded.reach)
     same = BoxSpec("same", FRAME, center_of_mass=(0.1, 0.1))
-    np.testing.assert_allclose(same.outline.edges, plain.outline.edges, atol=1e-15)
+    np.testing.assert_allclose(same.shape.edges, plain.shape.edges, atol=1e-15)
 
 
 def test_a_box_turns_about_its_own_center_of_mass() -> None:
@@ -330,4 +326,4 @@ def test_a_center_of_mass_outside_is_refused() -> None:
         BoxSpec("loaded", FRAME, center_of_mass=(0.3, 0.1))
     assert "\n" not in str(caught.value)
     hollow = BoxSpec("L", L_SHAPE, center_of_mass=(0.12, 0.12))  # between the arms of the L
-    assert hollow.outline.radius > 0.15
+    assert hollow.reach > 0.15
