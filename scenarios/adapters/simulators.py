@@ -256,6 +256,12 @@ def make_simulator(env: object) -> Simulator:
     if isinstance(env, AECEnv):
         if not (env.metadata or {}).get("is_parallelizable", False):
             raise ValueError("its agents act in turns, allowed: agents that act simultaneously")
+        for name in env.possible_agents:
+            if not isinstance(name, str):
+                raise ValueError(
+                    f"possible_agents: {name!r} is not text, which PettingZoo requires to make an "
+                    "AEC environment parallel"
+                )
         return PettingZooSimulator(aec_to_parallel(env))
     if isinstance(env, ParallelEnv) or hasattr(env, "possible_agents"):
         return PettingZooSimulator(env)

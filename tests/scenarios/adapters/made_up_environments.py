@@ -443,6 +443,14 @@ class Turns(AECEnv[Any, Any, Any]):
         self.agent_selection = self.selector.next()
 
 
+class NumberedTurns(Turns):
+    """Its players are numbered, which PettingZoo cannot make parallel."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.possible_agents = [0, 1]
+
+
 class TurnsForAll(Turns):
     """The key __all__ of truncations ends the episode after 5 steps."""
 

@@ -17,6 +17,7 @@ from made_up_environments import (
     LateButSeeing,
     MixedEnd,
     Numbered,
+    NumberedTurns,
     PaidInArrays,
     ReusingAfterwards,
     StrayEnd,
@@ -125,6 +126,7 @@ def test_who_has_left_observes_what_it_last_observed() -> None:
             gymnasium.vector.SyncVectorEnv([Cart, Cart]),
             "is a vector of environments, allowed: a single",
         ),
+        (NumberedTurns(), "possible_agents: 0 is not text"),
     ],
 )
 def test_what_is_no_environment_is_refused(env: Any, message: str) -> None:
