@@ -47,7 +47,7 @@ def errors(**scenario: Any) -> tuple[int, list[float]]:
             joint = controller.act(before)
             now = world.predict()
             views = [
-                BoxPrediction(now.situation, model, now.premises).poses(joint[None])
+                BoxPrediction(now.situation, model, now.settings).poses(joint[None])
                 for model in models
             ]
             transition = world.step(joint)

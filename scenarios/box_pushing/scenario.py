@@ -24,7 +24,7 @@ from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES, Measurements
 from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap, model_of
-from .prediction.prediction import BoxPrediction, Premises, PresentState
+from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
 from .states.situations import SituationBatch
@@ -113,17 +113,17 @@ class BoxPushing(Scenario, Embodiment):
             reward_settings, self._unit * settings.tolerance, settings.orientation_tolerance
         )
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
-        self._premises = Premises(
-            self._belief,
-            self.space,
-            self.action_set,
-            settings.speed_increment,
-            self._limits,
-            self.task,
-            settings.infrared,
-            self.box.shape,
-            settings.period,
-            settings.prediction_horizon * CONTROL_PERIOD,
+        self._prediction = PredictionSettings(
+            groups=self.groups,
+            belief=self._belief,
+            space=self.space,
+            action_set=self.action_set,
+            increments=self._unit_speeds,
+            limits=self._limits,
+            task=self.task,
+            infrared=settings.infrared,
+            period=settings.period,
+            horizon=settings.prediction_horizon * CONTROL_PERIOD,
         )
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
         # Robots that do not fit around the box are refused now, not in the middle of a study.
@@ -226,15 +226,14 @@ class BoxPushing(Scenario, Embodiment):
             self._goal,
             self._speeds,
             tuple(effects),
-            self.groups,
         )
         model = self._model if constants is None else model_of(self._belief, constants)
         if self._playground is None or self._saved is None:
-            return BoxPrediction(situation, model, self._premises)
+            return BoxPrediction(situation, model, self._prediction)
         future = Future(
             self._playground, self._saved, self._failures, self._step, self.settings.action_repeat
         )
-        return ExactPrediction(situation, model, self._premises, future)
+        return ExactPrediction(situation, model, self._prediction, future)
 
     def with_exact_prediction(self) -> BoxPushing:
         """Return an equal scenario that predicts one decision period by simulation."""

@@ -145,7 +145,7 @@ def policy_of(
             imagined = replace(
                 situation, robots=placed, box=box_pose, speeds=np.zeros_like(situation.speeds)
             )
-            start = BoxPrediction(imagined, prediction.model, prediction.premises)
+            start = BoxPrediction(imagined, prediction.model, prediction.settings)
             after = start.poses(choose(start)[None])
             motions.append(after.robots[robot, :, 0] - placed[robot])
         fields.append(MotionField(points, np.array(motions), others[:, :2]))

@@ -7,9 +7,8 @@ rigid
 static
     The box does not move; robots are stopped by it.
 exact
-    The world itself, saved, played ahead and restored. It knows all that is to come, failures and
-    their noise too, and takes no notice of a self-model: a bound on what prediction can give, some
-    thousand times slower than the others.
+    The simulation itself, saved, continued and restored. It knows future failures and their noise,
+    and ignores self-models: an upper bound for prediction, a thousand times slower than the others.
 """
 
 from __future__ import annotations
@@ -27,9 +26,10 @@ from ..world.boxes import BoxSpec
 from ..world.robots import compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
-from .prediction import BoxPrediction, Premises, PresentState
+from .prediction import BoxPrediction, PredictionSettings, PresentState
 from .push import PushModel
 from .settings import BeliefSettings
+from .wheel_commands import speeds_of
 
 IMMOBILE = 1e6
 """Ground friction [N] against which nothing moves."""
@@ -90,42 +90,44 @@ class Future:
 
 
 class ExactPrediction(BoxPrediction):
-    """Prediction by simulation; own blocks in tables are those of a robot alone.
+    """Prediction by simulation; own variables in tables are those of a robot alone.
 
     Parameters
     ----------
-    situation, model, premises
+    situation, model, settings
         See `BoxPrediction`.
     future
         The simulation.
     """
 
-    merges: ClassVar[bool] = False  # wheels that command one twist may yet slip differently
+    merges_twists: ClassVar[bool] = False  # wheels that command one twist may slip differently
 
     def __init__(
-        self, situation: PresentState, model: PushModel, premises: Premises, future: Future
+        self,
+        situation: PresentState,
+        model: PushModel,
+        settings: PredictionSettings,
+        future: Future,
     ) -> None:
-        super().__init__(situation, model, premises)
+        super().__init__(situation, model, settings)
         self.future = future
 
     def best_responses(self, rules: RuleBase) -> None:
         """Return None, because every joint action must be simulated."""
 
-    def _after(self, choices: IntArray, seconds: float) -> SituationBatch:
-        periods = round(seconds / CONTROL_PERIOD)
-        rows, which = np.unique(choices, axis=0, return_inverse=True)
-        commands = self.wheel_commands.speeds[np.arange(rows.shape[1]), rows]
-        played = [self.future.after(each.ravel(), periods) for each in commands]
-        poses, gaps = (np.array(part)[which] for part in zip(*played, strict=True))
-        situations_last = np.ascontiguousarray(poses.transpose(1, 2, 0))
-        gaps = np.ascontiguousarray(gaps.T)
-        return self._batch(situations_last[1:], situations_last[0], gaps, seconds)
+    def _after(self, actions: IntArray, seconds: float) -> SituationBatch:
+        distinct, rows = np.unique(actions, axis=1, return_inverse=True)
+        commands = speeds_of(distinct, self.wheel_commands.speeds)
+        played = [self.future.after(each, round(seconds / CONTROL_PERIOD)) for each in commands.T]
+        poses = np.stack([poses for poses, _ in played], axis=-1)[..., rows]
+        gaps = np.stack([gaps for _, gaps in played], axis=-1)[..., rows]
+        return self._batch(poses[1:].copy(), poses[0].copy(), gaps.copy(), seconds)
 
     def after(self, joint_action: IntArray) -> ExactPrediction:
-        """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
+        """Return the prediction from the situation after a joint action ``(n,)``."""
         speeds = self.commands(joint_action)
         future = self.future.onward(speeds)
         box = future.state.poses[0]
         robots = future.state.poses[1:]
         reached = replace(self.situation, robots=robots, box=box, speeds=speeds)
-        return ExactPrediction(reached, self.model, self.premises, future)
+        return ExactPrediction(reached, self.model, self.settings, future)

@@ -112,9 +112,10 @@ def push(
     """
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
-    bodies, one, near = np.zeros(n, ROBOT), np.zeros(1, BOX)[0], np.zeros(1, NEAREST)[0]
+    bodies, boxes, blocks = np.zeros(n, ROBOT), np.zeros(1, BOX), np.zeros(1, NEAREST)
     touching = np.empty(n, np.bool_)
     for first in range(0, m, LANES):
+        one, near = boxes[0], blocks[0]
         used = min(LANES, m - first)
         _set_pose(one, box)
         for r in range(n):

@@ -154,8 +154,9 @@ def _face_directions(
 
     From outside it is the direction to the nearest point, from inside away from it.
     """
-    near = np.zeros(1, NEAREST)[0]
+    blocks = np.zeros(1, NEAREST)
     for first in range(0, len(x), LANES):
+        near = blocks[0]
         lanes = min(LANES, len(x) - first)
         for k in range(lanes):
             s = first + k

@@ -23,7 +23,11 @@ LANES = 16
 
 
 def block_of(*rows: str) -> np.dtype[np.void]:
-    """Return the type of a record with `LANES` numbers in each of the named rows."""
+    """Return the type of a record with `LANES` numbers in each of the named rows.
+
+    A compiled record does not keep its array alive: a kernel must use the array later than the
+    record, for example by taking the record anew within a loop.
+    """
     return np.dtype((np.record, [(row, np.float64, (LANES,)) for row in rows]))
 
 
@@ -137,9 +141,10 @@ def distances(xs: FloatArray, ys: FloatArray, shape: BoxShape) -> FloatArray:
     >>> distances(np.array([0.3, 0.0]), np.zeros(2), disc).round(12).tolist()
     [0.2, -0.1]
     """
-    points = np.zeros(1, NEAREST)[0]
+    blocks = np.zeros(1, NEAREST)
     out = np.empty(len(xs))
     for first in range(0, len(xs), LANES):
+        points = blocks[0]
         lanes = min(LANES, len(xs) - first)
         for k in range(lanes):
             points.x[k] = xs[first + k]
@@ -156,13 +161,13 @@ def surface(shape: BoxShape, x: float, y: float) -> tuple[float, float, float]:
 
     On the surface the normal is not determined, and zero.
     """
-    points = np.zeros(1, NEAREST)[0]
-    points.x[0], points.y[0] = x, y
-    nearest_points(shape.edges, points, 1)
-    distance = points.distance[0]
+    blocks = np.zeros(1, NEAREST)
+    blocks[0].x[0], blocks[0].y[0] = x, y
+    nearest_points(shape.edges, blocks[0], 1)
+    distance = blocks[0].distance[0]
+    near_x, near_y = blocks[0].near_x[0], blocks[0].near_y[0]
     scale = 1.0 / distance if abs(distance) > ON_SURFACE_M else 0.0
-    normal_x, normal_y = scale * (x - points.near_x[0]), scale * (y - points.near_y[0])
-    return distance - shape.radius, normal_x, normal_y
+    return distance - shape.radius, scale * (x - near_x), scale * (y - near_y)
 
 
 @njit(cache=True)

@@ -1,4 +1,4 @@
-"""Wheel commands and twists against every robot-action index written out."""
+"""Wheel commands and twists against every robot action written out."""
 
 from itertools import product
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.prediction.wheel_commands import (
-    choices_of,
+    robot_actions,
+    speeds_of,
     twist_table,
     wheel_commands_of,
 )
@@ -21,31 +22,36 @@ EFFECT = np.array([[0.5, 0.5, 0.01], [0.0, 0.0, 0.0], [-18.0, 18.0, 0.0]])
 SKID = np.array([[0.5, 0.5, 0.0], [0.0, 0.0, 0.0], [7.0, 7.0, 0.0]])
 
 
+def test_every_robot_action_has_its_speeds_and_its_twist() -> None:
+    found = wheel_commands_of(COMMANDS, np.array([EFFECT, SKID]))
+    for r, effect in enumerate((EFFECT, SKID)):
+        expected = [[COMMANDS[r, 0, i], COMMANDS[r, 1, j]] for i, j in product(range(4), repeat=2)]
+        np.testing.assert_array_equal(found.speeds[r], expected)
+        for action, speeds in enumerate(expected):
+            twist = effect @ [*speeds, 1.0]
+            np.testing.assert_allclose(found.twists[r, action], twist, atol=1e-12)
+            assert found.alike[r, action] == expected.index(speeds)
+
+
+def test_robot_actions_are_digits_in_base_a() -> None:
+    joint = np.array([[0, 1, 2, 3], [3, 3, 0, 0]])
+    np.testing.assert_array_equal(robot_actions(joint, 2, 4), [[1, 15], [11, 0]])
+    commands = wheel_commands_of(COMMANDS, np.array([EFFECT, EFFECT]))
+    speeds = speeds_of(robot_actions(joint, 2, 4), commands.speeds)
+    np.testing.assert_array_equal(speeds.T[0], [0.13, -0.065, 0.13, 0.0])
+
+
 @pytest.mark.parametrize("merge", [False, True])
 @pytest.mark.parametrize("effect", [EFFECT, SKID])
-def test_every_index_finds_its_speeds_and_its_twist(effect: np.ndarray, merge: bool) -> None:
-    found = wheel_commands_of(COMMANDS, np.array([effect, effect]), merge)
-    for r in range(2):
-        for index, (left, right) in enumerate(product(range(4), repeat=2)):
-            command = found.which[r, index]
-            expected = [COMMANDS[r, 0, left], COMMANDS[r, 1, right]]
-            assert found.speeds[r, command].tolist() == expected
-            assert [found.levels[r, j, found.level[r, j, index]] for j in range(2)] == expected
-            twist = found.twists[r, found.first[r, found.distinct[r, command]]]
-            np.testing.assert_allclose(twist, effect @ [*expected, 1.0], atol=1e-10)
-        told = len(np.unique(found.speeds[r, : found.counts[r]], axis=0))
-        assert found.counts[r] == told == len(set(found.which[r]))
-    if effect is SKID and merge:
-        assert (found.n_distinct < found.counts).all()
-    else:
-        assert (found.n_distinct == found.counts).all()
-
-
-def test_the_table_holds_the_twists_of_every_joint_action() -> None:
-    commands = wheel_commands_of(COMMANDS, np.array([SKID, SKID]), True)
+def test_the_table_holds_the_twists_of_every_joint_action(effect: np.ndarray, merge: bool) -> None:
+    commands = wheel_commands_of(COMMANDS, np.array([effect, effect]))
     joint = np.indices((4,) * 4).reshape(4, -1).T
-    choices, row = twist_table(commands)
-    assert len(choices) == commands.n_distinct.prod()
-    robots = np.arange(2)
-    expected = commands.twists[robots, choices_of(joint, commands.which, 4)]
-    np.testing.assert_allclose(commands.twists[robots, choices[row]], expected, atol=1e-10)
+    choices, rows = twist_table(commands, merge)
+    kinds = [len(set(alike.tolist())) for alike in commands.alike]
+    if merge and effect is SKID:
+        assert choices.shape[1] < np.prod(kinds)
+    else:
+        assert choices.shape[1] == np.prod(kinds)
+    robots = np.arange(2)[:, None]
+    expected = commands.twists[robots, robot_actions(joint, 2, 4)]
+    np.testing.assert_allclose(commands.twists[robots, choices[:, rows]], expected, atol=1e-10)
