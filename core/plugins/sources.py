@@ -27,7 +27,8 @@ from typing import Any, NamedTuple
 from ..isolation import same_folder
 from .compiled import compiled_name
 from .printing import printable
-from .trust import is_trusted, module_text, sha256, trust
+from .syntax import imported
+from .trust import is_trusted, module_text, place_of, sha256, trust
 
 ZIPPED = b"PK"
 """First bytes of a zip file."""
@@ -245,6 +246,13 @@ class Sources:
             raise ValueError(f"{name}: {error.strerror or error}") from None
         except UnicodeDecodeError:
             raise ValueError(f"{name}: is not UTF-8 text") from None
+        for other in imported(text) - {"nested_agents"} if name.endswith(".py") else ():
+            local = [path.parent / f"{other}.py", path.parent / other / "__init__.py"]
+            if any(map(Path.exists, local)) and place_of(other) in (None, *map(str, local)):
+                raise ValueError(
+                    f"{name}: imports {other} from its folder, but a study keeps single files: put "
+                    "both in one file, or install the shared part as a package"
+                )
         return text
 
     def _module(self, name: str) -> ModuleType:

@@ -114,6 +114,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     warnings.formatwarning = _format_warning
+    # `core.fonts` says it in one line for all characters of a figure.
+    warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     warnings.filterwarnings("ignore", message=r".*joblib will operate in serial mode")  # never used
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors in STRICT:

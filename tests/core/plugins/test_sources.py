@@ -21,6 +21,12 @@ def test_a_name_in_a_file_is_found_and_the_file_run_once(tmp_path: Path) -> None
     assert sources.texts == {"arm.py": sources.text("arm.py")}
 
 
+def test_any_edit_of_a_file_counts() -> None:
+    texts = (TEXT, TEXT.replace("3", "4"), "# three\n" + TEXT)
+    digests = [Sources(texts={"arm.py": text}).digest("arm.py") for text in texts]
+    assert len(set(digests)) == 3
+
+
 @pytest.mark.parametrize(
     "content", [TEXT.replace("\n", "\r\n").encode(), b"\xef\xbb\xbf" + TEXT.encode()]
 )
@@ -99,6 +105,25 @@ def test_the_copy_of_a_study_stands_in_for_a_file_that_is_gone(tmp_path: Path) -
     assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 3
     (tmp_path / "links.py").write_text("LINKS = 4")
     assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 4
+
+
+@pytest.mark.parametrize("beside", ["shared.py", "shared/__init__.py"])
+def test_a_file_that_needs_another_one_is_refused(tmp_path: Path, beside: str) -> None:
+    (tmp_path / "links.py").write_text(
+        "def links():\n    from shared import LINKS\n    return LINKS"
+    )
+    Sources(tmp_path).load("links.py:links")  # installed, for all that can be known
+    (tmp_path / beside).parent.mkdir(exist_ok=True)
+    (tmp_path / beside).write_text("LINKS = 3")
+    with pytest.raises(ValueError, match=r"links\.py: imports shared from its folder"):
+        Sources(tmp_path).load("links.py:links")
+
+
+def test_an_installed_module_is_imported_whatever_stands_beside_a_file(tmp_path: Path) -> None:
+    (tmp_path / "links.py").write_text("import random, numpy\nLINKS = numpy.pi, random.random")
+    for beside in ("random.py", "numpy.py"):
+        (tmp_path / beside).write_text("raise ImportError")
+    assert Sources(tmp_path).load("links.py:LINKS")[0] > 3
 
 
 KERNEL = """

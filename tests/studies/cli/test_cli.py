@@ -281,9 +281,9 @@ BAD = {
 def test_an_interrupt_while_starting_up_is_silent(delay):
     """From when `main` has its handler; what Python does before is not ours."""
     program = (
-        "import signal, sys; from nested_agents import __main__ as program; "
-        "handle = signal.signal; "
-        "signal.signal = lambda *given: handle(*given) and None or print(flush=True); "
+        "import sys; from nested_agents import __main__ as program; "
+        "opened = program.open_standard_streams; "
+        "program.open_standard_streams = lambda: print(flush=True) or opened(); "
         "sys.exit(program.main())"
     )
     process = subprocess.Popen(
