@@ -45,6 +45,7 @@ LINES = (
     ("#CC79A7", (0, (6, 1.5)), "v"),
 )
 """Color, line style and marker of the first, second, ... line: they differ in gray, too."""
+EQUAL_COMPUTING = "At equal computing the chain needs the fewest decisions"
 ACTIONS = ("increase", "decrease", "maintain", "zero")
 
 
@@ -482,6 +483,32 @@ def success_by_size() -> Figure:
     return titled(figure, "The team's value lets teams scale to 16 robots")
 
 
+def equal_computing() -> Figure:
+    """Draw success and decisions to the goal by number of robots, for two budgets."""
+    results = load("equal-computing-boxes").results
+    budgets, robots = (64, 1024), (2, 4, 8)
+    names = {"chain": "chain", "tree:2": "binary tree", "star": "star",
+             "independent": "independent agents"}  # fmt: skip
+    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True, sharey="row")
+    for (above, below), budget in zip(panels.T, budgets, strict=True):
+        for line, (name, label) in enumerate(names.items()):
+            cells = [f"hierarchy, topology={name}, robots={n}, budget={budget}" for n in robots]
+            sizes = [n * (1 + 0.04 * (line - 1.5)) for n in robots]
+            draw_points(above, sizes, [success_of(results, c) for c in cells], line, label)
+            steps = [na.bootstrap(results.means(c, "evaluation", "steps")) for c in cells]
+            draw_points(below, sizes, [tuple(map(float, e)) for e in steps], line, label)
+        above.set(title=f"{budget:,} joint actions", ylim=(-0.03, 1.05))
+        below.set_xscale("log", base=2)
+        below.set_xticks(robots, [str(n) for n in robots])
+        below.set(xlabel="robots", ylim=(0, None))
+    panels[0, 0].set_ylabel("success")
+    panels[1, 0].set_ylabel("decisions")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2,
+                  frameon=False)  # fmt: skip
+    return titled(figure, EQUAL_COMPUTING)
+
+
 def outcomes(rates: pd.Series, episodes: int) -> np.ndarray:
     """Return successes ``(n_seeds, episodes)`` with the given rate in each row."""
     return np.arange(episodes) < np.round(rates.to_numpy()[:, None] * episodes)
@@ -515,7 +542,7 @@ def ppo() -> Figure:
 ALL = (
     idea, communication_lookahead, nested_decision, perception, learner, predictions,
     learning_curves, hierarchies, broken_messages, ablation, games, wheel_failure,
-    success_by_size, operations, ppo,
+    success_by_size, operations, equal_computing, ppo,
 )  # fmt: skip
 
 

@@ -24,10 +24,6 @@ __version__: str
 if not Path(__file__).with_name("core").exists():  # a checkout: the four folders are at the top
     __path__.append(str(Path(__file__).parents[1]))
 
-from .core.isolation import ignore_settings_files
-
-ignore_settings_files()
-
 _PLACES = {
     "AgentDecision": ("core.interface.experience", "AgentDecision"),
     "Agents": ("core.interface.agents", "Agents"),

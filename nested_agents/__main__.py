@@ -12,8 +12,6 @@ import signal
 from functools import partial
 from types import FrameType
 
-from .core.isolation import drop_empty_entries, open_standard_streams, restore_child_signal
-
 
 def main() -> int:
     """Run the command line and return its exit status; Ctrl-C ends even the imports in silence."""
@@ -25,9 +23,6 @@ def main() -> int:
     try:
         if is_ours:
             signal.signal(signal.SIGINT, partial(_interrupt, pressed))
-        open_standard_streams()
-        drop_empty_entries()
-        restore_child_signal()
         from .studies.cli.main import main as run
 
         return run()

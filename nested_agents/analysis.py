@@ -9,7 +9,7 @@ from .studies.catalogue.ablation import compared_with_first as compare_with_firs
 from .studies.catalogue.experience import AFTER, evaluated_after
 from .studies.catalogue.hierarchies import analysis_of as compare_hierarchies
 from .studies.catalogue.hierarchies import estimates as estimates_of_hierarchy
-from .studies.catalogue.hierarchies.cases import HierarchyCase
+from .studies.catalogue.sized import SizedCase
 from .studies.catalogue.study import analyse_as, distinct, system_of
 from .studies.catalogue.wheel_failure import courses_of
 from .studies.results import laws, samples
@@ -77,8 +77,8 @@ __all__ = [
     "Estimate",
     "Figures",
     "Friedman",
-    "HierarchyCase",
     "Results",
+    "SizedCase",
     "Sizes",
     "Summary",
     "adjust",

@@ -115,7 +115,6 @@ AXES: dict[str, dict[str, SpecTable]] = {
         "delayed": failing("delayed", "*1"),
         "noisy": failing("noisy", "*1"),
         "absent": failing("absent", "*2"),
-        "reparented": failing("reparented", "*3", superior="FIRST"),
         "left": failing("left", "*2"),
     },
     "one agent for": {

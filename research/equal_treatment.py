@@ -9,7 +9,7 @@ with the chain, in each setting and over all boxes. Measures and margins were na
 from collections.abc import Iterator, Mapping
 
 from nested_agents import load
-from nested_agents.analysis import EVALUATED, HierarchyCase, Results, format_estimate
+from nested_agents.analysis import EVALUATED, Results, SizedCase, format_estimate
 from nested_agents.terminal import print_text
 
 from . import RESULTS
@@ -27,7 +27,7 @@ OTHERS = {"4 joints, ": "edges-arms-again", "": "edges-games-again"}
 """Names of rows of several settings each, by what begins the names of these."""
 HOW = ("told, own plans", "told only, plans", "neither, plans")
 """Evaluations of these rows, in the order of columns."""
-Cases = list[HierarchyCase]
+Cases = list[SizedCase]
 
 
 def settings() -> Iterator[tuple[str, Results, Cases]]:
@@ -53,7 +53,7 @@ def lines() -> list[str]:
         "|---|---|---|---|---|",
     ]
     for setting, results, cases in settings():
-        values = {case.hierarchy: format_estimate(case.values[EVALUATED]) for case in cases}
+        values = {case.name: format_estimate(case.values[EVALUATED]) for case in cases}
         n_seeds = len(results.seeds(cases[0].condition))
         cells = " | ".join(values[name] for name in (TRAINED, *HOW))
         table.append(f"| {setting} | {n_seeds} | {cells} |")

@@ -15,7 +15,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
-from ..core.fonts import cover_text
 from ..core.hierarchy.hierarchy import Hierarchy
 from ..core.numerics import FloatArray, nx
 
@@ -62,7 +61,6 @@ def draw(
     if Path(path).suffix not in (".svg", ".png", ".pdf"):
         raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
     figure = picture(hierarchy, bodies=bodies, title=title, failing=failing)
-    cover_text(figure)
     # Without date and random identifiers, equal hierarchies give equal files.
     metadata = {"Date": None} if Path(path).suffix == ".svg" else None
     with matplotlib.rc_context({"svg.hashsalt": "nested-agents", "svg.fonttype": "none"}):

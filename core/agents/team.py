@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ..hierarchy.failures import LeftAgents, MessageFailure, ReparentedAgents
+from ..hierarchy.failures import LeftAgents, MessageFailure
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.messages import NO_PAYLOADS, Messages, Payloads
 from ..hierarchy.stages import DecisionStage, Inbox, decision_stages
@@ -115,10 +115,10 @@ class Team:
 
     @cached_property
     def _stages(self) -> tuple[DecisionStage, ...]:
-        # Reparented agents may receive actions from agents of their own stage.
+        # After the repair "next", agents may receive actions from agents of their own stage.
         is_sequential = any(
-            isinstance(f, ReparentedAgents) or (isinstance(f, LeftAgents) and f.repair == "next")
-            for f in self.messages.failures
+            isinstance(failure, LeftAgents) and failure.repair == "next"
+            for failure in self.messages.failures
         )
         acts_in_parallel = [part.acts_in_parallel and not is_sequential for part in self.parts]
         return decision_stages(self.hierarchy, self._part_of, acts_in_parallel)

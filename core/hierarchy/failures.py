@@ -1,7 +1,7 @@
 """Failures of messages between agents, and absences of agents, with their times.
 
-Messages of named agents are lost, delayed or replaced by random actions; agents are absent, leave
-the team or get another superior. Random failures have a random stream of their own, so that
+Messages of named agents are lost, delayed or replaced by random actions; agents are absent or leave
+the team. Random failures have a random stream of their own, so that
 environments and policies stay paired. The setting `unseen` of `core.search.settings` says what
 agents assume about actions that they did not receive.
 """
@@ -182,14 +182,6 @@ class AbsentAgents(MessageFailure):
         return np.full_like(sent.actions, LOST)
 
 
-class ReparentedAgents(MessageFailure):
-    """The agents receive from another superior; agents that search over them do not know."""
-
-    kind: Literal["reparented"] = "reparented"
-    superior: str
-    """Name of the new superior, which must decide before the agents."""
-
-
 class LeftAgents(MessageFailure):
     """The agents have left the team, and all others know. The hierarchy is repaired.
 
@@ -211,7 +203,7 @@ class LeftAgents(MessageFailure):
 
 
 AnyMessageFailure = Annotated[
-    LostMessages | DelayedMessages | NoisyMessages | AbsentAgents | ReparentedAgents | LeftAgents,
+    LostMessages | DelayedMessages | NoisyMessages | AbsentAgents | LeftAgents,
     Field(discriminator="kind"),
 ]
 """Any message failure, distinguished by `kind`."""

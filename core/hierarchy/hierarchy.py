@@ -29,7 +29,6 @@ from pydantic import AfterValidator
 
 from ..numerics import nx
 from ..plugins.words import expect, expect_each, expect_pairs
-from .picture import svg
 
 ARROW = "{} -> {}"
 LINE = "{} - {}"
@@ -144,13 +143,6 @@ class Hierarchy:
         pairs = [ARROW.format(self.agents[a], self.agents[b]) for a, b in self.edges]
         pairs += [LINE.format(self.agents[a], self.agents[b]) for a, b in self.neighbors]
         return f"Hierarchy({len(self)} agents: {', '.join(pairs) or 'no edges'})"
-
-    def _repr_svg_(self) -> str:
-        levels = [0] * len(self)
-        for level, agents in enumerate(nx.topological_generations(self._graph)):
-            for agent in agents:
-                levels[agent] = level
-        return svg(self.agents, levels, self.edges, self.neighbors)
 
     def senders(self, agent: int) -> tuple[int, ...]:
         """Return the agents whose decided actions `agent` receives, in agent order."""

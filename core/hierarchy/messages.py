@@ -13,7 +13,6 @@ from .failures import (
     AbsentAgents,
     LeftAgents,
     MessageFailure,
-    ReparentedAgents,
     Sent,
 )
 from .hierarchy import Hierarchy
@@ -63,7 +62,7 @@ class Messages:
     Raises
     ------
     ValueError
-        If a failure names an unknown agent, or a superior that decides too late.
+        If a failure names an unknown agent.
 
     Examples
     --------
@@ -86,14 +85,10 @@ class Messages:
     ) -> None:
         self.failures = tuple(failures)
         self._n_actions = n_actions
-        keys = [f"topology.failures[{k}]" for k in range(len(failures))]
-        pairs = list(zip(failures, keys, strict=True))
-        self._masks = [failure.mask(hierarchy.agents, key) for failure, key in pairs]
-        self._reparented = {
-            k: reparented_senders(hierarchy, failure, np.flatnonzero(self._masks[k]), key)
-            for k, (failure, key) in enumerate(pairs)
-            if isinstance(failure, ReparentedAgents)
-        }
+        self._masks = [
+            failure.mask(hierarchy.agents, f"topology.failures[{k}]")
+            for k, failure in enumerate(failures)
+        ]
         self._repaired: dict[tuple[int, ...], Hierarchy] = {(): hierarchy}
         self._neighbors: list[list[int]] = [[] for _ in hierarchy.agents]
         for a, b in hierarchy.neighbors if hierarchy.communication != "none" else ():
@@ -153,11 +148,7 @@ class Messages:
 
     def received(self, agent: int, joint_action: IntArray) -> Received:
         """Return the messages that reach an agent, given the actions decided so far."""
-        senders: IntArray = self._senders[agent]
-        for k in self._active:
-            if k in self._reparented:
-                senders = self._reparented[k][agent]
-        return self._transmit(senders, [*self._past_actions, joint_action], 0)
+        return self._transmit(self._senders[agent], [*self._past_actions, joint_action], 0)
 
     def received_from_neighbors(self, agent: int) -> Received:
         """Return the messages that neighbors sent in the previous decision."""
@@ -185,7 +176,7 @@ class Messages:
     def failing(self, episode: int, steps: int) -> BoolArray:
         """Return whether messages of an agent fail in the first steps of an episode.
 
-        The array has shape ``(steps, n)``. For reparented agents, their own messages count.
+        The array has shape ``(steps, n)``.
         """
         active = [[f.lasts(episode, step) for f in self.failures] for step in range(steps)]
         return np.array(active) @ np.array(self._masks)
@@ -241,23 +232,3 @@ class Messages:
             for mailbox in received
             for sender, age in zip(mailbox.senders.tolist(), mailbox.ages.tolist(), strict=True)
         )
-
-
-def reparented_senders(
-    hierarchy: Hierarchy, failure: ReparentedAgents, agents: IntArray, key: str
-) -> dict[int, IntArray]:
-    """Return the senders of every agent when some agents have another superior."""
-    names = hierarchy.agents
-    known = f"{key}.superior = {failure.superior!r}"
-    if failure.superior not in names:
-        raise ValueError(f"{known}: no such agent, allowed {', '.join(names[:8])}")
-    superior = names.index(failure.superior)
-    for agent in agents:
-        if hierarchy.order.index(superior) >= hierarchy.order.index(agent):
-            raise ValueError(f"{known}: must decide before {names[agent]!r}")
-    edges = [(names[a], names[b]) for a, b in hierarchy.edges if b not in agents]
-    edges += [(failure.superior, names[agent]) for agent in agents]
-    changed = Hierarchy(
-        names, edges, communication=hierarchy.communication, bodies=hierarchy.bodies
-    )
-    return {i: np.array(changed.senders(i), dtype=np.int64) for i in range(len(hierarchy))}

@@ -2,7 +2,7 @@
 
 A spec names what a user wrote as ``"arm.py:Arm"``, relative to the spec. The text of the file is
 kept with the study and travels to workers, so that nothing else is needed to continue, explain or
-report the study elsewhere. What a file means is its syntax tree: comments and layout do not count.
+report the study elsewhere.
 
 Names are resolved by the `Sources` that are *active*, see `Sources.active`; outside of any study
 these are the files below the working directory. What came with somebody else's study is run only if
@@ -20,7 +20,6 @@ from base64 import b64decode, b64encode
 from binascii import Error as BinasciiError
 from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -28,8 +27,7 @@ from typing import Any, NamedTuple
 from ..isolation import same_folder
 from .compiled import compiled_name
 from .printing import printable
-from .syntax import imported, tree_text
-from .trust import is_trusted, module_text, place_of, sha256, trust
+from .trust import is_trusted, module_text, sha256, trust
 
 ZIPPED = b"PK"
 """First bytes of a zip file."""
@@ -84,8 +82,6 @@ class Sources:
     >>> sources = Sources(texts={"arm.py": "LINKS = 3  # links"})
     >>> sources.load("arm.py:LINKS")
     3
-    >>> sources.digest("arm.py") == Sources(texts={"arm.py": "LINKS=3"}).digest("arm.py")
-    True
     """
 
     def __init__(
@@ -152,14 +148,14 @@ class Sources:
         return self._texts[name]
 
     def digest(self, name: str) -> str:
-        """Return a short hash of what a file means: of its syntax tree, if it is Python.
+        """Return a short hash of the text of a file.
 
         Raises
         ------
         ValueError
-            If there is no such file, or it is no Python.
+            If there is no such file.
         """
-        return meaning(self.text(name), name)
+        return sha256(self.text(name))[:16]
 
     def load(self, reference: str) -> Any:
         """Return what ``"file.py:Name"`` names; the file is run once.
@@ -249,13 +245,6 @@ class Sources:
             raise ValueError(f"{name}: {error.strerror or error}") from None
         except UnicodeDecodeError:
             raise ValueError(f"{name}: is not UTF-8 text") from None
-        for other in imported(text) - {"nested_agents"} if name.endswith(".py") else ():
-            local = [path.parent / f"{other}.py", path.parent / other / "__init__.py"]
-            if any(map(Path.exists, local)) and place_of(other) in (None, *map(str, local)):
-                raise ValueError(
-                    f"{name}: imports {other} from its folder, but a study keeps single files: put "
-                    "both in one file, or install the shared part as a package"
-                )
         return text
 
     def _module(self, name: str) -> ModuleType:
@@ -362,24 +351,6 @@ def kept_name(name: str) -> str:
     flat = quoted.replace("/", "__")
     # File systems take names of up to 255 bytes.
     return flat if len(flat.encode()) <= 200 else f"{sha256(name)}{flat[-30:]}"
-
-
-@cache
-def meaning(text: str, name: str) -> str:
-    """Return a short hash of what a file means: of its syntax tree, if it is Python.
-
-    Raises
-    ------
-    ValueError
-        If it is called so, and is none.
-    """
-    if not name.endswith(".py"):
-        return sha256(text)[:16]
-    try:
-        tree = tree_text(text, name)
-    except (SyntaxError, ValueError, RecursionError) as error:
-        raise ValueError(f"{name} cannot be run: {format_error(error)}") from None
-    return sha256(tree)[:16]
 
 
 def format_error(error: BaseException) -> str:

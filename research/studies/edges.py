@@ -32,8 +32,8 @@ from nested_agents.analysis import (
     Array,
     Estimate,
     Figures,
-    HierarchyCase,
     Results,
+    SizedCase,
     Sizes,
     bootstrap,
     distinct,
@@ -99,7 +99,7 @@ def analyse(results: Results) -> Analysis:
         for name, phase in ({TRAINED: "evaluation"} | results.other_evaluations(condition)).items():
             deciding = numbers[f"decision.{name}"]
             values = estimates(results, condition, phase, deciding, numbers[f"messages.{name}"])
-            cases.append(HierarchyCase(condition, name, value_of, robots, sizes, values, phase))
+            cases.append(SizedCase(condition, name, value_of, robots, sizes, values, phase))
     analysis = analysis_of(results, cases, TRAINED)
     pooled = lines_of(effects(results, cases, TRAINED), TRAINED)
     return replace(analysis, notes=(*analysis.notes, *pooled))
@@ -112,7 +112,7 @@ def draw(analysis: Analysis) -> Figures:
     """
     from nested_agents.figures import draw_forest
 
-    names = {case.hierarchy for case in analysis.cases if EVALUATED in case.values}
+    names = {case.name for case in analysis.cases if EVALUATED in case.values}
     figures = _draw_parted(analysis) if {*sum(PARTED, ())} <= names else {}
     unit = f"difference from {TRAINED}" if not names else f"success less that {TRAINED}"
     return figures | draw_forest("differences", analysis.differences, unit)
@@ -122,8 +122,8 @@ def _draw_parted(analysis: Analysis) -> Figures:
     """Draw success by telling and considering: four fields of a colour for each setting."""
     from nested_agents import figures
 
-    cases = sorted(analysis.cases, key=lambda case: (case.value_of, case.robots))
-    by_name = {(case.setting, case.hierarchy): case.values[EVALUATED] for case in cases}
+    cases = sorted(analysis.cases, key=lambda case: (case.group, case.robots))
+    by_name = {(case.setting, case.name): case.values[EVALUATED] for case in cases}
     settings = distinct(case.setting for case in cases)
     sizes = len({case.robots for case in cases})
     figure, panels = figures.grid(
@@ -186,7 +186,7 @@ class Effect(NamedTuple):
 
 
 def effects(
-    results: Results, cases: Sequence[HierarchyCase], reference: str
+    results: Results, cases: Sequence[SizedCase], reference: str
 ) -> dict[str, tuple[Effect, Effect]]:
     """Return by hierarchy its effects on success and on decisions, over all settings.
 
@@ -195,11 +195,11 @@ def effects(
     """
     if not results.main.is_rate:
         return {}
-    bases = {case.setting: case for case in cases if case.hierarchy == reference}
-    compared: dict[str, list[HierarchyCase]] = {}
+    bases = {case.setting: case for case in cases if case.name == reference}
+    compared: dict[str, list[SizedCase]] = {}
     for case in cases:
-        if case.setting in bases and case.hierarchy != reference:
-            compared.setdefault(case.hierarchy, []).append(case)
+        if case.setting in bases and case.name != reference:
+            compared.setdefault(case.name, []).append(case)
     samples: list[tuple[str, int, Array]] = []
     for hierarchy, own in compared.items():
         for of_seeds in (_success, _decisions):
@@ -221,11 +221,11 @@ def effects(
     return {hierarchy: (both[0], both[1]) for hierarchy, both in by_hierarchy.items()}
 
 
-def _success(results: Results, case: HierarchyCase) -> pd.Series:
+def _success(results: Results, case: SizedCase) -> pd.Series:
     return results.means(case.condition, case.phase)
 
 
-def _decisions(results: Results, case: HierarchyCase) -> pd.Series:
+def _decisions(results: Results, case: SizedCase) -> pd.Series:
     """Return the logarithm of the mean decisions of successful episodes, where there are any."""
     success = results.success(case.condition, case.phase)
     steps = results.values(case.condition, "steps", case.phase)

@@ -13,8 +13,8 @@ from nested_agents import Analysis, Session, Spec, SpecError, Study, rate
 from nested_agents.analysis import (
     EVALUATED,
     Figures,
-    HierarchyCase,
     Results,
+    SizedCase,
     Sizes,
     distinct,
     exactly,
@@ -62,7 +62,7 @@ def analyse(results: Results) -> Analysis:
         values = {EVALUATED: success, "messages": exactly(messages)}
         edges = str(columns.get("name", ""))
         setting = label(game) if game else ""
-        cases.append(HierarchyCase(condition, edges, setting, agents, sizes, values))
+        cases.append(SizedCase(condition, edges, setting, agents, sizes, values))
     return analysis_of(results, cases, REFERENCE)
 
 
@@ -72,13 +72,13 @@ def draw(analysis: Analysis) -> Figures:
 
     cases = analysis.cases
     games = distinct(case.setting for case in cases)
-    edges = distinct(case.hierarchy for case in cases)
+    edges = distinct(case.name for case in cases)
     each = 1.7, 0.6 + 0.22 * len(edges)
     figure, panels = f.grid(len(games), COLUMNS, each, (1.2, 0.6), sharex=True, sharey=True)
     for axes, game in zip(panels.flat, games, strict=False):
         axes.set_title(game, loc="left")
         for case in (case for case in cases if case.setting == game):
-            row = edges.index(case.hierarchy)
+            row = edges.index(case.name)
             colour = f.look(row)["color"]
             f.draw_row(axes, row, case.values[EVALUATED], color=colour, marker=f.marker(row))
         f.as_rates(axes, "x")

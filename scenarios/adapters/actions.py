@@ -62,40 +62,43 @@ class ActionMap:
         self._is_continuous = isinstance(next(iter(spaces.values())), Box)
         if any(isinstance(space, Box) != self._is_continuous for space in spaces.values()):
             raise ValueError("actions: some continuous, some discrete, allowed: one kind")
-        agents = [
-            (player, values)
-            for player, space in spaces.items()
-            for values in _levels(player, space, levels)
-        ]
-        n_actions = max(len(values) for _, values in agents)
+        tables = {player: _values(player, space, levels) for player, space in spaces.items()}
+        n_actions = max(len(values) for table in tables.values() for values in table)
         if n_actions < 2:
             raise ValueError("actions: agents have 1 each, allowed: at least 2")
         # (n_agents, n_actions) values of the actions of each agent
-        self._values = np.array([np.resize(values, n_actions) for _, values in agents])
-        self._members = {
-            player: tuple(i for i, (owner, _) in enumerate(agents) if owner == player)
-            for player in spaces
-        }
+        self._values = np.array(
+            [np.resize(values, n_actions) for table in tables.values() for values in table]
+        )
+        ends = np.cumsum([len(table) for table in tables.values()]).tolist()
+        bodies = [
+            range(end - len(table), end) for end, table in zip(ends, tables.values(), strict=True)
+        ]
+        self._members = dict(zip(spaces, bodies, strict=True))
         self.players = list(spaces)
-        self.groups = tuple(self._members.values())
-        if SINGLE in spaces:
-            self.groups = _checked_groups(groups, len(agents))
+        self.groups = tuple(tuple(body) for body in bodies)
+        if len(spaces) == 1:
+            self.groups = _checked_groups(groups, len(self._values))
             self.players *= len(self.groups)
         self.names = self._agent_names(bool(groups))
         if len(set(self.names)) < len(self.names):
             raise ValueError(f"agents {', '.join(self.names)}: their names must differ")
-        has_bodies = SINGLE not in spaces or bool(groups)
+        has_bodies = len(spaces) > 1 or bool(groups)
         self.roles = tuple(map(_role, self.names)) if has_bodies else self.names
         self.action_set = self._action_set(neutral)
 
     def _agent_names(self, has_groups: bool) -> tuple[str, ...]:
-        if SINGLE in self._spaces and not has_groups:
+        if has_groups:
+            numbered = enumerate(self.groups, 1)
+            return tuple(f"body{b}.{k + 1}" for b, body in numbered for k in range(len(body)))
+        if SINGLE in self._spaces:
             return tuple(f"actuator{k + 1}" for k in range(len(self._values)))
         names: list[str] = []
-        for k, (player, group) in enumerate(zip(self.players, self.groups, strict=True), 1):
-            body = f"body{k}" if has_groups else str(player)
-            is_one = len(group) == 1 and not has_groups
-            names += [body] if is_one else [f"{body}.{i}" for i in range(1, len(group) + 1)]
+        for player, members in self._members.items():
+            single = [str(player)]
+            names += (
+                single if len(members) == 1 else [f"{player}.{k + 1}" for k in range(len(members))]
+            )
         return tuple(names)
 
     def _action_set(self, neutral: int | None) -> ActionSet:
@@ -137,7 +140,7 @@ def _checked_groups(groups: Sequence[Sequence[int]], n: int) -> tuple[tuple[int,
     return tuple(map(tuple, groups))
 
 
-def _levels(player: Player, space: Space, levels: int) -> list[FloatArray]:
+def _values(player: Player, space: Space, levels: int) -> Sequence[FloatArray]:
     """Return the values of the actions of each agent of a player."""
     name = describe("actions", player)
     low, high = action_bounds(space, name)

@@ -1,9 +1,16 @@
-"""Saved states of simulators, from which joint actions are simulated to predict their outcome."""
+"""Copies of simulators, which are stepped to predict the outcome of joint actions.
+
+A MuJoCo simulator saves its ``MjData``, is stepped itself, and is restored. Others are pickled
+without their spaces and windows. Both kinds of copy continue with the random numbers of the
+original.
+"""
 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from importlib import import_module
 from io import BytesIO
 from types import FunctionType, ModuleType
@@ -14,59 +21,62 @@ import gymnasium
 from ...core.plugins.sources import format_error
 from .simulators import Player, Simulator
 
-SHARED_PACKAGES = ("pygame", "mujoco")
-"""Packages of objects that cannot be pickled."""
+SHARED_PACKAGES = ("pygame", "glfw", "OpenGL", "moderngl")
+"""Packages of objects that a simulator and its copies share."""
 SHARED_TYPES = gymnasium.Space, gymnasium.envs.registration.EnvSpec, FunctionType, ModuleType
-"""Types of objects that no step changes."""
+"""Types of objects that no step changes, which are shared, too."""
 
 
-class SavedState:
-    """State of a simulator, including its random numbers, to which it can be restored.
+class SimulatorCopies(ABC):
+    """A saved state of a simulator, valid until the simulator's next step."""
 
-    The attributes of the environment and its wrappers are pickled, except for shared objects. They
-    are pickled one by one, because environments that inherit EzPickle would be constructed again.
-    A MuJoCo simulation is copied as ``MjData``.
-    """
+    @abstractmethod
+    def open(self) -> AbstractContextManager[Simulator]:
+        """Return a context with a simulator in the saved state."""
+
+
+def copy_simulator(simulator: Simulator) -> SimulatorCopies:
+    """Save the present state of a simulator."""
+    data = getattr(simulator.env.unwrapped, "data", None)
+    is_mujoco = type(data).__module__.partition(".")[0] == "mujoco"
+    return MujocoCopies(simulator) if is_mujoco else PickledCopies(simulator)
+
+
+class PickledCopies(SimulatorCopies):
+    """Copies by pickling."""
 
     def __init__(self, simulator: Simulator) -> None:
         self._layers = _layers(simulator)
-        self._shared: dict[int, object] = {id(layer): layer for layer in self._layers}
         file = BytesIO()
-        pickler = _Pickler(file, self._shared)
+        pickler = _Pickler(file, self._layers)
+        # By attribute, because environments that inherit EzPickle would be constructed again.
         pickler.dump([vars(layer) for layer in self._layers])
-        self._attributes = file.getvalue()
-        attributes = vars(simulator.env.unwrapped)
-        self._data: Any = attributes.get("data")
-        self._mujoco: Any = None
-        if type(self._data).__module__.startswith("mujoco"):
-            self._mujoco = import_module("mujoco")
-            self._model = attributes["model"]
-            self._saved_data = self._mujoco.MjData(self._model)
-            self._mujoco.mj_copyData(self._saved_data, self._model, self._data)
+        self._shared = pickler.shared
+        self._saved = file.getvalue()
 
-    def restore(self) -> None:
-        """Restore the simulator to the saved state."""
-        unpickler = _Unpickler(BytesIO(self._attributes), self._shared)
-        for layer, attributes in zip(self._layers, unpickler.load(), strict=True):
-            vars(layer).clear()
+    @contextmanager
+    def open(self) -> Iterator[Simulator]:
+        """Return a context with a new copy."""
+        copies: dict[int, Any] = {id(layer): object.__new__(type(layer)) for layer in self._layers}
+        unpickler = _Unpickler(BytesIO(self._saved), self._shared | copies)
+        for layer, attributes in zip(copies.values(), unpickler.load(), strict=True):
             vars(layer).update(attributes)
-        if self._mujoco is not None:
-            self._mujoco.mj_copyData(self._data, self._model, self._saved_data)
+        yield copies[id(self._layers[0])]
 
 
 class _Pickler(pickle.Pickler):
-    """Pickles only the identity of shared objects."""
+    """Pickles only the identity of the layers themselves and of shared objects."""
 
-    def __init__(self, file: BytesIO, shared: dict[int, object]) -> None:
+    def __init__(self, file: BytesIO, layers: Iterable[object]) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
-        self._shared = shared
+        self.shared: dict[int, object] = {id(layer): layer for layer in layers}
 
     def persistent_id(self, value: object, /) -> int | None:
         """Return the identity of a shared object; None for objects to be pickled."""
         package = type(value).__module__.partition(".")[0]
         if isinstance(value, SHARED_TYPES) or package in SHARED_PACKAGES:
-            self._shared[id(value)] = value
-        return id(value) if id(value) in self._shared else None
+            self.shared[id(value)] = value
+        return id(value) if id(value) in self.shared else None
 
 
 class _Unpickler(pickle.Unpickler):
@@ -79,21 +89,47 @@ class _Unpickler(pickle.Unpickler):
         return self._shared[identity]
 
 
-def find_copy_fault(simulator: Simulator, actions: Mapping[Player, object]) -> str:
-    """Return the reason why a simulator's state cannot be saved; empty if it can.
+class MujocoCopies(SimulatorCopies):
+    """The MuJoCo simulator itself, restored after use."""
 
-    The simulator is reset, stepped and saved. After being restored, it must do the same twice.
+    def __init__(self, simulator: Simulator) -> None:
+        mujoco: Any = import_module("mujoco")
+        env = simulator.env.unwrapped
+        self._simulator = simulator
+        self._env = env
+        self._attributes = [(layer, dict(vars(layer))) for layer in _layers(simulator)]
+        self._copy_data = mujoco.mj_copyData
+        self._saved = mujoco.MjData(env.model)
+        self._copy_data(self._saved, env.model, env.data)
+
+    @contextmanager
+    def open(self) -> Iterator[Simulator]:
+        """Return a context with the simulator; its end restores the saved state."""
+        try:
+            yield self._simulator
+        finally:
+            self._copy_data(self._env.data, self._env.model, self._saved)
+            for layer, values in self._attributes:
+                vars(layer).update(values)
+
+
+def find_copy_fault(simulator: Simulator, actions: Mapping[Player, object]) -> str:
+    """Return the reason why a simulator cannot be copied; empty if it can.
+
+    The simulator is reset and stepped. Two copies and the original must then do the same.
     """
     simulator.reset(0)
+    for _ in range(2):
+        simulator.step(actions)
     results = []
     try:
-        simulator.step(actions)
-        saved = SavedState(simulator)
-        for _ in range(3):
-            results.append(pickle.dumps([simulator.step(actions) for _ in range(2)]))
-            saved.restore()
+        copies = copy_simulator(simulator)
+        for _ in range(2):
+            with copies.open() as copied:
+                results.append(pickle.dumps([copied.step(actions) for _ in range(2)]))
     except Exception as error:  # raised by the environment
         return format_error(error)
+    results.append(pickle.dumps([simulator.step(actions) for _ in range(2)]))
     return "" if len(set(results)) == 1 else "a copy does something else than the original"
 
 

@@ -1,15 +1,20 @@
-"""Numbers of which a player's observation consists: their names, bounds and values."""
+"""Numbers of which a player's observation consists: their names, bounds and values.
+
+The numbers of a Dict are named after its keys. Discrete parts of a Dict are one-hot encoded.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
 from gymnasium.spaces.utils import flatdim, flatten, flatten_space
 
 from ...core.numerics import FloatArray
-from .simulators import Player, Space, describe, when
+from .simulators import MASK_KEYS, Player, Space, describe, mask_error, when
 
 MAX_BOUND = 1e6
 """A space's bound beyond this is taken as infinite."""
@@ -17,8 +22,6 @@ MAX_BOUND = 1e6
 
 class ObservationEntries:
     """The numbers of a player's observations.
-
-    The numbers of a Dict are named after its keys; its discrete parts are one-hot encoded.
 
     Attributes
     ----------
@@ -44,43 +47,36 @@ class ObservationEntries:
     """
 
     def __init__(self, player: Player, space: Space) -> None:
+        self.player = player
+        self.space = space
         self._name = describe("observation", player)
-        self._parts: dict[str, Space] = dict(space.spaces) if isinstance(space, Dict) else {}
-        self._space = space
-        self.is_discrete = isinstance(space, Discrete)
+        parts = dict(space.spaces) if isinstance(space, Dict) else {"o": space}
+        for key, part in parts.items():
+            if key in MASK_KEYS:
+                raise mask_error(player, f"observation has {key}")
+            _check_part(part, self._name)
         self.names: list[str] = []
-        for key, part in (self._parts or {"o": space}).items():
-            self._check_part(key, part)
-            count = 1 if self.is_discrete else flatdim(part)
-            is_single = count == 1 and bool(self._parts)
-            self.names += [key] if is_single else [f"{key}{i}" for i in range(count)]
+        for key, part in parts.items():
+            count = 1 if part is space and isinstance(part, Discrete) else flatdim(part)
+            is_single = count == 1 and part is not space
+            self.names += [str(key)] if is_single else [f"{key}{i}" for i in range(count)]
         for name, count in Counter(self.names).items():
             if count > 1:
                 raise ValueError(f"{self._name}: {count} numbers are named {name}, rename a key")
-        flat = flatten_space(space)
-        if isinstance(space, Discrete):
-            limits = np.array([[space.start], [space.start + space.n - 1]], float)
-        elif isinstance(flat, Box):
-            limits = np.array([flat.low, flat.high], float)
-        self.bounds: FloatArray = np.where(
-            np.abs(limits) > MAX_BOUND, np.copysign(np.inf, limits), limits
-        )
+        self.bounds = self._bounds()
 
-    def _check_part(self, key: str, part: Space) -> None:
-        if key == "action_mask":
-            raise ValueError(
-                f"{self._name}: action_mask, allowed: environments without action masks; wrap "
-                "yours so that an illegal action does something legal"
-            )
-        if not isinstance(part, Box | Discrete | MultiDiscrete | MultiBinary):
-            raise ValueError(
-                f"{self._name}: {part}, allowed: Box, Discrete, MultiDiscrete, MultiBinary, Dict"
-            )
-        if isinstance(part, Box) and len(part.shape) > 1 and part.dtype == np.uint8:
-            raise ValueError(
-                f"{self._name}: images of shape {part.shape}, allowed: vectors of numbers; many "
-                "environments offer states under another id or option"
-            )
+    @property
+    def keys(self) -> list[str]:
+        """Keys of a Dict observation; empty for other spaces."""
+        return list(map(str, self.space)) if isinstance(self.space, Dict) else []
+
+    def _bounds(self) -> FloatArray:
+        if isinstance(self.space, Discrete):
+            first = float(self.space.start)
+            return np.array([[first], [first + float(self.space.n) - 1]])
+        flat: Any = flatten_space(self.space)
+        bounds = np.array([flat.low, flat.high], dtype=np.float64)
+        return np.where(np.abs(bounds) > MAX_BOUND, np.copysign(np.inf, bounds), bounds)
 
     def numbers(self, observation: object, step: int) -> FloatArray:
         """Return the numbers ``(k,)`` of an observation.
@@ -90,25 +86,50 @@ class ObservationEntries:
         ValueError
             If the observation does not fit its space.
         """
-        place = f"{self._name} {when(step)}"
-        if not self._parts:
-            numbers = _flat(self._space, observation, place)
-            return numbers.argmax() + self.bounds[0] if self.is_discrete else numbers
-        given = observation if isinstance(observation, dict) else {}
-        for key in self._parts:
-            if key not in given:
-                raise ValueError(f"{place}: key {key!r} is missing")
-        parts = self._parts.items()
-        return np.concatenate([_flat(part, given[key], f"{place}: {key}") for key, part in parts])
+        name = f"{self._name} {when(step)}"
+        if isinstance(self.space, Dict):
+            if not isinstance(observation, Mapping):
+                observation = {}
+            for key in self.space:
+                if key not in observation:
+                    raise ValueError(f"{name}: key {key!r} is missing")
+            parts = [_flat(p, observation[k], f"{name}: {k}") for k, p in self.space.items()]
+            numbers = np.concatenate(parts)
+        elif isinstance(self.space, Discrete):
+            numbers = np.atleast_1d(_flat(self.space, observation, name).argmax() + self.bounds[0])
+        else:
+            numbers = _flat(self.space, observation, name)
+        if len(numbers) != len(self.names):
+            raise ValueError(f"{name}: {len(numbers)} numbers, allowed: {self.space}")
+        return numbers
 
 
-def _flat(part: Space, value: object, place: str) -> FloatArray:
-    """Return the numbers of a part of an observation; a Box may exceed its bounds."""
+def _check_part(part: Space, name: str) -> None:
+    """Refuse spaces that are not a fixed number of numbers, and images."""
+    if not isinstance(part, Box | Discrete | MultiDiscrete | MultiBinary):
+        raise ValueError(
+            f"{name}: {part}, allowed: Box, Discrete, MultiDiscrete, MultiBinary, Dict"
+        )
+    if isinstance(part, Box) and len(part.shape) > 1 and part.dtype == np.uint8:
+        raise ValueError(
+            f"{name}: images of shape {part.shape}, allowed: vectors of numbers; many environments "
+            "offer states under another id or option"
+        )
+
+
+def _flat(part: Space, value: object, name: str) -> FloatArray:
+    """Return the numbers of a part of an observation; discrete parts are one-hot encoded."""
     array = np.asarray(value)
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{name}: {value!r:.40}, allowed: numbers")
+    with np.errstate(invalid="ignore", over="ignore"):
+        typed = array.astype(part.dtype)
+    if typed.dtype.kind in "biu" and not np.array_equal(typed, array):
+        raise ValueError(f"{name}: {array.ravel().tolist()}, allowed: {part}")
     if isinstance(part, Box):
-        fits = array.shape == part.shape and np.can_cast(array.dtype, part.dtype, "same_kind")
-    else:
-        fits = part.contains(value)
-    if not fits:
-        raise ValueError(f"{place}: {value!s:.60}, allowed: {part}")
-    return np.asarray(flatten(part, value), dtype=np.float64)
+        return typed.ravel().astype(np.float64)
+    if isinstance(part, Discrete) and typed.size == 1:
+        typed = typed.reshape(())
+    if not part.contains(typed):
+        raise ValueError(f"{name}: {typed.ravel().tolist()}, allowed: {part}")
+    return np.asarray(flatten(part, typed), dtype=np.float64)

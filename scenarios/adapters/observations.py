@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 
 import numpy as np
+from gymnasium.spaces import Discrete
 
 from ...core.interface.spaces import Variable
-from ...core.numerics import FloatArray, IntArray, wrap
+from ...core.numerics import BoolArray, FloatArray, IntArray, wrap
 from .entries import ObservationEntries
 from .settings import Direction, Entries, EnvironmentSettings
 from .simulators import EnvironmentStep, Player, Space, describe, when
@@ -17,11 +18,6 @@ MAX_CENTRES = 32
 """Maximum number of values of a discrete observation that each have a membership function."""
 ROUNDING = 1e-6
 """Relative amount by which a number may exceed the bounds of its space."""
-
-Numbers = list[FloatArray]
-"""Numbers of the observation of each player."""
-Explore = Callable[[Callable[[EnvironmentStep], Numbers]], Numbers]
-"""Plays random episodes; returns the minimum and maximum ``(2, k)`` of each player's numbers."""
 
 
 class StateReader:
@@ -36,7 +32,8 @@ class StateReader:
     bodies
         Player of each body.
     explore
-        Called with the method `numbers` if a range is unknown.
+        Returns the minimum and maximum ``(players, 2, k)`` of the numbers in random episodes, given
+        the function that reads these numbers. Called if a range is unknown.
 
     Attributes
     ----------
@@ -60,88 +57,97 @@ class StateReader:
         settings: EnvironmentSettings,
         spaces: Mapping[Player, Space],
         bodies: Sequence[Player],
-        explore: Explore,
+        explore: Callable[[Callable[[EnvironmentStep], FloatArray]], FloatArray],
     ) -> None:
         self._settings = settings
-        self._bodies = bodies
-        self._players = list(spaces)
-        self._entries = {player: ObservationEntries(player, spaces[player]) for player in spaces}
-        places = self._find_places()
+        self._entries = [ObservationEntries(player, space) for player, space in spaces.items()]
+        self._player: IntArray = np.array([list(spaces).index(player) for player in bodies])
+        self._names = self._common_names()
+        # Column of each common number in the observation of each player.
+        self._columns = [[own.names.index(n) for n in self._names] for own in self._entries]
+        columns = zip(self._entries, self._columns, strict=True)
+        self._bounds: FloatArray = np.stack([own.bounds[:, places] for own, places in columns])
+        self._places = self._find_variables()
+        self._is_read: BoolArray = np.zeros((len(spaces), len(self._names)), dtype=bool)
+        for rows in self._places.values():
+            self._is_read[self._player, rows] = True
         explored = cache(lambda: explore(self.numbers))
-        described = {name: self._variable(name, places[name], explored) for name in places}
-        self.variables = tuple(variable for variable in described.values() if variable)
+        described = [self._variable(name, explored) for name in self._places]
+        self.variables = tuple(variable for variable in described if variable is not None)
         names = [variable.name for variable in self.variables]
         self._check_names(names)
-        # (d, bodies) place of each variable, or of the cosine and the sine of an angle
-        self._first: IntArray = np.stack([places[name][0] for name in names])
-        self._last: IntArray = np.stack([places[name][-1] for name in names])
-        self._has_direction = np.array([len(places[name]) == 2 for name in names])
-        self._is_angle = np.array([variable.periodic for variable in self.variables])
-        self.bounds: FloatArray = np.array([self._bounds_of(name, places[name]) for name in names])
+        if not self.variables:
+            raise ValueError("observation: all of its numbers are constant in random episodes")
+        kept = [self._places[name] for name in names]
+        self.bounds: FloatArray = np.array([self._bounds_of(name) for name in names])
+        is_common = [bool((rows == rows[:, :1]).all()) for rows in kept]
         is_single = len(spaces) == 1
-        self.common = tuple(
-            name for name in names if is_single and (places[name] == places[name][:, :1]).all()
-        )
+        pairs = zip(names, is_common, strict=True)
+        self.common = tuple(name for name, same in pairs if same and is_single)
 
-    def _find_places(self) -> dict[str, IntArray]:
-        """Return the places of variables in observations ``(1 or 2, bodies)``, 2 for cos and sin.
-
-        A place is the index of a number in the observation of the player of a body.
-        """
-        settings = self._settings
-        first, *others = (entries.names for entries in self._entries.values())
-        shared = [name for name in first if all(name in other for other in others)]
-        if not settings.variables and any(set(other) != set(shared) for other in (first, *others)):
+    def _common_names(self) -> list[str]:
+        """Return the names of the numbers that all players observe, in the order of the first."""
+        first, *others = self._entries
+        for other in others:
+            if set(other.keys) != set(first.keys):
+                raise ValueError(
+                    f"observation: keys of {first.player} are {', '.join(first.keys) or 'none'}, "
+                    f"of {other.player} {', '.join(other.keys) or 'none'}, allowed: the same keys"
+                )
+        shared = set(first.names).intersection(*(other.names for other in others))
+        if not self._settings.variables and any(set(e.names) != shared for e in self._entries):
             raise ValueError(
                 "scenario.variables is missing: players observe different numbers, name some"
             )
+        return [name for name in first.names if name in shared]
+
+    def _find_variables(self) -> dict[str, IntArray]:
+        """Return the columns of each variable ``(1, bodies)``; ``(2, bodies)`` for cos and sin."""
+        settings = self._settings
         angles = {
-            name: self._find(f"angles.{name}", entries, shared)
-            for name, entries in settings.angles.items()
+            name: self._find(f"angles.{name}", entries) for name, entries in settings.angles.items()
         }
-        if settings.variables:
+        places = {
+            name: self._find(f"variables.{name}", entries)
+            for name, entries in settings.variables.items()
+        }
+        if not settings.variables:
+            used = {int(i) for rows in angles.values() for i in rows.ravel()}
+            n_bodies = len(self._player)
             places = {
-                name: self._find(f"variables.{name}", entries, shared)
-                for name, entries in settings.variables.items()
+                name: np.full((1, n_bodies), i)
+                for i, name in enumerate(self._names)
+                if i not in used
             }
-        else:
-            used = {first[i] for rows in angles.values() for i in rows[:, 0]}
-            free = [name for name in shared if name not in used]
-            places = {name: self._find(name, name, shared) for name in free}
         for name in angles.keys() & places.keys():
             raise ValueError(f"scenario.angles.{name}: another state variable has this name")
         return places | angles
 
-    def _find(self, key: str, entries: Entries | Direction, shared: list[str]) -> IntArray:
+    def _find(self, key: str, entries: Entries | Direction) -> IntArray:
         if isinstance(entries, Direction):
-            parts = [self._find(key, part, shared) for part in (entries.cos, entries.sin)]
-            return np.concatenate(parts)
-        by_body = entries if isinstance(entries, tuple) else (entries,) * len(self._bodies)
-        known: list[str | int] = [*range(len(shared)), *shared]
-        if len(by_body) != len(self._bodies) or not set(by_body) <= set(known):
+            return np.concatenate([self._find(key, entries.cos), self._find(key, entries.sin)])
+        n = len(self._player)
+        count = len(self._names)
+        by_body = entries if isinstance(entries, tuple) else (entries,) * n
+        known: list[str | int] = [*self._names, *range(count)]
+        if len(by_body) != n or not set(by_body) <= set(known):
             raise ValueError(
                 f"scenario.{key} = {entries}, allowed: a number of the observation, 0 to "
-                f"{len(shared) - 1} or {', '.join(shared)}, or one for each of "
-                f"{len(self._bodies)} bodies"
+                f"{count - 1} or {', '.join(self._names)}, or one for each of {n} bodies"
             )
-        names = [shared[entry] if isinstance(entry, int) else entry for entry in by_body]
-        pairs = zip(self._bodies, names, strict=True)
-        return np.array([[self._entries[player].names.index(name) for player, name in pairs]])
+        return np.array([[known.index(entry) % count for entry in by_body]], dtype=np.int64)
 
-    def _variable(
-        self, name: str, places: IntArray, explored: Callable[[], Numbers]
-    ) -> Variable | None:
+    def _variable(self, name: str, explored: Callable[[], FloatArray]) -> Variable | None:
         """Return a state variable; None for an unnamed number that never changes."""
         settings = self._settings
         centres = settings.centres.get(name, ())
         if name in settings.angles:
             return Variable(name, "rad", -np.pi, np.pi, periodic=True, centres=centres)
-        bounds = [entries.bounds for entries in self._entries.values()]
-        low, high = settings.ranges.get(name) or self._range(bounds, places)
+        low, high = settings.ranges.get(name) or self._range(self._bounds, name)
         if not np.isfinite([low, high]).all():
-            low, high = self._range(explored(), places)
+            low, high = self._range(explored(), name)
         if low < high:
-            is_discrete = all(entries.is_discrete for entries in self._entries.values())
+            is_discrete = all(isinstance(own.space, Discrete) for own in self._entries)
             if is_discrete and not centres and high - low < MAX_CENTRES:
                 centres = tuple(np.arange(low, high + 1.0).tolist())
             return Variable(name, "1", low, high, centres=centres)
@@ -152,67 +158,67 @@ class StateReader:
             )
         return None
 
-    def _range(self, bounds: Numbers, places: IntArray) -> tuple[float, float]:
-        """Return the range of a variable over all bodies, from bounds ``(2, k)`` by player."""
-        pairs = zip(self._bodies, places[0], strict=True)
-        ends = [bounds[self._players.index(player)][:, place] for player, place in pairs]
-        return float(np.min(ends)), float(np.max(ends))
+    def _range(self, bounds: FloatArray, name: str) -> tuple[float, float]:
+        """Return the bounds ``(players, 2, k)`` of a variable over all bodies."""
+        rows = self._places[name]
+        low = bounds[self._player, 0, rows].min()
+        high = bounds[self._player, 1, rows].max()
+        return float(low), float(high)
 
-    def _bounds_of(self, name: str, places: IntArray) -> tuple[float, float]:
+    def _bounds_of(self, name: str) -> tuple[float, float]:
         if name in self._settings.angles:
             return -np.pi, np.pi
         if name in self._settings.ranges:
             return -np.inf, np.inf
-        low, high = self._range([entries.bounds for entries in self._entries.values()], places)
+        low, high = self._range(self._bounds, name)
         margin = ROUNDING * max(abs(end) for end in (low, high, 1.0) if np.isfinite(end))
         return low - margin, high + margin
 
     def _check_names(self, names: Sequence[str]) -> None:
-        if not names:
-            raise ValueError("observation: all of its numbers are constant in random episodes")
         settings = self._settings
         success = settings.success if isinstance(settings.success, dict) else {}
-        used = {
-            "ranges": set(settings.ranges),
-            "centres": set(settings.centres),
-            "success": set(success) - {"return"},
+        tables = {
+            "ranges": settings.ranges.keys(),
+            "centres": settings.centres.keys(),
+            "success": success.keys() - {"return"},
         }
-        for key, given in used.items():
-            for name in sorted(given.difference(names)):
-                raise ValueError(
-                    f"scenario.{key}.{name}: no such state variable, known: {', '.join(names)}"
-                )
+        for key, used in tables.items():
+            for name in used:
+                if name not in names:
+                    known = ", ".join(names)
+                    raise ValueError(
+                        f"scenario.{key}.{name}: no such state variable, known: {known}"
+                    )
 
-    def numbers(self, step: EnvironmentStep) -> Numbers:
-        """Return the numbers of the observation of each player.
+    def numbers(self, step: EnvironmentStep) -> FloatArray:
+        """Return the common numbers ``(players, k)`` of the observations.
 
         Raises
         ------
         ValueError
-            If an observation does not fit its space.
+            If an observation does not fit its space, or a number that is used is not finite.
         """
-        return [
-            entries.numbers(step.observations[player], step.step)
-            for player, entries in self._entries.items()
-        ]
+        rows = []
+        for own, columns in zip(self._entries, self._columns, strict=True):
+            rows.append(own.numbers(step.observations[own.player], step.step)[columns])
+        numbers: FloatArray = np.array(rows)
+        for player, column in np.argwhere(self._is_read & ~np.isfinite(numbers)):
+            name = describe("observation", self._entries[player].player)
+            raise ValueError(
+                f"{name} {when(step.step)}: {self._names[column]} = {numbers[player, column]}, "
+                "allowed: finite numbers"
+            )
+        return numbers
 
     def states(self, step: EnvironmentStep) -> FloatArray:
-        """Return the states ``(bodies, d)`` of all bodies.
-
-        Raises
-        ------
-        ValueError
-            If an observation does not fit its space, or a state variable is not finite.
-        """
-        numbers = dict(zip(self._players, self.numbers(step), strict=True))
-        own = [numbers[player] for player in self._bodies]
-        first = np.stack([row[self._first[:, body]] for body, row in enumerate(own)])
-        last = np.stack([row[self._last[:, body]] for body, row in enumerate(own)])
-        angles = np.where(self._has_direction, np.arctan2(last, first), wrap(first))
-        states: FloatArray = np.where(self._is_angle, angles, first)
-        for body, i in np.argwhere(~np.isfinite(states)):
-            raise ValueError(
-                f"{describe('observation', self._bodies[body])} {when(step.step)}: "
-                f"{self.variables[i].name} = {states[body, i]}, allowed: finite numbers"
-            )
-        return states
+        """Return the states ``(bodies, d)`` of all bodies."""
+        numbers = self.numbers(step)[self._player]
+        bodies = np.arange(len(numbers))
+        states = []
+        for variable in self.variables:
+            first, *second = numbers[bodies, self._places[variable.name]]
+            if second:
+                states.append(np.arctan2(second[0], first))
+            else:
+                states.append(wrap(first) if variable.periodic else first)
+        return np.stack(states, axis=1)

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from ...core.interface.measures import NO_SUCCESS, SUCCESS, Measure
 from ...core.interface.prediction import Prediction
@@ -25,11 +24,11 @@ from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.sources import format_error, message
 from ..movies import film, save_picture
 from .actions import ActionMap
-from .copies import SavedState, find_copy_fault
+from .copies import SimulatorCopies, copy_simulator, find_copy_fault
 from .loading import Maker, find_maker
-from .observations import Numbers, StateReader
+from .observations import StateReader
 from .settings import EnvironmentSettings, GymnasiumSettings, PettingZooSettings
-from .simulators import Environment, EnvironmentStep, Simulator
+from .simulators import Environment, EnvironmentStep, Simulator, make_simulator
 
 TRIAL_STEPS = 8
 """Steps played when a scenario is built, so that faults are reported before anything runs."""
@@ -52,8 +51,8 @@ class EnvironmentScenario(Scenario):
     ----------
     settings
         See `EnvironmentSettings`.
-    creator
-        Class or function that makes the environment. By default, what the settings name.
+    make
+        Makes the simulator. By default, the environment that the settings name.
 
     Raises
     ------
@@ -74,14 +73,12 @@ class EnvironmentScenario(Scenario):
     recorded = ("joint_action",)
     repeats = True
 
-    def __init__(
-        self, settings: EnvironmentSettings, creator: Callable[..., object] | None = None
-    ) -> None:
-        self._make = Maker(settings, creator) if creator else find_maker(settings)
-        self._actions, self._reader = inspect_environment(self._make)
+    def __init__(self, settings: EnvironmentSettings, make: Maker | None = None) -> None:
+        self._make = find_maker(settings) if make is None else make
+        self._actions, self._reader = _inspect(settings, self._make)
         self.settings = settings
         self.measures = (SUCCEEDED if settings.success else NO_SUCCESS, REWARD)
-        self._simulator = self._make()
+        self._simulator = self._make(settings, None)
         self.agents = self._actions.names
         self.roles = self._actions.roles
         self.groups = self._actions.groups
@@ -177,13 +174,14 @@ class EnvironmentScenario(Scenario):
         success = self.settings.success
         if not isinstance(success, dict):
             return self._terminated
-        variables = dict(
-            zip([v.name for v in self.state_space.variables], self._states.T, strict=True)
-        )
+        names = [variable.name for variable in self.state_space.variables]
         for name, ends in success.items():
-            values = variables.get(name, self._return)  # only the key "return" is no variable
-            low, high = ends if isinstance(ends, tuple) else (ends, np.inf)
-            if not np.all((low <= values) & (values <= high)):
+            if isinstance(ends, tuple):
+                values = self._states[:, names.index(name)]
+                reached = bool(((ends[0] <= values) & (values <= ends[1])).all())
+            else:
+                reached = self._return >= ends
+            if not reached:
                 return False
         return bool(success)
 
@@ -196,41 +194,37 @@ class EnvironmentScenario(Scenario):
         """Draw the start of the episode, as the environment renders it, to a picture file."""
         if not self.draws:
             raise ValueError(f"{self.settings.id}: renders no pictures")
-        simulator = self._make("rgb_array")
+        simulator = self._make(self.settings, "rgb_array")
         simulator.reset(self._seed)
         figure = Figure(layout="constrained")
         axes = figure.subplots()
-        axes.imshow(_render(simulator))
+        axes.imshow(simulator.env.render())
         axes.axis("off")
         save_picture(figure, path)
 
     def animate(self, recording: Mapping[str, Any], path: Path) -> None:
         """Replay a recorded episode and write it as an animation."""
         try:
-            simulator = self._make("rgb_array")
+            simulator = self._make(self.settings, "rgb_array")
             simulator.reset(int(recording["seed"]))
-            frames = [_render(simulator)]
+            frames = [simulator.env.render()]
             for joint_action in recording["joint_action"][1:]:
                 self.play(simulator, joint_action)
-                frames.append(_render(simulator))
+                frames.append(simulator.env.render())
         except Exception as error:  # raised by the environment, for example without a display
             raise ValueError(f"animation: {format_error(error)}") from None
         fps = float(simulator.env.metadata.get("render_fps", DEFAULT_FPS))
         film(frames.__getitem__, len(frames) - 1, self.settings.hold / fps, path)
 
 
-def _render(simulator: Simulator) -> NDArray[np.uint8]:
-    return np.asarray(simulator.env.render(), dtype=np.uint8)
-
-
 class CopyPrediction(Prediction):
-    """Predicts by playing each joint action in the simulator, which is restored afterwards."""
+    """Predicts by stepping copies of a simulator, once for each joint action."""
 
     def __init__(self, scenario: EnvironmentScenario, simulator: Simulator) -> None:
         self._scenario = scenario
         self._simulator = simulator
-        self._saved: SavedState | None = None
-        self._results: dict[tuple[int, ...], tuple[FloatArray, float]] = {}
+        self._copies: SimulatorCopies | None = None
+        self._results: dict[bytes, tuple[FloatArray, float]] = {}
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
@@ -242,26 +236,39 @@ class CopyPrediction(Prediction):
 
     def _simulate(self, joint_action: IntArray) -> tuple[FloatArray, float]:
         """Return the next states ``(n, d)`` and the mean reward of a joint action."""
-        key = tuple(joint_action.tolist())
+        key = np.ascontiguousarray(joint_action, dtype=np.int64).tobytes()
         if key not in self._results:
-            if self._saved is None:
-                self._saved = SavedState(self._simulator)
+            if self._copies is None:
+                self._copies = copy_simulator(self._simulator)
             total = 0.0
-            try:
+            with self._copies.open() as simulator:
                 for _ in range(self._scenario.horizon):
-                    result = self._scenario.play(self._simulator, joint_action)
+                    result = self._scenario.play(simulator, joint_action)
                     total += float(np.mean(list(result.rewards.values())))
                     if result.is_over:
                         break
-            finally:
-                self._saved.restore()
             states = self._scenario.states_of(result)
             self._results[key] = states, total / self._scenario.horizon
         return self._results[key]
 
 
+def _inspect(settings: EnvironmentSettings, make: Maker) -> tuple[ActionMap, StateReader]:
+    """Return actions and state variables of an environment; report any fault in one line."""
+    try:
+        return inspect_environment(settings, make)
+    except (Exception, SystemExit) as error:  # raised by the environment
+        is_refusal = isinstance(error, ValueError)
+        fault = message(error) if is_refusal else f"cannot be played, {format_error(error)}"
+        if fault.startswith("scenario.") or (is_refusal and not settings.id):
+            raise ValueError(fault) from None
+        name = f"scenario.id = {settings.id!r}" if settings.id else "the environment"
+        raise ValueError(f"{name}: {fault}") from None
+
+
 @lru_cache(maxsize=32)
-def inspect_environment(make: Maker) -> tuple[ActionMap, StateReader]:
+def inspect_environment(
+    settings: EnvironmentSettings, make: Maker
+) -> tuple[ActionMap, StateReader]:
     """Return actions and state variables of an environment, the same in every process.
 
     Raises
@@ -269,32 +276,19 @@ def inspect_environment(make: Maker) -> tuple[ActionMap, StateReader]:
     ValueError
         If the settings do not fit the environment, or the environment is not supported.
     """
-    try:
-        return _inspect(make)
-    except (Exception, SystemExit) as error:  # raised by the environment
-        is_refusal = isinstance(error, ValueError)
-        fault = message(error) if is_refusal else f"cannot be played, {format_error(error)}"
-        if not fault.startswith(("scenario.", make.name)):
-            fault = f"{make.name}: {fault}"
-        raise ValueError(fault) from None
-
-
-def _inspect(make: Maker) -> tuple[ActionMap, StateReader]:
-    settings = make.settings
-    simulator = make()
+    simulator = make(settings, None)
     actions = ActionMap(
         simulator.action_spaces, settings.actions, settings.neutral, settings.bodies()
     )
 
-    def explore(numbers: Callable[[EnvironmentStep], Numbers]) -> Numbers:
+    def explore(numbers: Callable[[EnvironmentStep], FloatArray]) -> FloatArray:
         rng = np.random.default_rng(0)
         samples = [
             numbers(result)
             for episode in range(EXPLORED_EPISODES)
             for result in _play_randomly(simulator, actions, episode, EXPLORED_STEPS, rng)
         ]
-        by_player = zip(*samples, strict=True)
-        return [np.stack([np.fmin.reduce(rows), np.fmax.reduce(rows)]) for rows in by_player]
+        return np.stack([np.min(samples, axis=0), np.max(samples, axis=0)], axis=1)
 
     reader = StateReader(settings, simulator.observation_spaces, actions.players, explore)
     for result in _play_randomly(simulator, actions, 0, TRIAL_STEPS, np.random.default_rng(0)):
@@ -349,7 +343,7 @@ def from_gymnasium(
     >>> from_gymnasium(gymnasium.make("Pendulum-v1"), actions=3).action_set.names
     ('-2', '0', '2')
     """
-    return EnvironmentScenario(GymnasiumSettings(id="", **keys), _creator(env))
+    return EnvironmentScenario(GymnasiumSettings(id="", **keys), _maker_of(env))
 
 
 def from_pettingzoo(
@@ -370,8 +364,13 @@ def from_pettingzoo(
     ValueError
         If the settings do not fit the environment, or the environment is not supported.
     """
-    return EnvironmentScenario(PettingZooSettings(id="", **keys), _creator(env))
+    return EnvironmentScenario(PettingZooSettings(id="", **keys), _maker_of(env))
 
 
-def _creator(env: object) -> Callable[..., object]:
-    return env if callable(env) else lambda **_: env
+def _maker_of(env: object) -> Maker:
+    def make(settings: EnvironmentSettings, render_mode: str | None) -> Simulator:
+        if not callable(env):
+            return make_simulator(env)
+        return make_simulator(env() if render_mode is None else env(render_mode=render_mode))
+
+    return make

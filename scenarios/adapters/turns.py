@@ -24,6 +24,7 @@ from ...core.hierarchy.failures import MessageFailure
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.hierarchy.messages import Messages
 from ...core.numerics import FloatArray, IntArray
+from .simulators import Player, expand_all
 
 
 class TurnBasedEnv(parallel_to_aec_wrapper):
@@ -60,6 +61,9 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
     >>> env.agent_selection, env.observe("robot1.right")[-8:].tolist()
     ('robot1.right', [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     """
+
+    terminations: dict[Player, bool]
+    truncations: dict[Player, bool]
 
     def __init__(
         self,
@@ -121,6 +125,8 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
         if self._messages.failures:
             self._messages.advance(self._joint())
         self._begin_step()
+        self.terminations = expand_all(self.terminations, self.agents)
+        self.truncations = expand_all(self.truncations, self.agents)
         return super()._deads_step_first()
 
     def observe(self, agent: str) -> FloatArray:

@@ -51,17 +51,9 @@ class Begins(Protocol):
         """Start the random numbers of a run."""
 
 
-@runtime_checkable
-class Observes(Protocol):
-    """Policy that observes every step and may learn."""
-
-    def observe(self, reward: Data, observation: Data, terminated: Data, truncated: Data) -> None:
-        """Take in what a step led to."""
-
-
-Policy: TypeAlias = Model | Begins | Observes | Callable[[Data], Data]
+Policy: TypeAlias = Model | Begins | Callable[[Data], Data]
 """Policy: a model, or a function that returns the action for an observation, or for observations by
-agent. It may also be one that `Begins` or `Observes`."""
+agent. It may also be one that `Begins`."""
 
 
 class Wrapping(TypedDict, total=False):
@@ -250,8 +242,6 @@ def returns(
         observation, _ = env.reset(seed=int(world), options={"fault_episode": episode})
         for _ in range(steps):
             observation, reward, terminated, truncated, _ = env.step(act(observation))
-            if isinstance(policy, Observes):
-                policy.observe(reward, observation, terminated, truncated)
             if is_parallel:
                 totals[episode] += sum(reward.values()) / len(env.possible_agents)
                 is_over = not env.agents

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable
-from functools import partial
 from html import escape
 from os import PathLike
 from pathlib import Path
@@ -12,13 +10,8 @@ from typing import NamedTuple
 
 from ...core.plugins.words import closest
 from ..errors import SpecError
-from ..results.results import read
-from ..store.database import Planned
 from ..store.store import Store
 
-FRAME = "<iframe title='{title}' srcdoc='{page}' style='{style}'></iframe>"
-"""Style of the page in a notebook."""
-STYLE = "width: 100%; height: 42rem; border: 0"
 MOST_BYTES = 20_000_000
 """Maximum size of an animation in a notebook [bytes]."""
 
@@ -30,13 +23,8 @@ class Replay(NamedTuple):
     """Path of the file."""
     title: str
     """Condition, seed and episode."""
-    player: Callable[[], str] = str
-    """Returns a page that plays the recorded episodes of the trial; empty where no canvas can."""
 
     def _repr_html_(self) -> str:
-        page = self.player()
-        if page:
-            return FRAME.format(title=escape(self.title), page=escape(page), style=STYLE)
         content = self.path.read_bytes()
         title = escape(self.title)
         if self.path.suffix != ".gif" or len(content) > MOST_BYTES:
@@ -79,14 +67,4 @@ def draw_episode(
         if path is not None or not drawing.exists():
             scenario.animate(store.recording(trial.identity, episode), drawing)
     title = f"{trial.condition}, seed {trial.seed}, {episode} episode"
-    is_played = trial.settings.scenario.player
-    return Replay(drawing, title, partial(_player, directory, trial.planned) if is_played else str)
-
-
-def _player(directory: Path, trial: Planned) -> str:
-    """Return a page that plays the recorded episodes of a trial."""
-    from ..report.page import player_page
-    from ..report.replays import replays
-
-    with Store.open(directory) as store:
-        return player_page(replays(store, read(store), [trial]))
+    return Replay(drawing, title)

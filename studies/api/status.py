@@ -33,18 +33,10 @@ class Progress:
     is left."""
     seconds: float | None
     """Estimate of the time left [s]; None if nothing has finished to go by."""
-    checkpoints: int
-    """Number of waiting trials that would resume from a checkpoint."""
     damaged: tuple[str, ...]
     """What has finished but is not as it was written, one line each; counted as left."""
     refusal: str | None
     """Why the installed code would not go on with the study, in one line; None if it would."""
-
-    @property
-    def is_going_on(self) -> bool:
-        """Whether anything is still to come: of a damaged study only if somebody runs it."""
-        is_possible = self.refusal is None and not self.damaged
-        return bool(self.running or (self.left and is_possible))
 
 
 def progress(store: Store) -> Progress:
@@ -58,7 +50,6 @@ def progress(store: Store) -> Progress:
     running = [(t.condition, t.seed, begun[t.identity]) for t in pending if t.identity in begun]
     waiting = [trial for trial in pending if trial.identity not in begun]
     left = [trial.condition for trial in waiting]
-    checkpoints = store.checkpoints()
     failed = [*states.values()].count("failed")
     usual = cores() if left and refusal is None else 0
     processes = usual if now is None else now[0]
@@ -71,7 +62,6 @@ def progress(store: Store) -> Progress:
         running=tuple(running),
         processes=processes,
         seconds=_estimate(store.mean_seconds(), left, spent, processes),
-        checkpoints=sum(trial.identity in checkpoints for trial in waiting),
         damaged=tuple(store.notes),
         refusal=refusal,
     )
@@ -114,14 +104,11 @@ def describe(store: Store, now: Progress) -> Iterator[str]:
     for condition, seed, seconds in now.running:
         yield f"         {condition}, seed {seed}, for {duration(seconds)}"
     yield f"failed   {now.failed}"
-    begun = f", {now.checkpoints} of them from a checkpoint" if now.checkpoints else ""
-    yield f"left     {now.left}{begun}"
+    yield f"left     {now.left}"
     if now.seconds:
         yield f"time     about {duration(now.seconds)} with {count(now.processes, 'process', 'es')}"
     if not store.is_older and (remark := other_spec(store)) is not None:
         yield f"spec     {remark}"
-    if (versions := store.versions_of_code()) > 1:
-        yield f"code     finished trials are of {versions} versions of the installed code"
     if now.refusal:
         yield f"\nnothing can be added: {now.refusal}"
     for line in now.damaged:

@@ -54,9 +54,8 @@ def print_lines(lines: Iterable[str]) -> None:
 
 def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> None:
     """Print estimates by condition, each over its 95% interval, and its legend or another one."""
-    from rich.console import Console
-
-    table.print(Console())
+    if table.rows:
+        print_text(table.text(get_terminal_size().columns), "")
     print_lines(table.legend if legend is None else legend)
 
 

@@ -5,7 +5,6 @@ interrupted, 141 closed output. A command is one line in `COMMANDS` and a
 click command of that name in a module of `commands`.
 """
 
-import codecs
 import os
 import sys
 import warnings
@@ -22,13 +21,10 @@ from ..errors import SpecError
 from .options import complete
 
 PROGRAM = "nested-agents"
-IN_ASCII = "nested-agents-ascii"
-"""Name of the error handler of the streams: a terminal that lacks dashes shows ``-`` for them."""
+STRICT = ("strict", "surrogateescape")
+"""Error handlers of streams that raise for characters that the terminal lacks."""
 
-REFUSING = ("strict", "surrogateescape")
-"""The error handlers that Python's streams have by locale and that raise for such characters."""
-
-LEAST_ADDRESSES = 10**9
+MIN_ADDRESS_SPACE = 10**9
 """Minimum address space [bytes]; with less, libraries of linear algebra crash or hang."""
 
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
@@ -118,12 +114,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     warnings.formatwarning = _format_warning
-    # `core.fonts` says it in one line for all characters of a figure.
-    warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     warnings.filterwarnings("ignore", message=r".*joblib will operate in serial mode")  # never used
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper) and stream.errors in REFUSING:
-            stream.reconfigure(errors=IN_ASCII)
+        if isinstance(stream, TextIOWrapper) and stream.errors in STRICT:
+            stream.reconfigure(errors="replace")
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
 
 
@@ -139,26 +133,15 @@ def _format_warning(
 
 
 def _check_address_space() -> None:
-    """Refuse to begin what a limit of the shell would not let end."""
+    """Refuse a limit of the shell under which libraries crash or hang."""
     if sys.platform == "win32":
         return
     import resource
 
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if limit != resource.RLIM_INFINITY and limit < LEAST_ADDRESSES:
-        least = LEAST_ADDRESSES // 1024
+    if limit != resource.RLIM_INFINITY and limit < MIN_ADDRESS_SPACE:
+        least = MIN_ADDRESS_SPACE // 1024
         raise SpecError(f"ulimit -v {limit // 1024}: must be at least {least}, or unlimited")
-
-
-def _in_ascii(error: UnicodeError) -> tuple[str, int]:
-    """Return what stands for the characters that a terminal lacks, and where they end."""
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    lacking = error.object[error.start : error.end]
-    return "".join("-" if c in "–−" else "?" for c in lacking), error.end
-
-
-codecs.register_error(IN_ASCII, _in_ascii)
 
 
 def run_to_status(program: str, run: Callable[[], int]) -> int:
@@ -188,15 +171,7 @@ def run_to_status(program: str, run: Callable[[], int]) -> int:
     return 2
 
 
-COMPLETE = "_NESTED_AGENTS_COMPLETE"
-"""Environment variable that a shell sets to ask for completions."""
-
-
 def _run(arguments: list[str]) -> int:
-    if instruction := os.environ.get(COMPLETE):
-        from click.shell_completion import shell_complete
-
-        return shell_complete(nested_agents, {}, PROGRAM, COMPLETE, instruction)
     # Not `nested_agents.main`, which has its own answers to a closed pipe and to Ctrl-C.
     try:
         with nested_agents.make_context(command_line(), arguments) as context:

@@ -11,6 +11,7 @@ from matplotlib.ticker import MultipleLocator
 from ...core.numerics import pd
 from ..errors import WIDTH
 from ..presentation import figures
+from ..presentation.tables import text_of
 from .functions import labels, mean_shares, percent, place
 from .team import Explanation, WheelEffects
 
@@ -107,9 +108,7 @@ def _functions(explained: Explanation) -> Iterator[str]:
 
 
 def _table(cells: Sequence[Sequence[str]], rows: Sequence[str], columns: Sequence[str]) -> str:
-    """Return a table within 80 columns; columns that do not fit follow below."""
-    table = pd.DataFrame(cells, index=rows, columns=columns).to_string(line_width=WIDTH)
-    return table.replace("  \\\n", "\n")
+    return text_of(pd.DataFrame(cells, index=rows, columns=columns))
 
 
 def _names_of_rules(explained: Explanation, j: int) -> list[str]:

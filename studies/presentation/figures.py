@@ -14,7 +14,6 @@ from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import ArrayLike
 
-from ...core.fonts import cover_text
 from ..results.aggregates import Aggregates
 from ..results.analysis import Figures
 from ..results.differences import Difference
@@ -199,7 +198,6 @@ def write(figure: Figure, path: Path) -> None:
     """
     check_suffix(path)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
-    cover_text(figure)
     with apply_style(), replacing(path) as file:
         figure.savefig(file, format=path.suffix[1:], dpi=150, metadata=metadata)
 

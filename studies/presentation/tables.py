@@ -1,8 +1,4 @@
-"""Tables for reading, as Markdown and LaTeX, and as CSV with every digit: of a study, or its rows.
-
-That of rows is for a terminal: it names condition and phase once, above their rows, and rounds.
-What the condition's label says already, the swept keys, is left to CSV and JSON.
-"""
+"""Tables as text, Markdown, HTML and LaTeX for reading, and as CSV and JSON with every digit."""
 
 from __future__ import annotations
 
@@ -14,18 +10,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape as in_html
 from shutil import get_terminal_size
+from textwrap import wrap
 from typing import Any, Literal, NamedTuple, TextIO
 
 import numpy as np
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from ...core.interface.measures import RETURN, SUCCESS, Measure, main_measure
 from ...core.numerics import pd
 from ...core.plugins.printing import printable
 from ...core.plugins.words import expect_each, near
-from ..errors import SpecError
+from ..errors import WIDTH, SpecError
 from ..results.analysis import Summary
 from ..results.notation import format_estimate
 from ..results.spreadsheet import harmless
@@ -40,13 +34,43 @@ FORMATS = {"seed": "d", "episode": "d", "steps": "d", "return": ".4g"}
 MISSING = "–"
 
 
+def text_of(frame: pd.DataFrame, width: int = WIDTH, *, index: bool = True) -> str:
+    """Return a table of texts; columns beyond the width follow below, as a further table.
+
+    Headings that are wider than their column have two lines.
+    """
+    clean = frame.rename(index=lambda label: printable(str(label)))
+    headings = [
+        _in_two_lines(printable(title), max(map(len, frame[title]), default=0)) for title in frame
+    ]
+    if any(above for above, _ in headings):
+        clean.columns = pd.MultiIndex.from_tuples(headings)
+    else:
+        clean.columns = [title for _, title in headings]
+    text = clean.to_string(index=index, line_width=width, sparsify=False).replace("  \\\n", "\n")
+    lines = "\n".join(map(str.rstrip, text.splitlines()))
+    return lines.replace("\n\n\n", "\n\n").lstrip("\n")  # without empty first lines of headings
+
+
+def _in_two_lines(title: str, width: int) -> tuple[str, str]:
+    """Return a heading in two lines if it is wider than its column, otherwise in one.
+
+    >>> _in_two_lines("evaluation success", 6), _in_two_lines("evaluation success", 20)
+    (('evaluation', 'success'), ('', 'evaluation success'))
+    """
+    most = max(width, round(0.6 * len(title)))
+    first, *rest = wrap(title, most, break_long_words=False, break_on_hyphens=False) or [""]
+    return (first, " ".join(rest)) if rest else ("", first)
+
+
 def write_rows(
     frame: pd.DataFrame, measures: Sequence[Measure], form: Format, file: TextIO
 ) -> None:
     """Write a frame of episodes, which has the columns of `measures`.
 
     CSV and JSON hold every digit, so equal results are equal bytes. Truth values are 0 and 1 in
-    CSV, true and false in JSON.
+    CSV, true and false in JSON. The table is rounded, and names condition and phase above their
+    rows.
     """
     if form == "csv":
         file.write(in_csv(frame))
@@ -55,43 +79,29 @@ def write_rows(
         lines = [json.dumps(dict(zip(names, row, strict=True))) for row in rows_of(frame)]
         file.write("[" + ",\n ".join(lines) + "]\n")
     else:
-        text = io.StringIO()  # a console would end the program when its reader goes away
-        console = Console(file=text, width=get_terminal_size().columns, highlight=False)
+        width = get_terminal_size().columns
         for (condition, phase), rows in frame.groupby(["condition", "phase"], sort=False):
-            console.print(f"\n{_literal(condition)}, {_literal(phase)}")
-            console.print(_table(rows, {m.name: m for m in measures}))
-        file.write(text.getvalue())
+            shown = _shown(rows, {m.name: m for m in measures})
+            file.write(f"\n{printable(condition)}, {printable(phase)}\n")
+            file.write(f"{text_of(shown, width, index=False)}\n")
 
 
-def _table(frame: pd.DataFrame, measures: dict[str, Measure]) -> Table:
-    """Return the rows of one condition; no word and no number is broken if there is any room.
+def _shown(frame: pd.DataFrame, measures: dict[str, Measure]) -> pd.DataFrame:
+    """Return the rows of one condition as texts.
 
     What equals success in every row, such as that the box stopped at the goal, is left out; so is
     success where nothing is one.
     """
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="")
-    shown = [name for name in frame.columns if name in FORMATS or name in measures]
-    if SUCCESS.name in shown:
-        same = {n for n in shown if n in measures and frame[n].equals(frame[SUCCESS.name])}
-        shown = [name for name in shown if name == SUCCESS.name or name not in same]
+    names = [name for name in frame.columns if name in FORMATS or name in measures]
+    if SUCCESS.name in names:
+        same = {n for n in names if n in measures and frame[n].equals(frame[SUCCESS.name])}
+        names = [name for name in names if name == SUCCESS.name or name not in same]
         if main_measure([measures.get(SUCCESS.name, SUCCESS)]) == RETURN:
-            shown.remove(SUCCESS.name)
-    cells = [_cells(frame[[name]], measures.get(name)) for name in shown]
-    for name, texts in zip(shown, cells, strict=True):
-        heading = printable(measures[name].heading if name in measures else name)
-        width = max(map(len, texts), default=0)
-        if len(heading) > width:
-            heading = _in_two_lines(heading)
-        least = max(width, *map(len, heading.split()))
-        table.add_column(escape(heading), justify="right", vertical="bottom", min_width=least)
-    for row in zip(*cells, strict=True):
-        table.add_row(*row)
-    return table
-
-
-def _literal(text: str) -> str:
-    """Return text as rich prints it: no markup, and nothing that a terminal obeys."""
-    return escape(printable(text))
+            names.remove(SUCCESS.name)
+    headings = {name: measures[name].heading if name in measures else name for name in names}
+    return pd.DataFrame(
+        {headings[name]: _cells(frame[[name]], measures.get(name)) for name in names}
+    )
 
 
 def _cells(column: pd.DataFrame, measure: Measure | None) -> list[str]:
@@ -165,31 +175,22 @@ class SummaryTable:
     """Lines of the table. It prints as on a terminal of 80 columns; notebooks show HTML."""
 
     def __str__(self) -> str:
-        file = io.StringIO()
-        self.print(Console(file=file, width=80, color_system=None))
-        return "\n".join([*map(str.rstrip, file.getvalue().splitlines()), *self.legend])
+        return "\n".join([self.text(), "", *self.legend] if self.rows else self.legend)
 
-    def print(self, console: Console) -> None:
-        """Print a line of estimates for each condition, each with its 95% interval.
+    def text(self, width: int = WIDTH) -> str:
+        """Return a line of estimates for each condition, each with its 95% interval.
 
-        Columns that do not fit side by side without breaking a word follow below, as a further
-        table. How many seeds there are is a column if conditions differ in it.
+        The number of seeds stands after the label if conditions differ in it.
         """
-        if not self.rows:
-            return
         labels = [
-            _literal(condition if self.seeds else f"{condition} ({count(seeds, 'seed')})")
+            condition if self.seeds else f"{condition} ({count(seeds, 'seed')})"
             for condition, seeds, _ in self.rows
         ]
-        for block in _blocks(self.titles, self.rows, max(map(len, labels)), console.width):
-            table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
-            table.add_column("", overflow="fold")
-            for column in block:
-                table.add_column(escape(column.heading), width=column.width)
-            for label, (_, _, cells) in zip(labels, self.rows, strict=True):
-                table.add_row(label, *(column.padded(cells[column.place]) for column in block))
-            console.print(table)
-            console.print()
+        columns = {
+            title: _aligned([cells[i] for *_, cells in self.rows])
+            for i, title in enumerate(self.titles)
+        }
+        return text_of(pd.DataFrame(columns, index=labels), width) if self.rows else ""
 
     @property
     def seeds(self) -> int:
@@ -363,62 +364,9 @@ Row = tuple[str, int, tuple[Cell | None, ...]]
 """Condition, number of seeds, and a cell per title; none where there is no estimate."""
 
 
-LABEL = 24
-"""Width to which a condition's label may be broken [characters]."""
-
-
-class Column(NamedTuple):
-    """A column on a terminal: values end at one place, and their intervals begin at one."""
-
-    place: int
-    """Index of its title in the table."""
-    heading: str
-    """Title in one or two lines."""
-    value: int
-    """Width of its values [characters]."""
-    width: int
-    """Width [characters]."""
-
-    def padded(self, cell: Cell | None) -> str:
-        """Return a cell of it."""
-        return f"{cell.value:>{self.value}} [dim]{escape(cell.interval)}[/]" if cell else ""
-
-
-def _columns(titles: Sequence[str], rows: Sequence[Row], lines: int) -> Iterator[Column]:
-    """Yield columns with titles of at most `lines` lines, one or two."""
-    for i, title in enumerate(map(printable, titles)):
-        cells = [cell for _, _, row in rows if (cell := row[i])]
-        value = max((len(cell.value) for cell in cells), default=0)
-        interval = max((len(cell.interval) for cell in cells), default=0)
-        width = value + bool(interval) + interval
-        heading = title if lines == 1 or len(title) <= width else _in_two_lines(title)
-        yield Column(i, heading, value, max(width, *map(len, heading.splitlines())))
-
-
-def _in_two_lines(title: str) -> str:
-    """Return a title broken where its lines are shortest, rather after a comma."""
-    gaps = [i for i, letter in enumerate(title) if letter == " "]
-    if not gaps:
-        return title
-    gap = min(gaps, key=lambda i: (max(i, len(title) - i - 1), title[i - 1] != ","))
-    return f"{title[:gap]}\n{title[gap + 1 :]}"
-
-
-def _blocks(
-    titles: Sequence[str], rows: Sequence[Row], label: int, width: int
-) -> list[list[Column]]:
-    """Return blocks of columns that fit side by side, one block if titles of two lines fit.
-
-    Otherwise in as few blocks as fit.
-    """
-    for lines in (1, 2):
-        columns = [*_columns(titles, rows, lines)]
-        if label + sum(2 + column.width for column in columns) <= width:
-            return [columns]
-    n = len(columns)
-    label = min(label, LABEL)
-    for many in range(n, 0, -1):
-        blocks = [columns[k : k + many] for k in range(0, n, many)]
-        if all(label + sum(2 + column.width for column in block) <= width for block in blocks):
-            break
-    return blocks
+def _aligned(cells: Sequence[Cell | None]) -> list[str]:
+    """Return cells in which values end, and intervals begin, at one place."""
+    known = [cell or Cell("", "") for cell in cells]
+    value = max(len(cell.value) for cell in known)
+    interval = max(len(cell.interval) for cell in known)
+    return [f"{cell.value:>{value}} {cell.interval:<{interval}}" for cell in known]

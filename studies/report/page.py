@@ -32,7 +32,7 @@ from ..spec.tables import SpecTable, dumps
 from ..store.store import Store
 from ..workers.runner import installed
 from .pictures import hierarchy_pictures, pictures
-from .replays import Replays, replays
+from .replays import replays
 from .sentences import SIZES, condition_sentences, main_title, methods, significant, verdict
 
 FOLDER = Path(__file__).parent
@@ -173,15 +173,6 @@ def comparison_page(
         css=_read_own("page.css"),
         js=_read_own("page.js"),
     )
-
-
-def player_page(packed: Replays) -> str:
-    """Return a page that plays episodes, for a frame in a notebook; empty without episodes."""
-    if not packed.episodes:
-        return ""
-    script = Markup(packed.script)
-    css = _read_own("page.css")
-    return _template("alone").render(replays=packed, css=css, replay_js=script)
 
 
 def check_path(file: Path) -> None:

@@ -11,7 +11,6 @@ from typing import NamedTuple
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ...core.fonts import cover_text
 from ...topologies.drawing import picture
 from ..errors import SpecError
 from ..presentation.figures import apply_style
@@ -52,7 +51,6 @@ def pictures(figures: Mapping[str, Figure], prefix: str = "figure") -> list[Pict
     drawings = []
     with apply_style():
         for number, (name, figure) in enumerate(figures.items(), 1):
-            cover_text(figure)
             svg = io.StringIO()
             figure.savefig(svg, format="svg", metadata={"Date": None})
             name_space = f"{prefix}{number}-"

@@ -6,6 +6,7 @@ compared by the text of their files: those on the path of Python and those insta
 
 from __future__ import annotations
 
+import ast
 import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -13,7 +14,6 @@ from importlib.metadata import PackageNotFoundError, distribution, packages_dist
 from importlib.util import find_spec
 from pathlib import Path
 
-from ...core.plugins.syntax import imported
 from ...core.plugins.trust import modules_in
 
 LIBRARIES = ("llvmlite", "numba", "numpy", "scipy")
@@ -107,3 +107,20 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "unknown"
+
+
+def imported(text: str) -> set[str]:
+    """Return the top-level names of all modules that Python text imports; none if it is no Python.
+
+    Examples
+    --------
+    >>> sorted(imported("import numpy.linalg; from tank import Tank"))
+    ['numpy', 'tank']
+    """
+    try:
+        nodes = list(ast.walk(ast.parse(text)))
+    except (SyntaxError, ValueError, RecursionError):
+        return set()
+    names = {alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names}
+    names |= {n.module or "" for n in nodes if isinstance(n, ast.ImportFrom) and not n.level}
+    return {name.partition(".")[0] for name in names}

@@ -17,7 +17,6 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import lru_cache
@@ -105,11 +104,6 @@ class Store:
             Planned(identity, condition, seed, dict(_recorded(kept)))
             for identity, condition, seed, kept in rows
         )
-
-    def versions_of_code(self) -> int:
-        """Return how many versions of the installed code have computed the finished trials."""
-        query = "SELECT count(DISTINCT code) FROM trials WHERE state = 'done'"
-        return int(self._db.execute(query).fetchone()[0])
 
     def code(self) -> dict[str, str]:
         """Return digests of the code that the last run used, by module."""
@@ -328,15 +322,6 @@ class Store:
             self._seal(identity)
         with suppress(OSError):
             (self.directory / CHECKPOINTS / f"{identity}.npz").unlink()
-
-    def checkpoints(self) -> dict[str, float]:
-        """Return the age of each trial's checkpoint, by identity [s]."""
-        now = time.time()
-        ages = {}
-        for file in (self.directory / CHECKPOINTS).glob("*.npz"):
-            with suppress(OSError):  # its trial may just have ended
-                ages[file.stem] = max(now - file.stat().st_mtime, 0.0)
-        return ages
 
     def fail(self, trial: Planned, error: str) -> None:
         """Save the traceback of a failed trial."""

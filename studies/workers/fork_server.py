@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...core.isolation import python_command, restore_child_signal
+from ...core.isolation import python_command
 from .preloading import LoadedCode, loaded_code, preload
 from .runner import Outcome, RunTrial, attempt, end_with_parent, storable
 
@@ -110,7 +110,7 @@ def _start_server(parent: int) -> tuple[subprocess.Popen[bytes], Connection]:
 def serve(descriptor: int) -> None:
     """Fork a process for each requested trial, until the connection closes."""
     worker = Connection(descriptor)
-    restore_child_signal()
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent may ignore it; waitpid needs it
     importlib.import_module("nested_agents.studies.trials.session")
     known = LoadedCode((), ())
     while True:

@@ -31,7 +31,7 @@ def test_every_cell_runs_or_says_why_not_as_the_page_does() -> None:
 @pytest.mark.parametrize(
     ("axis", "case", "learner", "verdict"),
     [
-        ("messages", "reparented", "fitted-q", "yes"),
+        ("messages", "absent", "fitted-q", "yes"),
         ("messages", "lost", "mappo", "left out"),
         ("lookahead", "none", "mixed", "yes"),
         ("further", "kept team", "td-lambda", "yes"),

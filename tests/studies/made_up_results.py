@@ -169,7 +169,6 @@ def scaling(success: dict[int, float], seconds_per_agent: float = 1e-4) -> Array
             "seconds.learning": 1e-5 * agents * steps,
             "seconds.physics": 1e-5 * agents * steps,
             "seconds.sensors": 1e-5 * agents * steps,
-            "process_bytes": 2e8 * spread,
         }
     return base
 

@@ -12,13 +12,11 @@ they favor hierarchies that succeed only in easy episodes.
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import SpecError
 from ...results.analysis import (
-    EVALUATED,
     NOTHING,
     Analysis,
     Figures,
@@ -34,11 +32,8 @@ from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exac
 from ...spec.spec import Spec
 from ...spec.tables import label_but
 from ..scaling import NUMBERS, measure
+from ..sized import SizedCase, draw_by_size
 from ..study import check_evaluated, distinct
-from .cases import HierarchyCase
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -80,30 +75,30 @@ def analyse(results: Results) -> Analysis:
         values = estimates(
             results, condition, "evaluation", numbers["decision_median"], numbers["messages"]
         )
-        cases.append(HierarchyCase(condition, hierarchy, value_of, robots, sizes, values))
+        cases.append(SizedCase(condition, hierarchy, value_of, robots, sizes, values))
     return analysis_of(results, cases, REFERENCE)
 
 
-def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str) -> Analysis:
+def analysis_of(results: Results, cases: Sequence[SizedCase], reference: str) -> Analysis:
     """Compare cases with the reference hierarchy, or with the first if it is missing."""
-    values_of = distinct(case.value_of for case in cases)
-    cases = sorted(cases, key=lambda case: (case.robots, values_of.index(case.value_of)))
+    groups = distinct(case.group for case in cases)
+    cases = sorted(cases, key=lambda case: (case.robots, groups.index(case.group)))
     table = [Summary(c.label, len(results.seeds(c.condition)), c.values) for c in cases]
     if not cases:
         return Analysis(())
-    hierarchies = [case.hierarchy for case in cases]
+    hierarchies = [case.name for case in cases]
     reference = reference if reference in hierarchies else hierarchies[0]
     main = results.main
     title = f"evaluation {main.heading}"
     means = [results.means(case.condition, case.phase, main.name) for case in cases]
-    bases = {c.setting: m for c, m in zip(cases, means, strict=True) if c.hierarchy == reference}
+    bases = {c.setting: m for c, m in zip(cases, means, strict=True) if c.name == reference}
     pairs: dict[str, list[Pair]] = {setting: [] for setting in bases}
     for case, own in zip(cases, means, strict=True):
-        if case.setting in bases and case.hierarchy != reference:
-            pairs[case.setting].append((case.hierarchy, title, own, bases[case.setting]))
+        if case.setting in bases and case.name != reference:
+            pairs[case.setting].append((case.name, title, own, bases[case.setting]))
     judgement, lines = judged(pairs, reference, main, title)
     compared = {setting: own for setting, own in judgement.items() if own}
-    notes = ["Rows: setting, hierarchy."] * any(case.value_of for case in cases)
+    notes = ["Rows: setting, hierarchy."] * any(case.group for case in cases)
     return Analysis(tuple(table), (*notes, MESSAGES, "", *(lines or [NOTHING])), cases, compared)
 
 
@@ -134,70 +129,10 @@ def to_the_goal(success: Array, steps: Array) -> Array:
     return np.array([run[reached].mean() for reached, run in runs if reached.any()])
 
 
-def _draw_dots(cases: Sequence[HierarchyCase]) -> "Figure":
-    """Draw success and messages for one team size, with a row for every hierarchy."""
-    from ...presentation import figures
-
-    main = next(iter(cases[0].values))
-    rows = distinct(case.hierarchy for case in cases)
-    values_of = distinct(case.value_of for case in cases)
-    offsets = figures.beside(len(values_of))
-    figure, panels = figures.panels(1, 2, (7.2, 1.3 + 0.36 * len(rows)), sharey=True)
-    for axes, title in zip(panels[0], (main, "messages"), strict=True):
-        for case in cases:
-            i = values_of.index(case.value_of)
-            row = rows.index(case.hierarchy) + offsets[i]
-            colour = figures.COLOURS[i]
-            figures.draw_row(
-                axes, row, case.values[title], color=colour, marker=figures.marker(i), markersize=5
-            )
-        axes.set_xlabel(title)
-        axes.grid(axis="x", alpha=0.25)
-    if main == EVALUATED:
-        figures.as_rates(panels[0, 0], "x")
-    figures.name_rows(panels[0, 0], rows)
-    if len(values_of) > 1:
-        names = [f"value of: {value_of}" for value_of in values_of]
-        figures.name_points(figure, names, "means over seeds, bars: 95% intervals")
-    return figure
-
-
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: success and decision time against the number of robots.
-
-    For a single size it is a chart of success and messages with a row for each hierarchy. Otherwise
-    it has a column of panels for each value that decides. Points are means over seeds with 95%
-    intervals; hierarchies differ by color and marker and are slightly offset.
-    """
-    from ...presentation import figures  # matplotlib takes its time
-
-    cases = analysis.cases
-    if len({case.robots for case in cases}) == 1:
-        return {"hierarchies": _draw_dots(cases)}
-    main = next(iter(cases[0].values))
-    hierarchies = distinct(case.hierarchy for case in cases)
-    values_of = distinct(case.value_of for case in cases)
-    size = (max(5.6, 0.6 + 2.8 * len(values_of)), 5.2)
-    figure, panels = figures.panels(2, len(values_of), size, sharex=True, sharey="row")
-    for column, value_of in zip(panels.T, values_of, strict=True):
-        for index, hierarchy in enumerate(hierarchies):
-            own = [c for c in cases if (c.hierarchy, c.value_of) == (hierarchy, value_of)]
-            for axes, title in zip(column, (main, DECIDING), strict=True):
-                robots = [case.robots for case in own]
-                values = [case.values[title] for case in own]
-                if own:
-                    figures.draw_line(axes, robots, values, index, len(hierarchies))
-        column[0].set_title(f"value of: {value_of}" if value_of else "", loc="left")
-        column[1].set_xlabel(cases[0].sizes.word)
-    for axes in panels.flat:
-        figures.scale_axis(axes, sorted({case.robots for case in cases}))
-    if main == EVALUATED:
-        figures.as_rates(panels[0, 0])
-    figures.log_axis(panels[1, 0])
-    for axes, title in zip(panels[:, 0], (main, "deciding [ms]"), strict=True):
-        axes.set_ylabel(title)
-    figures.name_lines(figure, hierarchies, "means over seeds, bars: 95% intervals")
-    return {"hierarchies": figure}
+    """Return the figure: evaluation, decision time and messages against the number of robots."""
+    titles = [analysis.cases[0].main, DECIDING, "messages"]
+    return {"hierarchies": draw_by_size(analysis.cases, titles)}
 
 
 __all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

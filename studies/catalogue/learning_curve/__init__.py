@@ -13,7 +13,7 @@ import numpy as np
 
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, evaluated
+from ...results.analysis import Analysis, Figures, Summary, estimate_of, evaluated
 from ...results.comparison import mean_estimate, values_by_seed
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rates
@@ -44,27 +44,24 @@ def check(spec: Spec) -> None:
 
 
 Metric = tuple[str, Measure, str]
-"""Heading of a column of the table, which measurement it is, and of which of `BLOCKS`."""
+"""Heading of a column of the table, its measure, and one of `BLOCKS`."""
 
 
 def metrics_of(
     measures: Sequence[Measure], main: Measure, steps: Measure, episodes: int
 ) -> tuple[Metric, ...]:
-    """Return the columns of the table, given the measures of an episode, and their number.
+    """Return the columns of the table, given the measures of an episode and their number.
 
-    The main measure as it begins, as it ends and when evaluated; how the evaluation fares by other
-    rates and how many steps it takes; and every other measure at the end of training. Where
-    training is no longer than a block, its begin is its end.
+    The main measure has columns for the first and last block of training and for the evaluation;
+    measures that are no rates have one for the last block.
     """
     title = main.heading
-    others = [m for m in measures if m.name != SUCCESS.name]
     return (
         *[(f"{title} first {BLOCK}", main, "first")] * (episodes > BLOCK),
         (f"{title} last {BLOCK}", main, "last"),
         (f"evaluation {title}", main, "evaluation"),
-        *((f"{m.title}, evaluation", m, "evaluation") for m in others if m.is_rate),
         ("evaluation steps", steps, "evaluation"),
-        *((m.heading, m, "last") for m in others if not m.is_rate),
+        *((m.heading, m, "last") for m in measures if m.name != SUCCESS.name and not m.is_rate),
     )
 
 
@@ -96,7 +93,6 @@ def analyse(results: Results) -> Analysis:
             if title == f"evaluation {main.heading}":
                 estimates |= evaluated(results, condition)
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
-    _leave_out_same(table)
     followed = []
     for m in dict.fromkeys((main, *measures)):
         own = [c for c in conditions if results.has(c, "training", m.name)]
@@ -105,18 +101,6 @@ def analyse(results: Results) -> Analysis:
             followed.append((m, values))
     is_ragged = any(np.isnan(v).any() for _, values in followed for v in values.values())
     return Analysis(tuple(table), (UNEQUAL,) * is_ragged, followed)
-
-
-def _leave_out_same(table: Sequence[Summary]) -> None:
-    """Leave out rates of evaluation that are its success, wherever they are known."""
-    for title in {title for line in table for title in line.estimates}:
-        if title.endswith(", evaluation") and all(
-            line.estimates[title] == line.estimates.get(EVALUATED)
-            for line in table
-            if title in line.estimates
-        ):
-            for line in table:
-                line.estimates.pop(title, None)
 
 
 def _of_evaluations(results: Results) -> Analysis:

@@ -29,7 +29,6 @@ from ....core.plugins.settings import FailureSpan
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures, Summary, estimate_over_seeds, judged
 from ...results.differences import Pair
-from ...results.notation import wrapped
 from ...results.recovery import BLOCK, FailureCourse, bounded, failure_course
 from ...results.results import KEPT, Results
 from ...results.statistics import Array, bootstrap, exactly, rate
@@ -165,12 +164,6 @@ def analyse(results: Results) -> Analysis:
     notes = ["Rows: fault, then the parts that adapt to it."] if courses else []
     if not all(course.measured.before.any() for course in courses):
         notes.append("Recovery is not measured without successes before the failure.")
-    idle = max((int((~c.measured.before.any(axis=1)).sum()) for c in courses), default=0)
-    if idle:
-        notes += wrapped(
-            f"Seeds without a success in the {BLOCK} episodes before the failure count as "
-            f"recovered at once. A row has at most {idle} of them."
-        )
     if any(course.end is not None for course in courses):
         notes.append("Recovery after the end of a failure is not adaptation.")
     table = tuple(course.summary for course in courses)
@@ -279,9 +272,6 @@ def _mark_failures(axes: Axes, course: Course) -> None:
 
 def _smoothed(success: Array, cuts: Sequence[int]) -> Array:
     """Return running means over the last episodes that do not extend across `cuts`."""
-    means = []
-    for episode in range(success.shape[1]):
-        earliest = max((cut for cut in cuts if cut <= episode), default=0)
-        first = max(earliest, episode - SMOOTHED + 1)
-        means.append(success[:, first : episode + 1].mean(axis=1))
-    return np.stack(means, axis=1)
+    segments = (pd.DataFrame(part.T) for part in np.split(success, cuts, axis=1))
+    means = [part.rolling(SMOOTHED, min_periods=1).mean() for part in segments if len(part)]
+    return np.asarray(pd.concat(means).T)

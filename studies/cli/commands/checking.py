@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,16 +13,10 @@ from .. import options
 from ..display import print_text, print_wrapped
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
-    from ....core.models.predictors import LearnedPredictorSettings
     from ....core.plugins.settings import ScenarioSettings
-    from ...trials.trial import Trial
 
 SHORT = "{:.2g}".format
 """Format of the numbers in tables: two significant digits."""
-LESSONS = 8
-"""Number of training episodes before the errors of a learned predictor are shown."""
 
 
 class ScenarioCase(NamedTuple):
@@ -46,8 +39,7 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
     """Check the contract of scenarios, such as equal results for equal seeds.
 
     A table shows the range and the observed values of every variable, and the root mean square
-    errors of its prediction and of persistence. If agents learn a model, a second table shows
-    its errors after a few episodes.
+    errors of its prediction and of persistence.
 
     With SPEC.toml, the scenario of each condition is checked. With FILE.py:NAME, the scenario that
     this function or class of a Python file builds is checked. A class with a nested class Settings
@@ -83,49 +75,11 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
             _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
     if is_spec and not faults:
         check_conditions(Spec.load(Path(source), changes))
-        for label, errors in _learned_errors(source, changes, steps):
-            print_wrapped(
-                f"{label}: prediction errors after {LESSONS} training episodes", "learned  ", 8
-            )
-            _print_frame(errors.to_string(float_format=SHORT))
     return 1 if faults else 0
 
 
 def _print_frame(text: str) -> None:
     print_text("", text, "")
-
-
-def _learned_errors(
-    source: str, changes: tuple[str, ...], steps: int
-) -> Iterator[tuple[str, DataFrame]]:
-    """Yield the errors of learned predictors by variable, see `errors_of`, each once."""
-    from ...explain.team import errors_of
-    from ...spec.spec import Spec
-    from ...trials.session import Session
-    from ...trials.trial import trials_of
-
-    checked: set[tuple[ScenarioSettings, LearnedPredictorSettings]] = set()
-    for trial in trials_of(Spec.load(Path(source), changes)):
-        predictor = _learned_predictor(trial)
-        if predictor is None or (trial.settings.scenario, predictor) in checked:
-            continue
-        checked.add((trial.settings.scenario, predictor))
-        session = Session(replace(trial, episodes=LESSONS, steps=steps, curriculum=()))
-        session.train(LESSONS)
-        errors = errors_of(session.team, session.scenario, trial.seed)
-        if errors is not None:
-            yield trial.condition, errors
-
-
-def _learned_predictor(trial: Trial) -> LearnedPredictorSettings | None:
-    """Return the settings of the learned predictor of a trial; None without one."""
-    from ....core.learners import LearnerSettings
-    from ....core.models.predictors import LearnedPredictorSettings
-
-    learner = trial.settings.learner
-    if not isinstance(learner, LearnerSettings):
-        return None
-    return learner.predictor if isinstance(learner.predictor, LearnedPredictorSettings) else None
 
 
 def _case_of_file(source: str) -> ScenarioCase:

@@ -2,14 +2,11 @@
 
 import io
 import json
-import sys
-import time
 from pathlib import Path
 from typing import Literal, TypedDict, Unpack
 
 import click
 
-from ....core.plugins.printing import printable
 from ....core.shell import command_line
 from ...api.status import describe, failures, progress
 from ...errors import SpecError, refused
@@ -37,20 +34,14 @@ from ..loading import (
     untrusted,
 )
 
-PERIOD = 2.0
-"""Polling interval of a watched study [s]."""
-
 
 @click.command()
 @options.directory
-@options.flag("--watch", "On a terminal, look again every two seconds while anything is to come.")
-def status(directory: Path, watch: bool) -> int:
-    """Tell how many trials are done, running, failed (with the reason) and left, and for how long.
+def status(directory: Path) -> int:
+    """Show progress, failures and remaining time.
 
     DIR is the folder of the study. Reading it does not disturb a run.
     """
-    if watch and sys.stdout.isatty():
-        _watch(directory)
     with Store.open(directory) as store:
         print_lines(describe(store, progress(store)))
         failed = store.failed()
@@ -59,22 +50,6 @@ def status(directory: Path, watch: bool) -> int:
     if failed:
         print_text(f"\nto run them again: {command_line('retry', directory)}")
     return 1 if failed else 0
-
-
-def _watch(directory: Path) -> None:
-    """Show how far a study is until nothing is to come."""
-    from rich.live import Live
-    from rich.text import Text
-
-    with Live(auto_refresh=False, transient=True) as live:
-        while True:
-            with Store.open(directory) as store:
-                now = progress(store)
-                lines = "\n".join(describe(store, now))
-            live.update(Text(printable(lines)), refresh=True)
-            if not now.is_going_on:
-                return
-            time.sleep(PERIOD)
 
 
 @click.command()

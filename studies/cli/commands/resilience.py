@@ -50,6 +50,8 @@ def resilience(
     DIR is the folder of a study that keeps its teams (keep_teams = true). Teams are not trained
     again. Each agent is lost in turn, then pairs, then larger sets, until success halves.
     """
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)  # refused before the teams are evaluated
     loaded = read_results((directory,), where=where, trust=trust)
     say_remarks(loaded)
     report = loaded.resilience(**choices)
@@ -63,6 +65,5 @@ def resilience(
     if out is not None:
         from ...presentation.figures import save
 
-        out.mkdir(parents=True, exist_ok=True)
         print_text(*save(report.figures(), out))
     return 0

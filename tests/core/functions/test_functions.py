@@ -14,7 +14,6 @@ from nested_agents.core.hierarchy.failures import (
     DelayedMessages,
     LostMessages,
     NoisyMessages,
-    ReparentedAgents,
 )
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners import LEARNERS
@@ -205,17 +204,6 @@ def test_actions_alone_are_heard_if_the_receiver_wants_no_more() -> None:
     team.act(look(world))
     assert calls[1][2] == {"cart1": ("increase", None)}
     assert team.decision_costs == {"calls": 2, "messages": 1, "message_bytes": 0}
-
-
-def test_whoever_has_another_superior_is_told_what_that_one_decides() -> None:
-    names = ["cart1", "cart2", "cart3"]
-    star = Hierarchy(names, [("cart1", "cart2"), ("cart1", "cart3")])
-    reparented = ReparentedAgents(agents="cart3", superior="cart2")
-    team, world, calls = team_of("echo", hierarchy=star, failures=[reparented])
-    for _ in range(2):
-        team.act(look(world))
-    # cart2 has decided `decrease`, not the neutral action
-    assert calls[-1][2]["cart2"] == ("decrease", "cart21")
 
 
 def test_functions_and_learners_are_one_team() -> None:

@@ -11,7 +11,6 @@ from nested_agents.core.hierarchy.failures import (
     LostMessages,
     MessageFailure,
     NoisyMessages,
-    ReparentedAgents,
 )
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.hierarchy.messages import Messages
@@ -78,14 +77,6 @@ def test_who_is_absent_says_nothing() -> None:
     assert not made.absent(every).size
 
 
-def test_who_has_another_superior_is_told_by_that_one_and_those_above_it() -> None:
-    made = messages(ReparentedAgents(agents="d", superior="b", step=1))
-    assert heard(made, 3).keys() == {0, 1, 2}
-    made.advance(DECIDED)
-    assert heard(made, 3).keys() == {0, 1}
-    assert heard(made, 2).keys() == {0, 1}
-
-
 def test_the_same_seed_loses_the_same_messages() -> None:
     one, same, other = (messages(LostMessages(agents="*", probability=0.5)) for _ in range(3))
     other.reset(6, episode=0)
@@ -105,9 +96,6 @@ def test_whose_messages_fail_when_is_known_beforehand() -> None:
     ("failure", "complaint"),
     [
         (LostMessages(agents="e"), r"topology.failures\[0\].agents = 'e': no such agent, allowed"),
-        (ReparentedAgents(agents="b", superior="z"), "superior = 'z': no such agent, allowed a, b"),
-        (ReparentedAgents(agents="b", superior="c"), "superior = 'c': must decide before 'b'"),
-        (ReparentedAgents(agents="b", superior="b"), "superior = 'b': must decide before 'b'"),
     ],
 )
 def test_failures_of_agents_that_do_not_exist_are_refused(failure, complaint) -> None:

@@ -22,20 +22,6 @@ def test_a_name_in_a_file_is_found_and_the_file_run_once(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("other", "same"),
-    [
-        ("# three\n" + TEXT, True),
-        (TEXT.replace("LINKS = 3", "LINKS=3  # links"), True),
-        (TEXT.replace("3", "4"), False),
-        (TEXT.replace("2 * x", "x * 2"), False),
-    ],
-)
-def test_only_what_is_run_counts(other: str, same: bool) -> None:
-    one, two = (Sources(texts={"arm.py": text}).digest("arm.py") for text in (TEXT, other))
-    assert (one == two) is same
-
-
-@pytest.mark.parametrize(
     "content", [TEXT.replace("\n", "\r\n").encode(), b"\xef\xbb\xbf" + TEXT.encode()]
 )
 def test_other_line_ends_and_a_byte_order_mark_change_nothing(
@@ -75,8 +61,6 @@ def test_what_is_no_text_is_refused(tmp_path: Path) -> None:
     for name, complaint in (("arm.py", "is not UTF-8 text"), ("long.py", "is larger than allowed")):
         with pytest.raises(ValueError, match=rf"^{name}: {complaint}"):
             Sources(tmp_path).text(name)
-    with pytest.raises(ValueError, match=r"^arm\.py cannot be run: SyntaxError: .*\(arm\.py, line"):
-        Sources(texts={"arm.py": "x ="}).digest("arm.py")
 
 
 def test_texts_travel_without_their_folder(tmp_path: Path) -> None:
@@ -115,25 +99,6 @@ def test_the_copy_of_a_study_stands_in_for_a_file_that_is_gone(tmp_path: Path) -
     assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 3
     (tmp_path / "links.py").write_text("LINKS = 4")
     assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 4
-
-
-@pytest.mark.parametrize("beside", ["shared.py", "shared/__init__.py"])
-def test_a_file_that_needs_another_one_is_refused(tmp_path: Path, beside: str) -> None:
-    (tmp_path / "links.py").write_text(
-        "def links():\n    from shared import LINKS\n    return LINKS"
-    )
-    Sources(tmp_path).load("links.py:links")  # installed, for all that can be known
-    (tmp_path / beside).parent.mkdir(exist_ok=True)
-    (tmp_path / beside).write_text("LINKS = 3")
-    with pytest.raises(ValueError, match=r"links\.py: imports shared from its folder"):
-        Sources(tmp_path).load("links.py:links")
-
-
-def test_an_installed_module_is_imported_whatever_stands_beside_a_file(tmp_path: Path) -> None:
-    (tmp_path / "links.py").write_text("import random, numpy\nLINKS = numpy.pi, random.random")
-    for beside in ("random.py", "numpy.py"):
-        (tmp_path / beside).write_text("raise ImportError")
-    assert Sources(tmp_path).load("links.py:LINKS")[0] > 3
 
 
 KERNEL = """

@@ -152,6 +152,36 @@ class EndsApart(Walkers):
         return observed, rewards, terminated, truncated, infos
 
 
+class EndsForAll(Walkers):
+    """The key __all__ ends the episode after 5 steps, as in RLlib; no agent has a flag of its own.
+
+    `which` are terminations or truncations, by their place in what a step returns.
+    """
+
+    which = 2
+
+    def step(self, actions: Any) -> Any:
+        parts = list(super().step(actions))
+        parts[2], parts[3] = {"__all__": False}, {"__all__": False}
+        parts[self.which] = {"__all__": self.t >= 5}
+        parts[4] = {"__common__": {}, **parts[4]}
+        return tuple(parts)
+
+
+class CutForAll(EndsForAll):
+    """The same, truncated."""
+
+    which = 3
+
+
+class StrayEnd(Walkers):
+    """Terminations name an agent that nobody knows."""
+
+    def step(self, actions: Any) -> Any:
+        observed, paid, ends, *rest = super().step(actions)
+        return observed, paid, {**ends, "agent_2": False}, *rest
+
+
 class Numbered(Walkers):
     """Ids are numbers, and 0 is one."""
 
@@ -242,6 +272,14 @@ class Masked(Walkers):
         return {"observation": super().look(agent), "action_mask": np.ones(3, np.int8)}
 
 
+class MaskedBeside(Walkers):
+    """Infos say which actions are legal."""
+
+    def step(self, actions: Any) -> Any:
+        result = super().step(actions)
+        return (*result[:4], {agent: {"action_mask": np.ones(3, np.int8)} for agent in actions})
+
+
 class PaidInArrays(Walkers):
     """Rewards are arrays of one number."""
 
@@ -314,6 +352,19 @@ class Reusing(Walkers):
         return self.buffers[agent]
 
 
+class ReusingAfterwards(Reusing):
+    """The first walker leaves after step 3; its array is written to by and by."""
+
+    def step(self, actions: Any) -> Any:
+        observed, rewards, terminated, truncated, infos = super().step(actions)
+        if self.t == 3:
+            terminated["agent_0"] = True
+            self.agents = ["agent_1"]
+        elif self.t > 3:
+            self.buffers["agent_0"][:] = 99.0
+        return observed, rewards, terminated, truncated, infos
+
+
 class Huge(Walkers):
     """Bounds that are none, as some spaces have them; and actions of such."""
 
@@ -348,10 +399,9 @@ class Turns(AECEnv[Any, Any, Any]):
     """Two walkers that take turns and move together after the last turn."""
 
     metadata = {"name": "turns", "render_modes": [], "is_parallelizable": True}  # noqa: RUF012
-    ids: tuple[Any, ...] = ("first", "second")
 
     def __init__(self) -> None:
-        self.possible_agents = list(self.ids)
+        self.possible_agents = ["first", "second"]
         self.render_mode = None
 
     def observation_space(self, agent: Any) -> Any:
@@ -365,7 +415,7 @@ class Turns(AECEnv[Any, Any, Any]):
 
     def reset(self, seed: int | None = None, options: Any = None) -> Any:
         rng = np.random.default_rng(seed)
-        self.agents = list(self.ids)
+        self.agents = ["first", "second"]
         self.x = {agent: rng.uniform(-0.5, 0.5) for agent in self.agents}
         self.t = 0
         self.rewards = dict.fromkeys(self.agents, 0.0)
@@ -394,9 +444,19 @@ class Turns(AECEnv[Any, Any, Any]):
 
 
 class NumberedTurns(Turns):
-    """Players that take turns are numbered."""
+    """Its players are numbered, which PettingZoo cannot make parallel."""
 
-    ids = (0, 1)
+    def __init__(self) -> None:
+        super().__init__()
+        self.possible_agents = [0, 1]
+
+
+class TurnsForAll(Turns):
+    """The key __all__ of truncations ends the episode after 5 steps."""
+
+    def step(self, action: Any) -> Any:
+        super().step(action)
+        self.truncations = {**self.truncations, "__all__": self.t >= 5}
 
 
 class Cart(gymnasium.Env[Any, Any]):
@@ -445,3 +505,11 @@ class CartPaidInArrays(Cart):
     def step(self, action: Any) -> Any:
         observed, reward, *rest = super().step(action)
         return observed, np.array([[reward]]), *rest
+
+
+class UndecidedCart(Cart):
+    """Whether it has terminated is not said."""
+
+    def step(self, action: Any) -> Any:
+        observed, reward, _, *rest = super().step(action)
+        return observed, reward, None, *rest

@@ -22,7 +22,7 @@ def test_parts_of_a_dict_stand_in_its_order() -> None:
 def test_a_choice_is_a_number() -> None:
     entries = ObservationEntries("a", Discrete(3, start=5))
     assert entries.bounds.tolist() == [[5.0], [7.0]]
-    for seen in (6, np.int64(6), np.array(6)):
+    for seen in (6, np.int64(6), np.array(6), np.array([6])):
         assert entries.numbers(seen, 0).tolist() == [6.0]
 
 
@@ -35,15 +35,15 @@ def test_bounds_beyond_a_million_are_none() -> None:
 @pytest.mark.parametrize(
     ("space", "seen", "message"),
     [
-        (Dict({"side": Discrete(2)}), {"side": -1}, r"side: -1, allowed: Discrete"),
-        (Dict({"side": Discrete(2)}), {"side": 2}, r"side: 2, allowed: Discrete"),
+        (Dict({"side": Discrete(2)}), {"side": -1}, r"side: \[-1\], allowed: Discrete"),
+        (Dict({"side": Discrete(2)}), {"side": 2}, r"side: \[2\], allowed: Discrete"),
         (Dict({"side": Discrete(2)}), {}, "key 'side' is missing"),
         (Dict({"side": Discrete(2)}), np.zeros(2), "key 'side' is missing"),
         (MultiDiscrete([2, 2]), [0, 2], r"\[0, 2\], allowed: MultiDiscrete"),
         (Box(-1, 1, (2,), np.int8), [0.5, 0.0], r"\[0\.5, 0\.0\], allowed: Box"),
         (Box(0, 9, (2,), np.uint8), [-1, 0], r"\[-1, 0\], allowed: Box"),
-        (Box(0.0, 1.0, (2,)), {"x": 1}, "allowed: Box"),
-        (Box(0.0, 1.0, (2,)), np.zeros(3), "allowed: Box"),
+        (Box(0.0, 1.0, (2,)), {"x": 1}, "allowed: numbers"),
+        (Box(0.0, 1.0, (2,)), np.zeros(3), "at step 7: 3 numbers, allowed: Box"),
         (Discrete(3), np.zeros(2), "allowed: Discrete"),
     ],
 )

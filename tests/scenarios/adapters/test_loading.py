@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +93,7 @@ def test_a_study_keeps_the_file_and_asks_for_trust(
         (GymnasiumSettings(id="nothing.py:Cart"), "nothing.py: No such file"),
         (
             PettingZooSettings(id="sisl/multiwalker-v0"),
-            "is not registered with PettingZoo, and is no module; did you mean",
+            "is not registered with PettingZoo; did you mean",
         ),
     ],
 )
@@ -107,8 +108,10 @@ def test_what_cannot_be_made_is_refused_by_its_id(
 
 def test_registered_ids_stand_beside_modules() -> None:
     pytest.importorskip("Box2D")
-    ids = "sisl/multiwalker-v9", "pettingzoo/sisl/multiwalker_v9"
-    worlds = [PettingZooSettings(id=name).build() for name in ids]
+    ids = "sisl/multiwalker-v9", "pettingzoo/sisl/multiwalker_v9", "pettingzoo.sisl.multiwalker_v9"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)
+        worlds = [PettingZooSettings(id=name).build() for name in ids]
     assert {world.agents for world in worlds} == {worlds[0].agents}
     assert len({world.reset(0).tobytes() for world in worlds}) == 1
 

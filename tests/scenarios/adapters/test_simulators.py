@@ -11,13 +11,18 @@ from made_up_environments import (
     LENGTH,
     Cart,
     CartPaidInArrays,
+    CutForAll,
     EndsApart,
+    EndsForAll,
     LateButSeeing,
     MixedEnd,
     Numbered,
     NumberedTurns,
     PaidInArrays,
+    ReusingAfterwards,
+    StrayEnd,
     Turns,
+    TurnsForAll,
     Unnamed,
     Walkers,
 )
@@ -71,6 +76,29 @@ def test_an_episode_ends_when_each_has_ended_in_either_way() -> None:
     assert (played[-1].terminated, played[-1].truncated) == (True, False)
 
 
+@pytest.mark.parametrize(
+    ("env", "terminated"), [(EndsForAll(), True), (CutForAll(), False), (TurnsForAll(), False)]
+)
+def test_the_key_for_all_ends_an_episode(env: Any, terminated: bool) -> None:
+    _, played = play(env)
+    assert len(played) == 6
+    assert (played[-1].terminated, played[-1].truncated) == (terminated, not terminated)
+    _, again = play(env)
+    assert len(again) == 6
+
+
+def test_an_agent_may_be_called_as_the_key_for_all() -> None:
+    class Called(Walkers):
+        ids = ("__all__", "b")
+
+    assert len(play(Called())[1]) == LENGTH + 1
+
+
+def test_a_flag_of_an_unknown_agent_is_refused() -> None:
+    with pytest.raises(ValueError, match="terminations at step 1: 'agent_2' is not in possible"):
+        play(StrayEnd())
+
+
 def test_rewards_of_one_number_are_numbers() -> None:
     _, played = play(PaidInArrays())
     assert {type(reward) for step in played for reward in step.rewards.values()} == {float}
@@ -84,11 +112,20 @@ def test_who_observes_from_the_start_may_act_later() -> None:
     assert played[1].rewards["agent_1"] == 0.0
 
 
+def test_who_has_left_observes_what_it_last_observed() -> None:
+    _, played = play(ReusingAfterwards())
+    last = [step.observations["agent_0"] for step in played[4:]]
+    assert all(seen[1] == pytest.approx(0.3) for seen in last)  # type: ignore[index]
+
+
 @pytest.mark.parametrize(
     ("env", "message"),
     [
-        (3, "is int, allowed: gymnasium.Env"),
-        (gymnasium.vector.SyncVectorEnv([Cart, Cart]), "is SyncVectorEnv, allowed: gymnasium.Env"),
+        (3, "is int, allowed: an environment of Gymnasium or PettingZoo"),
+        (
+            gymnasium.vector.SyncVectorEnv([Cart, Cart]),
+            "is a vector of environments, allowed: a single",
+        ),
         (NumberedTurns(), "possible_agents: 0 is not text"),
     ],
 )

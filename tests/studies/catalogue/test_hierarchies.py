@@ -124,7 +124,7 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     partly = {key: chance for key, chance in CHANCES.items() if key[:2] != ("star", "own")}
     for chances, columns in ((CHANCES, 2), (partly, 2)):
         (figure,) = draw(analyse(hierarchies(chances).frames())).values()
-        assert len(figure.axes) == 2 * columns
+        assert len(figure.axes) == 3 * columns
     paths = save({"hierarchies": figure}, tmp_path)
     assert all(path.stat().st_size > 0 for path in paths)
     assert draw_figures(module, analyse(NOTHING)) == {}

@@ -44,14 +44,6 @@ def test_the_table_takes_the_ends_of_training_and_the_evaluation():
     ]  # fmt: skip
 
 
-def test_a_rate_has_a_column_where_it_is_not_the_success():
-    results = made_up()
-    results.evaluation["never"]["stopped_at_goal"] = arrays(4, 3, 1)["success"]
-    learns, never = analyse(results.frames()).table
-    assert "stopped at goal, evaluation" in learns.estimates
-    assert float(never.estimates["stopped at goal, evaluation"].value) == 1.0
-
-
 def test_curves_have_a_point_for_every_episode():
     curves = {m.name: curves_of(m, own) for m, own in analyse(made_up().frames()).cases}
     assert curves["final_distance_m"]["learns"].value.tolist() == list(range(12))

@@ -180,23 +180,6 @@ def test_a_class_is_checked_with_its_default_settings(
     assert "its Settings have no defaults for all keys, Unsettled.Settings: carts: missing" in err
 
 
-def test_errors_of_learned_predictors_are_shown_once_beside_those_of_persistence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "spec.toml"
-    path.write_text(
-        'seeds = 2\nscenario = { kind = "line-up", carts = 2 }\n'
-        "[sweep]\n"
-        '"learner.predictor.kind" = ["given", "learned"]\n'
-        '"learner.discount" = [0.5, 0.9]\n'
-    )
-    assert main(["check", str(path), "--steps", "6"]) == 0
-    _, table = capsys.readouterr().out.split("prediction errors after 8 training episodes")
-    head, *rows = (line for line in table.splitlines() if line)
-    assert head.split() == ["learned", "persistence", "given"]
-    assert [row.split()[0] for row in rows] == ["distance", "lead"]
-
-
 def test_a_topology_that_fails_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -281,9 +281,9 @@ BAD = {
 def test_an_interrupt_while_starting_up_is_silent(delay):
     """From when `main` has its handler; what Python does before is not ours."""
     program = (
-        "import sys; from nested_agents import __main__ as program; "
-        "opened = program.open_standard_streams; "
-        "program.open_standard_streams = lambda: print(flush=True) or opened(); "
+        "import signal, sys; from nested_agents import __main__ as program; "
+        "handle = signal.signal; "
+        "signal.signal = lambda *given: handle(*given) and None or print(flush=True); "
         "sys.exit(program.main())"
     )
     process = subprocess.Popen(
@@ -330,14 +330,6 @@ def test_a_damaged_database_is_one_line(study, tmp_path, capsys):
     (tmp_path / DATABASE).write_bytes((study[0] / DATABASE).read_bytes()[:5000])
     assert main(["results", str(tmp_path)]) == 2
     assert re.fullmatch(r"nested-agents: error: [^\n]+\n", capsys.readouterr().err)
-
-
-def test_shells_are_told_how_a_line_goes_on(monkeypatch, capsys):
-    monkeypatch.setenv("_NESTED_AGENTS_COMPLETE", "bash_complete")
-    monkeypatch.setenv("COMP_WORDS", "nested-agents run --ba")
-    monkeypatch.setenv("COMP_CWORD", "2")
-    assert main([]) == 0
-    assert capsys.readouterr().out == "plain,--backend\n"
 
 
 def test_a_study_whose_trials_all_fail_says_so(

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.core.isolation import restore_child_signal
 from nested_agents.core.plugins import trust
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.studies.cli.main import main
@@ -177,15 +176,6 @@ def test_code_of_users_does_not_move_this_process(tmp_path, monkeypatch):
         assert Path.cwd() == tmp_path
         os.chdir("/")
     assert Path.cwd() == tmp_path
-
-
-def test_an_ignored_signal_of_children_is_restored():
-    usual = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
-    try:
-        restore_child_signal()
-        assert signal.getsignal(signal.SIGCHLD) is signal.SIG_DFL
-    finally:
-        signal.signal(signal.SIGCHLD, usual)
 
 
 def test_without_a_home_nothing_is_noted_and_everything_works(monkeypatch):
