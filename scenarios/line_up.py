@@ -22,12 +22,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..core.interface.environments import Transitions
 from ..core.interface.measures import SUCCESS, Measure
 from ..core.interface.prediction import Blocks, Prediction, Tables
 from ..core.interface.scenario import Scenario, Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
-from ..core.interface.stacked import StackedEnvironments
 from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 
@@ -148,46 +146,13 @@ class LineUp(Scenario):
         """Return this scenario, because its predictions are exact."""
         return self
 
-    def environments(self, count: int) -> LineUpEnvironments:
-        """Return many environments that are stepped in one call."""
-        return LineUpEnvironments(self, count)
-
     def _commanded(self, joint_actions: IntArray) -> FloatArray:
-        return commanded(self._commands, joint_actions, self.action_set)
+        """Return the speeds ``(..., n)`` [m/s] that joint actions command."""
+        increment, limit = np.array([INCREMENT]), np.array([MAX_SPEED])
+        return self.action_set.apply(self._commands, joint_actions, increment, limit)
 
     def _states(self) -> FloatArray:
         return observe(self._places)
-
-
-class LineUpEnvironments(StackedEnvironments[LineUp]):
-    """Many environments of carts."""
-
-    def allocate(self, scenario: LineUp, count: int) -> None:
-        """Allocate the state of all environments."""
-        self._places: FloatArray = np.zeros((count, len(scenario.agents)))
-        self._speeds: FloatArray = np.zeros_like(self._places)
-        self._commands: FloatArray = np.zeros_like(self._places)
-
-    def store(self, index: int, scenario: LineUp) -> None:
-        """Copy the carts, at rest, into an environment."""
-        self._places[index] = scenario._places
-        self._speeds[index] = 0.0
-        self._commands[index] = 0.0
-
-    def step(self, joint_actions: IntArray) -> Transitions:
-        """Execute joint actions ``(W, n)`` for one period."""
-        self._commands = commanded(self._commands, joint_actions, self.scenario.action_set)
-        self._places, self._speeds = advance(self._places, self._speeds, self._commands)
-        arrived = np.all(np.abs(self._places) < TOLERANCE, axis=1)
-        rewards = np.broadcast_to(reward(self._places)[:, None], joint_actions.shape)
-        return Transitions(
-            observe(self._places), rewards, arrived, np.zeros(self.count, dtype=bool)
-        )
-
-
-def commanded(commands: FloatArray, joint_actions: IntArray, actions: ActionSet) -> FloatArray:
-    """Return the speeds ``(..., n)`` [m/s] that joint actions command."""
-    return actions.apply(commands, joint_actions, np.array([INCREMENT]), np.array([MAX_SPEED]))
 
 
 def observe(places: FloatArray) -> FloatArray:

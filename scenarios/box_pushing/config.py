@@ -1,12 +1,6 @@
-"""The settings of box pushing, as they stand in the ``[scenario]`` table of a spec.
+"""Settings of box pushing, as in the ``[scenario]`` table of a spec."""
 
-Sizes that are surely wrong are named with the unit in which they were probably given. The world is
-one of robots that stand on a table: centimetres and hundreds of grams. A box of 300 m is no error,
-for the physics holds, but it was hardly intended.
-"""
-
-from collections.abc import Iterator, Mapping
-from math import pi
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -26,18 +20,6 @@ from .world.settings import (
     label,
 )
 
-LARGEST_BOX = 20.0
-"""Beyond this a size of a box was hardly intended [m]."""
-LARGEST_RADIUS = 1.0
-"""The same of the radius of a robot [m]."""
-LARGEST_REACH = 5.0
-"""The same of the reach of infrared sensors [m]."""
-HEAVIEST = 50.0
-"""The same of masses [kg]."""
-FASTEST = 10.0
-"""The same of wheel speeds [m/s]."""
-NEAREST_GOAL = 1e-4
-"""A tolerance below this is hardly intended [m]."""
 WRITTEN = {
     "box_distance": -1.0,
     "contact_cross_track_error": -2.0,
@@ -77,16 +59,6 @@ class BoxTaskSettings(ScenarioSettings):
     """Distance of the box from the goal [m] beyond which an episode is broken off."""
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
-
-    def warnings(self) -> tuple[str, ...]:
-        """Return sizes that are probably given in another unit, a line each.
-
-        Examples
-        --------
-        >>> BoxPushingSettings(infrared={"reach": 60.0}).warnings()
-        ('scenario.infrared.reach = 60 m: perhaps meant in mm, 0.06 m',)
-        """
-        return tuple(_warnings(self))
 
     @property
     def task_size(self) -> float:
@@ -147,40 +119,3 @@ class BoxPushingSettings(BoxTaskSettings):
         if preset == "default" and self.robots <= 2:
             return {"learner": {"weights": "own"}}
         return {}
-
-
-def _warnings(settings: BoxTaskSettings) -> Iterator[str]:
-    """Yield a line for every size that is probably given in another unit."""
-    box = settings.box
-    robot = settings.robot
-    if not isinstance(box, str):
-        width = max(max(axis) - min(axis) for axis in zip(*box.vertices, strict=True))
-        yield from _length("box.vertices", width, LARGEST_BOX)
-    if not isinstance(robot, str):
-        yield from _length("robot.radius", robot.radius, LARGEST_RADIUS)
-        if robot.max_speed > FASTEST:
-            yield _suggest_unit("robot.max_speed", robot.max_speed, "m/s", "mm/s", 1e-3)
-    for name, body in (("box", box), ("robot", robot)):
-        if not isinstance(body, str) and body.mass > HEAVIEST:
-            yield _suggest_unit(f"{name}.mass", body.mass, "kg", "g", 1e-3)
-    yield from _length("infrared.reach", settings.infrared.reach, LARGEST_REACH)
-    yield from _length("tolerance", settings.tolerance, LARGEST_BOX)
-    if settings.tolerance < NEAREST_GOAL:
-        tolerance = f"{settings.tolerance:g} m"
-        yield f"scenario.tolerance = {tolerance}: hardly any episode will reach the goal"
-    if settings.orientation_tolerance is not None and settings.orientation_tolerance > pi:
-        angle = settings.orientation_tolerance
-        yield _suggest_unit("orientation_tolerance", angle, "rad", "degrees", pi / 180.0)
-
-
-def _length(key: str, value: float, most: float) -> Iterator[str]:
-    if value > most:
-        is_far_off = value * 1e-2 > most / 10.0
-        unit, factor = ("mm", 1e-3) if is_far_off else ("cm", 1e-2)
-        yield _suggest_unit(key, value, "m", unit, factor)
-
-
-def _suggest_unit(key: str, value: float, unit: str, other: str, factor: float) -> str:
-    return (
-        f"scenario.{key} = {value:g} {unit}: perhaps meant in {other}, {value * factor:.3g} {unit}"
-    )

@@ -22,7 +22,7 @@ from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
-from .measurements import MEASURES, Measurements
+from .measurements import MEASURES
 from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap, model_of
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
@@ -162,7 +162,8 @@ class BoxPushing(Scenario, Embodiment):
         self._failures.begin(seed, episode)
         self.world.set_grip(self._failures.grip)
         self._save()
-        return self._observe(self.world.box_pose)
+        present = self._present(self.world.box_pose)
+        return self.states_at(present, self._speeds[None])[0]
 
     def commanded(self, speeds: FloatArray, joint_actions: IntArray) -> FloatArray:
         """Return the wheel speeds ``(..., n)`` that joint actions command, given those before."""
@@ -193,7 +194,8 @@ class BoxPushing(Scenario, Embodiment):
         if terminated:
             # The wheels stop; the box may leave the tolerance before it comes to rest.
             self._advance(np.zeros(len(self.agents)))
-            measured["stopped_at_goal"] = self._reached()
+            there = self.task.reached(self._distance(), self._orientation())
+            measured["stopped_at_goal"] = bool(there)
         self._step += 1
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
@@ -281,11 +283,17 @@ class BoxPushing(Scenario, Embodiment):
         # After every step, asked for or not, as saving costs the world its order of contacts.
         self._saved = None if self._playground is None else self.world.state()
 
-    def measure(self) -> Measurements:
-        """Return poses, speeds, contact and errors of the present state."""
+    def measure(self) -> dict[str, object]:
+        """Return poses, speeds, contact and errors of the present state.
+
+        Poses ``(M, 3)`` and ``(3,)`` are in m, m, rad, wheel speeds ``(n,)`` are the commanded ones
+        [m/s], and `contact_time` ``(M,)`` is the fraction of the last decision period in contact.
+        `stopped_at_goal` is known after the step that ends the episode: whether the box stayed at
+        the goal once the wheels had stopped.
+        """
         return self._measured(self._distance(), self._orientation())
 
-    def _measured(self, distance: float, orientation: float) -> Measurements:
+    def _measured(self, distance: float, orientation: float) -> dict[str, object]:
         times = self.world.contact_time
         return {
             "robot_poses": self.world.robot_poses.copy(),
@@ -312,22 +320,9 @@ class BoxPushing(Scenario, Embodiment):
     def _orientation(self) -> float:
         return float(wrap(self.world.box_pose[2] - self._goal[2]))
 
-    def _reached(self) -> bool:
-        distance = np.array([self._distance()])
-        orientation = np.array([self._orientation()])
-        return bool(self.task.reached(distance, orientation)[0])
-
-    def _observe(self, origin: FloatArray) -> FloatArray:
-        """Return the states ``(n, d)`` of all agents: the error observation layer.
-
-        `origin` is the pose ``(3,)`` of the box one decision period ago.
-        """
-        return self.states_at(self._present(origin), self._speeds[None])[0]
-
     def _present(self, origin: FloatArray) -> SituationBatch:
-        world = self.world
-        poses, gaps = world.poses[None], world.gaps[None]
-        return self.situations(poses, gaps, origin[None])
+        """Return the present situation; `origin` is the former pose ``(3,)`` of the box."""
+        return self.situations(self.world.poses[None], self.world.gaps[None], origin[None])
 
     def situations(
         self, poses: FloatArray, gaps: FloatArray, origins: FloatArray

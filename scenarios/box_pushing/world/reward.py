@@ -59,9 +59,9 @@ class Task(NamedTuple):
             orientation_tolerance=inf if orientation_tolerance is None else orientation_tolerance,
         )
 
-    def reached(self, distance: FloatArray, orientation: FloatArray) -> BoolArray:
+    def reached(self, distance: float | FloatArray, orientation: float | FloatArray) -> BoolArray:
         """Return whether the goal is reached ``(m,)``; parameters as of `reward`."""
-        near: BoolArray = distance <= self.tolerance
+        near = np.asarray(distance) <= self.tolerance
         return near & (np.abs(orientation) <= self.orientation_tolerance)
 
 

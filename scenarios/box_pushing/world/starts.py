@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from math import cos, pi, radians, sin
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ....core.numerics import FloatArray, wrap
 from .boxes import BoxSpec
-from .geometry import surface
+from .geometry import distances, surface
 from .settings import RobotSettings
 
 GOAL = (1.0, 0.0, 0.0)
@@ -111,26 +112,21 @@ def approach(
 ) -> tuple[float, float]:
     """Return the point of a ray out of the box that is `gap` from its surface.
 
-    If there are several, as in a hollow, it is the outermost: bracketed on a grid, then bisected.
+    If there are several, as in a hollow, it is the outermost; if there is none, the origin.
     """
     dx = cos(azimuth)
     dy = sin(azimuth)
 
-    def clear(t: float) -> bool:
-        x = origin[0] + t * dx
-        y = origin[1] + t * dy
-        return surface(box.shape, x, y)[0] >= gap
+    def excess(t: float) -> float:
+        return float(surface(box.shape, origin[0] + t * dx, origin[1] + t * dy)[0]) - gap
 
-    step = 2 * (box.reach + gap) / GRID
-    low = max((i * step for i in range(GRID) if not clear(i * step)), default=0.0)
-    high = low + step
-    while high - low > PRECISION:
-        middle = (low + high) / 2
-        if clear(middle):
-            high = middle
-        else:
-            low = middle
-    return origin[0] + high * dx, origin[1] + high * dy
+    steps = np.linspace(0.0, 2 * (box.reach + gap), GRID)
+    gaps = distances(origin[0] + steps * dx, origin[1] + steps * dy, box.shape)
+    near = np.flatnonzero(gaps < gap)
+    if not len(near):
+        return origin
+    t = brentq(excess, steps[near[-1]], steps[near[-1] + 1], xtol=PRECISION)
+    return origin[0] + t * dx, origin[1] + t * dy
 
 
 def _behind(

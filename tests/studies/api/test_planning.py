@@ -72,13 +72,6 @@ def test_numbers_out_of_range_are_refused(tmp_path, capsys, options, complaint) 
     assert complaint in capsys.readouterr().err
 
 
-def test_doubtful_sizes_are_told_before_anything_is_spent(tmp_path, capsys) -> None:
-    path = tmp_path / "spec.toml"
-    path.write_text("seeds = 2\n[scenario.infrared]\nreach = 60.0\n")
-    assert main(["plan", str(path), "--no-timed"]) == 0
-    assert "scenario.infrared.reach = 60 m: perhaps meant in mm" in capsys.readouterr().out
-
-
 def test_a_plan_of_three_sizes_tells_which_exponents_can_be_told_apart() -> None:
     spec = {"seeds": 12, "sweep": {"scenario.robots": [2, 4, 8], "topology": ["chain", "star"]}}
     said = " ".join(str(planning.plan(spec, timed=False)).split())
