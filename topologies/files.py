@@ -5,16 +5,28 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from xml.etree.ElementTree import ParseError
+from typing import NamedTuple
 
 from ..core.numerics import nx
 from ..core.plugins import sources
+from ..core.plugins.words import closest, show
+from . import graphml
 from .builders import check_legible, quote
 
 NUMBERED = re.compile(r"n?\d+")
 """Ids that a program gave to nodes, as yEd and Gephi do."""
+NODE_LINK_KEYS = ("directed", "multigraph", "graph", "nodes", "edges", "links")
+"""Keys that `networkx.node_link_data` writes; ``links`` is the older name of ``edges``."""
+
+
+class Node(NamedTuple):
+    """A node as a file lists it."""
+
+    id: object
+    label: object = None
 
 
 def read_file(path: str) -> nx.Graph | dict[str, object]:
@@ -34,7 +46,7 @@ def read_file(path: str) -> nx.Graph | dict[str, object]:
     Raises
     ------
     ValueError
-        If the file cannot be read or holds neither; one line.
+        If the file cannot be read, holds neither, or contradicts itself; one line.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in sources.GRAPHS:
@@ -42,47 +54,120 @@ def read_file(path: str) -> nx.Graph | dict[str, object]:
     text = sources.active().text(path)
     try:
         if suffix == ".graphml":
-            return _labeled(nx.parse_graphml(text))
-        content = tomllib.loads(text) if suffix == ".toml" else json.loads(text)
+            nodes, edges, is_directed = graphml.parse(text)
+            return _graph([Node(*node) for node in nodes], edges, is_directed)
+        content = tomllib.loads(text) if suffix == ".toml" else _json(text)
         if isinstance(content, dict) and "nodes" in content:
-            return _labeled(_node_link_graph(content))
+            return _node_link_graph(content)
         return _table_of(content)
     except RecursionError:
         raise ValueError(f"{path}: is nested too deeply") from None
-    except (ValueError, ParseError, nx.NetworkXError) as error:
+    except ValueError as error:
         raise ValueError(f"{path}: {' '.join(str(error).split())}") from None
 
 
+def _json(text: str) -> object:
+    """Return the content of a JSON file; refuse an object that has one key twice."""
+
+    def table(pairs: list[tuple[str, object]]) -> dict[str, object]:
+        for key, times in Counter(key for key, _ in pairs).items():
+            if times > 1:
+                raise ValueError(f"key {quote(key)} is given {times} times, allowed: once")
+        return dict(pairs)
+
+    return json.loads(text, object_pairs_hook=table)
+
+
 def _node_link_graph(content: dict[str, object]) -> nx.Graph:
-    """Return the graph of a table; ``links`` is the older name of ``edges``."""
-    for key in ("directed", "multigraph"):
-        if not isinstance(content.get(key, False), bool):
-            raise ValueError(f"{key} = {quote(content[key])}: must be true or false")
-    edges = "links" if "links" in content else "edges"
-    try:
-        return nx.node_link_graph(content, multigraph=False, edges=edges)
-    except (KeyError, TypeError, AttributeError, ValueError):
-        raise ValueError(
-            f"must be as networkx.node_link_data writes it: nodes with id, {edges} with source "
-            "and target"
-        ) from None
+    """Return the graph of a table as `networkx.node_link_data` writes it."""
+    for key in content:
+        if key not in NODE_LINK_KEYS:
+            raise ValueError(f"unknown key {quote(key)}: {closest(key, NODE_LINK_KEYS)}")
+    if "links" in content and "edges" in content:
+        raise ValueError("both edges and links are given, allowed: one of them")
+    is_directed = _flag(content, "directed")
+    if _flag(content, "multigraph"):
+        raise ValueError("multigraph = true: must be false, an edge joins two agents once")
+    links = "links" if "links" in content else "edges"
+    nodes = _tables(content, "nodes", ("id",))
+    edges = _tables(content, links, ("source", "target"))
+    for edge in edges:
+        if edge.get("directed", is_directed) is not is_directed:
+            raise ValueError(
+                f"edge {quote(edge['source'])} - {quote(edge['target'])} has directed = "
+                f"{show(edge['directed'])}, the graph has {show(is_directed)}: must be equal"
+            )
+    return _graph(
+        [Node(node["id"], node.get("label")) for node in nodes],
+        [(edge["source"], edge["target"]) for edge in edges],
+        is_directed,
+    )
 
 
-def _labeled(graph: nx.Graph) -> nx.Graph:
-    """Name nodes by their labels, if all ids are numbers and nodes have labels."""
-    labels = dict(graph.nodes(data="label"))
-    given = [label for label in labels.values() if label is not None]
-    if not given or not all(NUMBERED.fullmatch(str(node)) for node in graph):
-        check_legible(graph)
-        return graph
-    names = {node: str(label).strip() for node, label in labels.items()}
-    for node, name in names.items():
-        if labels[node] is None:
-            raise ValueError(f"node {quote(node)} has no label, others have one")
-        if list(names.values()).count(name) > 1:
-            raise ValueError(f"label {quote(name)} is that of several nodes, allowed: one")
-    check_legible(names.values())
-    return nx.relabel_nodes(graph, names)
+def _flag(content: dict[str, object], key: str) -> bool:
+    """Return a flag of a table, false if it is absent."""
+    value = content.get(key, False)
+    if not isinstance(value, bool):
+        raise ValueError(f"{key} = {quote(value)}: must be true or false, without quotes")
+    return value
+
+
+def _tables(
+    content: dict[str, object], key: str, needed: tuple[str, ...]
+) -> list[dict[str, object]]:
+    """Return a list of tables, each with the `needed` keys."""
+    listed = content.get(key)
+    if not isinstance(listed, list) or not all(
+        isinstance(part, dict) and part.keys() >= set(needed) for part in listed
+    ):
+        raise ValueError(f"{key} must be a list of tables with {' and '.join(needed)}")
+    return listed
+
+
+def _graph(
+    nodes: list[Node], edges: Iterable[tuple[object, object]], is_directed: bool
+) -> nx.Graph:
+    """Return the graph of nodes and edges; refuse what is given twice or does not exist."""
+    check_legible(node.id for node in nodes)
+    ids = [str(node.id) for node in nodes]
+    _refuse_repeated(ids, "id")
+    names = dict(zip(ids, _names_of(nodes), strict=True))
+    graph = nx.empty_graph(names.values(), create_using=nx.DiGraph if is_directed else nx.Graph)
+    arrow = "->" if is_directed else "-"
+    for pair in edges:
+        check_legible(pair)
+        source, target = map(str, pair)
+        edge = f"edge {quote(source)} {arrow} {quote(target)}"
+        for end in (source, target):
+            if end not in names:
+                raise ValueError(f"{edge}: {closest(end, ids)}, allowed: ids of nodes")
+        if source == target:
+            raise ValueError(f"{edge} leads from an agent to itself")
+        if graph.has_edge(names[source], names[target]):
+            raise ValueError(f"{edge} is given more than once")
+        graph.add_edge(names[source], names[target])
+    return graph
+
+
+def _names_of(nodes: list[Node]) -> list[str]:
+    """Return the names of agents: ids, or labels if all ids are numbers and nodes have labels."""
+    labeled = [node for node in nodes if node.label is not None]
+    if not labeled or not all(NUMBERED.fullmatch(str(node.id)) for node in nodes):
+        return [str(node.id) for node in nodes]
+    for node in nodes:
+        if node.label is None:
+            raise ValueError(f"node {quote(node.id)} has no label, others have one")
+    labels = [n.label.strip() if isinstance(n.label, str) else n.label for n in nodes]
+    check_legible(labels)
+    names = [str(label) for label in labels]
+    _refuse_repeated(names, "label")
+    return names
+
+
+def _refuse_repeated(names: list[str], what: str) -> None:
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise ValueError(f"{what} {quote(name)} is that of {times} nodes, allowed: one")
 
 
 def _table_of(content: object) -> dict[str, object]:

@@ -134,31 +134,53 @@ def graphml(rest: str, default: str = "directed") -> str:
 
 
 NODES = '{"directed": true, "nodes": [{"id": "a"}, {"id": "b"}], '
-NODE_LINK = "must be as networkx.node_link_data writes it"
 REFUSED = {
-    "twice.graphml": (yed(("a", "b", "b", "d")), "label 'b' is that of several nodes"),
+    "twice.graphml": (yed(("a", "b", "b", "d")), "label 'b' is that of 2 nodes"),
     "some.graphml": (
         gephi("n").replace('<data key="label">c</data>', ""),
         "node 'n2' has no label, others have one",
     ),
     "empty.graphml": (yed(("a", "b", " ", "d")), "'' is no name of an agent"),
-    "texts.json": ('{"nodes": ["a"], "links": []}', NODE_LINK),
-    "nodes.json": ('{"nodes": 3, "links": []}', NODE_LINK),
-    "bare.json": (NODES + '"links": [{"source": "a"}]}', NODE_LINK),
-    "none.json": (NODES + '"edges": null}', NODE_LINK),
-    "pairs.json": (NODES + '"edges": [["a", "b"]]}', NODE_LINK),
-    "id.json": ('{"nodes": [{"id": null}], "links": []}', NODE_LINK),
-    "repeated_node.json": ('{"nodes": [{"id": 1}, {"id": "1"}], "links": []}', "agent '1'"),
+    "texts.json": ('{"nodes": ["a"], "links": []}', "nodes must be a list of tables with id"),
+    "nodes.json": ('{"nodes": 3, "links": []}', "nodes must be a list of tables with id"),
+    "bare.json": (NODES + '"links": [{"source": "a"}]}', "with source and target"),
+    "none.json": (NODES + '"edges": null}', "edges must be a list of tables with source and"),
+    "pairs.json": (NODES + '"edges": [["a", "b"]]}', "edges must be a list of tables with"),
+    "id.json": ('{"nodes": [{"id": null}], "links": []}', "None is no name of an agent"),
+    "repeated_node.json": (
+        '{"nodes": [{"id": 1}, {"id": "1"}], "links": []}',
+        "id '1' is that of 2 nodes",
+    ),
+    "repeated_edge.json": (
+        NODES + '"edges": [{"source": "a", "target": "b"}, {"source": "a", "target": "b"}]}',
+        "edge 'a' -> 'b' is given more than once",
+    ),
+    "both_ways.json": (
+        NODES.replace("true", "false")
+        + '"edges": [{"source": "a", "target": "b"}, {"source": "b", "target": "a"}]}',
+        "edge 'b' - 'a' is given more than once",
+    ),
     "loop.json": (
         NODES + '"edges": [{"source": "a", "target": "a"}]}',
-        "agent 'a' cannot be its own superior",
+        "edge 'a' -> 'a' leads from an agent to itself",
     ),
-    "stray.json": (NODES + '"edges": [{"source": "a", "target": "c"}]}', "unknown agent 'c'"),
-    "misspelled.json": (NODES + '"edgs": []}', NODE_LINK),
+    "stray.json": (
+        NODES + '"edges": [{"source": "a", "target": "c"}]}',
+        "edge 'a' -> 'c': known: a, b",
+    ),
+    "misspelled.json": (NODES + '"edgs": [], "edges": []}', "'edgs': did you mean 'edges'?"),
+    "two_lists.json": (NODES + '"edges": [], "links": []}', "both edges and links are given"),
+    "twice.json": (NODES + '"edges": [], "edges": []}', "key 'edges' is given 2 times"),
     "graph_direction.json": (
         NODES.replace("true", '"false"') + '"edges": []}',
         "directed = 'false': must be true or false",
     ),
+    "number_direction.json": (NODES.replace("true", "1") + '"edges": []}', "directed = 1: must be"),
+    "edge_direction.json": (
+        NODES + '"edges": [{"source": "a", "target": "b", "directed": false}]}',
+        "has directed = false, the graph has true",
+    ),
+    "multigraph.json": (NODES + '"multigraph": 0, "edges": []}', "multigraph = 0: must be true or"),
     "nodes.toml": ('nodes = [{id = "a"}]\nedges = []\ndirected = "yes"', "directed = 'yes'"),
     "beside.json": (
         '{"topology": {"edges": [["a", "b"]]}, "edges": [["b", "a"]]}',
@@ -168,21 +190,49 @@ REFUSED = {
         '{"edges": [["a", "b"]], "alone": ["b"]}',
         "agent 'b' occurs more than once in edges and alone",
     ),
-    "false.graphml": (graphml(EDGE.replace("/>", ' directed="false"/>')), "directed=false edge"),
-    "default.graphml": (graphml(EDGE, default="Directed"), "the graph is undirected"),
+    "zero.graphml": (
+        graphml(EDGE.replace("/>", ' directed="0"/>')),
+        "edge 'a' - 'b': directed = '0' in a graph with edgedefault = 'directed'",
+    ),
+    "false.graphml": (graphml(EDGE.replace("/>", ' directed="false"/>')), "directed = 'false' in"),
+    "yes.graphml": (graphml(EDGE.replace("/>", ' directed="yes"/>')), "directed = 'yes' in"),
+    "one.graphml": (
+        graphml(EDGE.replace("/>", ' directed="1"/>'), default="undirected"),
+        "directed = '1' in a graph with edgedefault = 'undirected'",
+    ),
+    "attribute.graphml": (
+        graphml(EDGE.replace("/>", ' Directed="false"/>')),
+        "unknown attribute 'Directed'",
+    ),
+    "default.graphml": (graphml(EDGE, default="Directed"), "edgedefault = 'Directed': must be"),
     "no_default.graphml": (
         graphml(EDGE).replace(' edgedefault="directed"', ""),
-        "the graph is undirected",
+        "edgedefault = None: must be",
     ),
-    "nested.graphml": (graphml('<node id="c"><graph edgedefault="directed"/></node>'), "'c'"),
-    "repeated_edge.graphml": (graphml(EDGE * 2), "the graph is a multigraph"),
-    "loop.graphml": (graphml(EDGE.replace("b", "a")), "agent 'a' cannot be its own superior"),
-    "stray.graphml": (graphml(EDGE.replace('"b"', '"c"')), "unknown agent 'c'"),
-    "hyperedge.graphml": (graphml("<hyperedge/>"), "hyperedges"),
+    "two.graphml": (
+        graphml(EDGE).replace("</graphml>", '<graph edgedefault="directed"/></graphml>'),
+        "2 elements <graph>, allowed: one",
+    ),
+    "nested.graphml": (
+        graphml('<node id="c"><graph edgedefault="directed"/></node>'),
+        "2 elements <graph>, allowed: one",
+    ),
+    "repeated_edge.graphml": (graphml(EDGE * 2), "edge 'a' -> 'b' is given more than once"),
+    "repeated_node.graphml": (graphml('<node id="b"/>'), "id 'b' is that of 2 nodes"),
+    "loop.graphml": (graphml(EDGE.replace("b", "a")), "leads from an agent to itself"),
+    "stray.graphml": (graphml(EDGE.replace('"b"', '"c"')), "edge 'a' -> 'c': known: a, b"),
+    "hyperedge.graphml": (graphml("<hyperedge/>"), "element <hyperedge> in <graph>"),
+    "arrow.graphml": (
+        yed().replace(
+            '<y:LineStyle color="#000000"',
+            '<y:Arrows source="standard" target="none"/><y:LineStyle color="#000000"',
+        ),
+        "has an arrowhead at its source",
+    ),
     "twin.json": (
         NODES.replace("{", '{"multigraph": true, ', 1)
         + '"links": [{"source": "a", "target": "b"}]}',
-        "the graph is a multigraph",
+        "multigraph = true: must be false",
     ),
 }
 
