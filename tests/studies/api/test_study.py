@@ -80,7 +80,7 @@ def test_trials_are_asked_again_by_another_study(study) -> None:
     for name, complaint in (("ablaton", "did you mean 'ablation'"), ("scaling", "needs robots")):
         with pytest.raises(na.SpecError, match=complaint):
             study.as_study(name).table()
-    with pytest.raises(na.SpecError, match="report: is of a whole study"):
+    with pytest.raises(na.SpecError, match="report: needs a whole study"):
         again.report()
 
 
