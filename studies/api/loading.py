@@ -21,7 +21,8 @@ from ..spec.tables import SpecTable, TomlTable
 from ..store.durable import read_text
 from ..store.store import Store
 from .comparison import Comparison
-from .study import Defaults, Place, StudyResults
+from .data import Defaults, Place
+from .study import StudyResults
 
 Roles = Mapping[str, str | Sequence[str]]
 """Column of a table by its role, see `ScoreColumns`."""

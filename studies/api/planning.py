@@ -31,8 +31,8 @@ from ..trials.session import Session
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import cores
 from ..workers.workers import check_jobs
+from .data import Place
 from .running import examine
-from .study import Place
 
 PILOT_SEED = 10_000
 """Seed of all pilot episodes."""

@@ -10,9 +10,10 @@ from ..spec.objects import plain
 from ..spec.tables import TomlTable, label
 from ..store.database import EVALUATION
 from ..workers.runner import Observer
+from .data import Place
 from .kept_teams import KeptTeams
 from .loading import load
-from .study import Place, StudyResults
+from .study import StudyResults
 
 
 def reevaluate(

@@ -1,6 +1,6 @@
-"""Runs a study: every trial that its store does not hold yet, on workers of any kind.
+"""Running a study: all trials that are missing in its store, on workers of any kind.
 
-Who wants to see how it goes passes an `Observer`.
+An `Observer` receives the progress.
 """
 
 import json
@@ -27,7 +27,8 @@ from ..trials.keeping import open_to_run, pending
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer, Outcome, run_trials, versions
 from ..workers.workers import check_workers, start_workers
-from .study import Place, StudyResults
+from .data import Place
+from .study import StudyResults
 
 CHECKPOINT = 300.0
 """Default interval between checkpoints of a trial [s]."""
@@ -47,20 +48,20 @@ def run_study(
     chosen: Sequence[Trial] = (),
     checkpoint: float = CHECKPOINT,
 ) -> Iterator[Store]:
-    """Run what is left of a study; then its store is open for as long as the context lasts.
+    """Run the missing trials of a study; then its store is open until the context ends.
 
     Parameters
     ----------
     spec
         The study.
     directory
-        Where it is kept; made if it does not exist.
+        Folder of the study; created if it does not exist.
     jobs, backend, address
-        Who runs the trials, see `start_workers`.
+        Kind and number of workers, see `start_workers`.
     retry_failed
         Whether failed trials are run again.
     accept_code
-        Whether to go on with a study although the installed code has changed.
+        Whether to continue a study although the installed code has changed.
     observer
         Object that is notified of progress; None for no notifications.
     chosen
@@ -72,14 +73,14 @@ def run_study(
     Yields
     ------
     Store
-        With the results of every trial, or its traceback (`Store.failed`).
+        Contains the results of every trial, or its traceback (`Store.failed`).
 
     Raises
     ------
     SpecError
         If the study cannot be run or continued; one line says why.
     KeyboardInterrupt
-        If it is interrupted. What has finished is kept; the same call continues.
+        If it is interrupted. Finished trials are kept, and the same call continues.
     """
     observer = observer or Observer()
     measures = examine(spec, may_fail=True)
@@ -89,7 +90,7 @@ def run_study(
         raise SpecError(f"--checkpoint {checkpoint:g}: must be 0 or more seconds")
     with ExitStack() as stack:
         start = partial(start_workers, backend, jobs, address)
-        # A cluster that cannot be reached is told before anything is written.
+        # A cluster that cannot be reached is reported before anything is written.
         workers = None if address is None else stack.enter_context(start(len(trials)))
         opened = open_to_run(directory, spec, trials, measures, accept_code=accept_code)
         store = stack.enter_context(opened)
@@ -125,7 +126,7 @@ def run_study(
 
 @contextmanager
 def _checkpoints(store: Store, seconds: float, observer: Observer) -> Iterator[Checkpoints]:
-    """Make a folder for checkpoints of trials, and remove it in the end if none is left."""
+    """Create the folder of checkpoints; remove it on exit if it is empty."""
     folder = store.directory.resolve() / CHECKPOINTS
     with suppress(OSError):  # trials go on without
         folder.mkdir(exist_ok=True)
@@ -140,13 +141,13 @@ def _checkpoints(store: Store, seconds: float, observer: Observer) -> Iterator[C
 
 
 def examine(spec: Spec, *, may_fail: bool = False) -> tuple[Measure, ...]:
-    """Return what a study measures of its episodes, if it can be run; see `check_conditions`.
+    """Return the measures of the episodes of a study that can run; see `check_conditions`.
 
     Raises
     ------
     SpecError
-        If a condition cannot be built, or the study has not what it needs; before anything is run
-        or written.
+        If a condition cannot be built, or the spec lacks something that the study needs. Nothing
+        has been run or written then.
     """
     measures = check_conditions(spec, may_fail=may_fail)
     with spec.sources.active():
@@ -167,21 +168,21 @@ def run(
     observer: Observer | None = None,
     checkpoint: float = CHECKPOINT,
 ) -> StudyResults:
-    """Run what is left of a study and return its results; the same call again continues it.
+    """Run the missing trials of a study and return all results; the same call resumes the study.
 
     Parameters
     ----------
     spec
-        A `Spec`, a table as TOML has it, which may hold objects, or the path of a TOML file.
+        A `Spec`, a table as in TOML, which may hold objects, or the path of a TOML file.
     out
-        Where the study is kept; made if it does not exist. Every trial is kept the moment it
+        Folder of the study; created if it does not exist. Every trial is stored as soon as it
         finishes.
     jobs, backend, address, retry_failed, accept_code, checkpoint
-        As those of `run_study`.
+        As in `run_study`.
     progress
-        Whether to show how it goes.
+        Whether to show progress in the terminal.
     observer
-        Who is notified of progress instead, see `nested_agents.studies.workers.runner.Observer`.
+        Receives the progress instead, see `nested_agents.studies.workers.runner.Observer`.
 
     Warns
     -----

@@ -1,4 +1,4 @@
-"""How far a study is: its trials by what became of them, and the time that is left."""
+"""Progress of a study: its trials by state, and the remaining time."""
 
 from __future__ import annotations
 
@@ -29,27 +29,30 @@ class Progress:
     running: tuple[tuple[str, int, float], ...]
     """Condition, seed, and seconds so far of the trials that are running."""
     processes: int
-    """How many trials run at a time; if none does, the cores of this machine; or none where nothing
-    is left."""
+    """Number of trials that run at a time. If no run is active: the number of cores of this
+    machine, or 0 if no trial can run."""
     seconds: float | None
-    """Estimate of the time left [s]; None if nothing has finished to go by."""
+    """Estimate of the remaining time [s]; None if no trial has finished."""
     damaged: tuple[str, ...]
-    """What has finished but is not as it was written, one line each; counted as left."""
+    """One line for each finished trial whose results are damaged. These trials count as left."""
     refusal: str | None
-    """Why the installed code would not go on with the study, in one line; None if it would."""
+    """One line on why the installed code does not continue the study; None if it does."""
 
 
 def progress(store: Store) -> Progress:
-    """Return how far the study of an open store is."""
+    """Return the progress of the study of an open store."""
     trials = store.planned()
     refusal = outdated(store)
     states = store.states()
     now = read_running(store.directory)
-    begun = {} if now is None else now[1]
+    seconds = {} if now is None else now[1]
     pending = [trial for trial in trials if trial.identity not in states]
-    running = [(t.condition, t.seed, begun[t.identity]) for t in pending if t.identity in begun]
-    waiting = [trial for trial in pending if trial.identity not in begun]
-    left = [trial.condition for trial in waiting]
+    running = [
+        (trial.condition, trial.seed, seconds[trial.identity])
+        for trial in pending
+        if trial.identity in seconds
+    ]
+    left = [trial.condition for trial in pending if trial.identity not in seconds]
     failed = [*states.values()].count("failed")
     usual = cores() if left and refusal is None else 0
     processes = usual if now is None else now[0]
@@ -70,9 +73,9 @@ def progress(store: Store) -> Progress:
 def _estimate(
     means: Mapping[str, float], left: list[str], running: list[tuple[str, float]], processes: int
 ) -> float | None:
-    """Return the time left [s], by what the finished trials of each condition took on average.
+    """Return the remaining time [s] from the mean durations of finished trials by condition.
 
-    Conditions of which none has finished are taken to be like the others on average.
+    A condition without a finished trial gets the mean of the others.
     """
     if not (left or running):
         return 0.0
@@ -85,16 +88,14 @@ def _estimate(
 
 
 def describe(store: Store, now: Progress) -> Iterator[str]:
-    """Yield how many trials are done, running, failed and left, and for how long.
-
-    Then, each after an empty line, why nothing can be added to the study, and what is damaged.
+    """Yield lines on the trials that are done, running, failed and left, and on damage.
 
     Parameters
     ----------
     store
         The open store.
     now
-        How far its study is.
+        Progress of its study.
     """
     outline = StudyOutline.kept(store)
     extent = f"{count(len(outline.columns), 'condition')} x {count(len(outline.seeds), 'seed')}"
@@ -120,13 +121,13 @@ class Status:
     """Progress of a study; printed like the command ``status``."""
 
     progress: Progress
-    """Its trials, each counted once."""
+    """Numbers of trials by state."""
     text: str
-    """The same in words."""
+    """The progress as text."""
 
     @classmethod
     def of(cls, directory: Path) -> Status:
-        """Return that of the study in a directory, whoever runs it; looking disturbs nothing.
+        """Return the progress of the study in a directory; this does not disturb a run.
 
         Raises
         ------
@@ -144,7 +145,7 @@ class Status:
 
 
 def failures(failed: Iterable[tuple[str, int, str]]) -> Iterator[str]:
-    r"""Yield which trials failed and why, those with equal tracebacks together.
+    r"""Yield the failed trials and their tracebacks; equal tracebacks are shown once.
 
     >>> print(*failures([("a", 0, "E\n"), ("a", 3, "E\n"), ("b", 1, "F")]), sep="\n")
     a, seeds 0, 3 failed:

@@ -59,13 +59,6 @@ def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> Non
     print_lines(table.legend if legend is None else legend)
 
 
-def print_meanings(table: SummaryTable) -> None:
-    """Print what the columns of a table are, a paragraph each."""
-    print_text("")
-    for title, meaning in table.meanings.items():
-        print_wrapped(f"{title}: {meaning}", indent=2)
-
-
 def in_form(table: SummaryTable, form: Form) -> str:
     """Return a table as text in a form."""
     match form:
@@ -81,15 +74,9 @@ def in_form(table: SummaryTable, form: Form) -> str:
             return f"{table}\n"
 
 
-def print_study(
-    study: StudyResults, columns: Sequence[str] = (), *, is_explained: bool = False
-) -> None:
-    """Print a study's table, what the columns are if asked, and what it says of its results."""
-    table = study.table(columns)
-    print_table(table)
-    if is_explained:
-        print_meanings(table)
-        print_text("")
+def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:
+    """Print the table of a study, its notes and its power."""
+    print_table(study.table(columns))
     print_lines(study.notes)
     if not any(note.startswith("Power:") for note in study.notes):  # one number of power a study
         print_lines(study.power)

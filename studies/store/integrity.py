@@ -45,7 +45,11 @@ def check_study(path: Path, db: sqlite3.Connection) -> int:
         if version.isdecimal() and int(version) < database.RESULTS_VERSION:
             return int(version)
         if meta.get("sha256") != study_checksum(db):
-            raise DamageError(path, "the description of the study does not match its checksum")
+            raise DamageError(
+                path,
+                "the description of the study does not match its checksum; a study of an earlier "
+                "development version of nested-agents looks the same",
+            )
         _check_planned(path, db)
         return int(version)
     except DECODE_ERRORS as error:

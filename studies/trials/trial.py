@@ -38,23 +38,23 @@ class Trial:
     settings: ConditionSettings
     """Settings of the condition."""
     seed: int
-    """As in `Spec`."""
+    """Seed of all random numbers."""
     episodes: int
-    """As in `Spec`."""
+    """Number of training episodes."""
     steps: int
-    """As in `Spec`."""
+    """Maximum number of decisions in an episode."""
     evaluation: int
-    """As in `Spec`."""
+    """Number of evaluation episodes after training."""
     evaluations: tuple[tuple[str, ConditionSettings], ...] = ()
     """Names and settings of the further evaluations of the trained team."""
     curriculum: tuple[Stage, ...] = ()
     """Stages in which the team is trained before its own scenario."""
     evaluation_steps: int | None = None
-    """As in `Spec`."""
+    """Maximum number of decisions in an evaluation episode; None: as in training."""
     decisions: int | None = None
-    """As in `Spec`."""
+    """Number of decisions of training; None if the study counts episodes."""
     keep_teams: bool = False
-    """As in `Spec`. It does not affect measurements and is not a part of the identity."""
+    """Whether the trained team is kept. Not a part of the identity: measurements are the same."""
     sources: Sources = field(default_factory=Sources, compare=False)
     """User files that it names. Digests of those that it uses are a part of its identity."""
 

@@ -166,7 +166,7 @@ def starting_processes() -> Iterator[None]:
 Backend = Literal["loky", "dask"]
 """``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
 ATTEMPTS = 2
-"""How often a trial whose worker has died runs alone."""
+"""Number of further attempts for a trial after its worker has died."""
 
 
 class Observer:

@@ -20,7 +20,6 @@ from ..display import (
     in_form,
     print_data,
     print_lines,
-    print_meanings,
     print_study,
     print_table,
     print_text,
@@ -62,7 +61,6 @@ def status(directory: Path) -> int:
     metavar="TITLE...",
     help="Headings of the columns to print, in this order; by default all.",
 )
-@options.flag("--legend", "Say below the table what its columns are.")
 @options.form
 @options.trust
 def table(
@@ -70,7 +68,6 @@ def table(
     study: str | None,
     where: str | None,
     columns: tuple[str, ...],
-    legend: bool,
     form: Form,
     trust: bool,
 ) -> int:
@@ -81,7 +78,7 @@ def table(
     """
     results = load_results(sources, study=study, where=where, trust=trust)
     if form == "table":
-        print_study(results, columns, is_explained=legend)
+        print_study(results, columns)
     else:
         print_data(in_form(results.table(columns), form))
     return 0
@@ -121,7 +118,6 @@ class Compared(TypedDict):
     type=click.Choice(["higher", "lower"]),
     help="Which scores of other tools are better; by default higher ones.",
 )
-@options.flag("--legend", "Say below the table what its columns are.")
 @options.out("A page to write: verdicts, table, statistics and figure.", "FILE.html")
 @options.form
 @options.trust
@@ -131,7 +127,6 @@ def compare(
     better: Literal["higher", "lower"] | None,
     out: Path | None,
     statistics: bool,
-    legend: bool,
     plot: Path | None,
     where: str | None,
     form: Form,
@@ -162,8 +157,6 @@ def compare(
             print_data(f"\n{in_form(comparison.aggregated, form)}")
         return 0
     print_table(comparison.table)
-    if legend:
-        print_meanings(comparison.table)
     print_text("", *comparison.verdicts)
     if statistics:
         print_text("")
@@ -235,11 +228,7 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
         store.verify()
         paths = {folder / name: content for name, content in _contents(store, form).items()}
     there = [path for path in paths if path.exists()]
-    # Of an export that was killed the first file is left, and is what would be written.
-    is_rest = len(there) < len(paths) and all(
-        path.is_file() and path.read_bytes() == paths[path] for path in there
-    )
-    if there and not (overwrite or is_rest):
+    if there and not overwrite:
         raise SpecError(f"{there[0]}: exists; --overwrite replaces it, --out writes elsewhere")
     try:
         folder.mkdir(parents=True, exist_ok=True)

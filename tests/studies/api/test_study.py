@@ -80,7 +80,7 @@ def test_trials_are_asked_again_by_another_study(study) -> None:
     for name, complaint in (("ablaton", "did you mean 'ablation'"), ("scaling", "needs robots")):
         with pytest.raises(na.SpecError, match=complaint):
             study.as_study(name).table()
-    with pytest.raises(na.SpecError, match="report: is of a whole study"):
+    with pytest.raises(na.SpecError, match="report: needs a whole study"):
         again.report()
 
 
@@ -146,7 +146,4 @@ def test_a_trained_team_is_explained_and_played(tmp_path) -> None:
     assert "policy" in explained.figures
     assert explained._repr_html_().startswith("<pre>default, seed 0")
     html = study.replay()._repr_html_()
-    assert html.startswith(
-        "<iframe title='default, seed 0, last episode' srcdoc='&lt;!DOCTYPE html"
-    )
-    assert html.count("'") == 6, "the page is escaped"
+    assert html.startswith("<img alt='default, seed 0, last episode' src='data:image/gif;base64,")
