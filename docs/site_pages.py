@@ -27,6 +27,7 @@ NAVIGATION = {
     ),
     "Results": (
         "results/index", "results/paper", "results/communication_lookahead", "results/scaling",
+        "results/equal_computing",
         "results/failures", "results/ppo", "notebooks/README",
     ),
     "Reference": (
