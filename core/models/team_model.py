@@ -85,7 +85,7 @@ class TeamModel:
         if self.predictor is not None:
             return self.predictor.predict(seen.present)
         if self.self_model is None and self.calibration is None and errors is None:
-            return seen.scenario.predict()
+            return _checked(seen.scenario.predict())
         bodies = seen.scenario.embodiment()
         if bodies is None:
             raise ValueError(
@@ -112,3 +112,13 @@ class TeamModel:
         """Start from the models of another team."""
         for name in self.adaptive.keys() & former.adaptive.keys():
             self.adaptive[name].warm_start(former.adaptive[name])
+
+
+def _checked(prediction: object) -> Prediction | None:
+    """Return what a scenario predicts; refuse what is no prediction."""
+    if prediction is None or isinstance(prediction, Prediction):
+        return prediction
+    raise ValueError(
+        f"scenario.predict() returned {type(prediction).__name__}, allowed: None or an instance of "
+        "nested_agents.Prediction"
+    )

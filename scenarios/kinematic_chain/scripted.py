@@ -16,7 +16,7 @@ above, and takes the action with the nearest turn.
   from the joint to the goal.
 """
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import Annotated
 
 import numpy as np
@@ -25,12 +25,12 @@ from pydantic import Field
 from ...core.interface.agents import Counts
 from ...core.numerics import FloatArray
 from ...core.search import EvaluatorSettings
-from ...core.search.evaluator import DecisionContext, DecisionProblem
+from ...core.search.evaluator import DecisionContext, DecisionProblem, Evaluator
 from .scenario import ChainPrediction
 from .variables import forward_kinematics, jacobian
 
 
-class _Scripted(ABC):
+class _Scripted(Evaluator):
     """Base class: the action with the turn nearest to the desired one."""
 
     def __init__(self, settings: EvaluatorSettings, problem: DecisionProblem) -> None:

@@ -50,7 +50,7 @@ class Comparison:
         Raises
         ------
         SpecError
-            If no two conditions have two seeds each.
+            If no two conditions have two runs each, on common items if any.
         """
         return aggregate(self.analysis)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -10,8 +11,12 @@ from numbers import Integral
 from typing import TYPE_CHECKING
 
 from ...core.plugins.words import expect, expect_each
+from ..cost.profile import search_method
 from ..presentation.tables import SummaryTable, tabulate
 from ..results import scaling_law as laws_of_results
+from ..results.results import Results
+from ..spec.tables import label_but
+from ..trials.arrangement import arrange
 from .study import StudyResults
 
 if TYPE_CHECKING:
@@ -90,4 +95,37 @@ def scaling_law(
     law = laws_of_results.scaling_law(
         results, name, phase=phase, size=size, criterion=criterion, predict=predict
     )
-    return Growth(law)
+    return Growth(law._replace(remarks=_method_remarks(study, results, size)))
+
+
+def _method_remarks(study: StudyResults, results: Results, size: str | None) -> tuple[str, ...]:
+    """Return a sentence for each group of conditions in which the search method changes with size.
+
+    A team of each condition is built to find its method. A study with untrusted files, or one that
+    is known by its table alone, has no methods.
+    """
+    columns = laws_of_results.columns_of(results)
+    key = laws_of_results.size_key(columns, size)
+    groups: dict[str, list[tuple[float, str]]] = {}
+    for condition, settings in study.condition_settings().items():
+        if condition in columns:
+            row = columns[condition]
+            with study._sources.active(), suppress(ValueError, ImportError):
+                method = search_method(arrange(settings, 0).team)
+                groups.setdefault(label_but(row, [key]), []).append((float(str(row[key])), method))
+    name = key.rpartition(".")[2]
+    changes: dict[str, list[str]] = {}
+    for group, members in groups.items():
+        first = {method: n for n, method in sorted(members, reverse=True)}
+        steps = sorted((n, method) for method, n in first.items())
+        if len(steps) > 1:
+            text = ", ".join(f"{method} from {n:g} {name}" for n, method in steps)
+            changes.setdefault(text, []).append(group)
+    remarks = []
+    for text, own in changes.items():
+        head = "" if len(own) == len(groups) else f"{', '.join(own)}: "
+        remarks.append(
+            f"{head}The search method changes within the sizes ({text}), so that one law describes "
+            "several methods; learner.decision.evaluator sets one for all."
+        )
+    return tuple(remarks)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TypedDict, Unpack
+from typing import TypedDict, Unpack, get_args
 
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
@@ -127,6 +127,8 @@ def compare_table(
     -0.23
     """
     expect("a table of pandas or the path of a file", pd.DataFrame | str | PathLike, table=table)
+    if better not in get_args(Better):
+        raise SpecError(f"better = {better!r}, allowed: {' or '.join(get_args(Better))}")
     condition, score = columns.get("condition", ()), columns.get("score", ())
     expect_each("names of columns", str, condition=condition, score=score)
     roles = _roles(columns)
@@ -212,6 +214,7 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
     measure = None
     with refused(before):
         if exported.is_exported(table) and roles.keys() <= {"score"}:
+            _check_better(better)
             header = published.header_beside(path) if path else None
             own = exported.results_of(table, header and header.description)
             outline = header.outline if header else _outline(own.conditions)
@@ -222,6 +225,15 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
             outline, results, notes = foreign.results_of(table, columns, better)
     remarks = tuple(f"{before}{line}" for line in notes)
     return StudyResults(outline, results, (), remarks, _defaults=Defaults(measure))
+
+
+def _check_better(better: Better) -> None:
+    """Refuse a direction for exported results, whose measures have their own."""
+    if better == "lower":
+        raise ValueError(
+            "better = 'lower': the columns are those of an exported study, which knows what is "
+            "better; allowed: no direction, or other names of columns"
+        )
 
 
 def _outline(conditions: Mapping[str, Mapping[str, object]]) -> StudyOutline:
@@ -238,6 +250,7 @@ def _of_runs(path: Path, runs: Sequence[marl_eval.AlgorithmRun], better: Better)
     is_exported = header is not None and {run.algorithm for run in runs} <= names
     with refused(f"{path}: "):
         if header is not None and is_exported:
+            _check_better(better)
             own = marl_eval.results_of(runs, better, known, header.measures)
             outline, results = header.outline, header.limited(own.results)
         else:

@@ -118,7 +118,7 @@ class Analysis:
     """Differences by measure or by setting, p adjusted over all."""
 
 
-NOTHING = "Nothing to compare: no two conditions have two seeds each."
+NOTHING = "Nothing to compare: no two conditions have two runs each, on common items if any."
 TESTS = {
     True: "permutation of signs over seeds",
     False: "permutation of labels of independent samples, with Welch's intervals",

@@ -41,6 +41,8 @@ def choose_trials(results: Results, choice: str, settings: SpecTable) -> Results
     names = {end: name for end, name in zip(ends, frame, strict=True) if ends.count(end) == 1}
     frame = frame.assign(**{end: frame[name] for end, name in names.items()})
     try:
+        if re.search(r"@|__", re.sub(r"'[^']*'|\"[^\"]*\"", "", choice)):
+            raise ValueError("allowed: names of columns, numbers, text and comparisons")
         is_chosen = frame.eval(choice)
         if not isinstance(is_chosen, pd.Series) or is_chosen.dtype != bool:
             raise TypeError("is not true or false of each trial")

@@ -81,6 +81,11 @@ class ComparisonTable(NamedTuple):
         left_out = "; ".join(text for group in self.groups for text in group.left_out)
         if left_out:
             lines += wrapped(f"Without a partner and left out of the difference: {left_out}.")
+        compared = {c for group in self.groups for c in group.members.values()}
+        others = [c for c in self.results.conditions if c not in compared]
+        if others:
+            names = "; ".join(others)
+            lines += wrapped(f"Not compared, because they have no {self.title}: {names}.")
         values = [own for group in self.groups for own in group.values.values()]
         if self.measure.name == SUCCESS.name and not any(own.any() for own in values):
             lines += wrapped(f"No run has any {self.title}.")
@@ -226,7 +231,7 @@ def usual_phase(results: Results, measure: str) -> str:
         known = {c for c in results.of_phase(phase) if results.has_any(c, phase, measure)}
         if known and known >= trained:
             return phase
-    if trained or len(results.phases) < 2:
+    if LAST_STEP not in results.phases and (trained or len(results.phases) < 2):
         return next(iter(results.phases), "training")
     raise SpecError(f"phase: name one, known: {', '.join(results.phases)}")
 
@@ -239,8 +244,7 @@ def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[
         shared = [values.loc[seeds, episodes] for values in (own, base)]
         both = shared[0].notna() & shared[1].notna()
         shared = [values.where(both).dropna(how="all") for values in shared]
-        if len(shared[0]) >= MIN_RUNS:
-            own, base = shared
+        own, base = (values if len(episodes) else values.iloc[:0] for values in shared)
     return row_means(own), row_means(base)
 
 

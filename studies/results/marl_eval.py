@@ -216,7 +216,8 @@ def results_of(
     notes = [f"keys that are no steps are ignored: {', '.join(ignored)}"] if ignored else []
     empty = sum(not (run.series or run.absolute) for run in runs)
     notes += [f"{empty} of {len(runs)} runs have measured nothing: left out"] if empty else []
-    phases, chosen = _phases(frame, runs)
+    is_exported = bool(conditions) and _counts_episodes(runs)
+    phases, chosen = _phases(frame, is_exported)
     wide = pd.concat(phases).pivot(index=KEYS, columns="measure", values="value").reset_index()
     wide["seed"] = whole_names(_without_prefix(wide["seed"]))
     known = measures or _measures(wide, metrics, better)
@@ -273,14 +274,12 @@ def _long(runs: Sequence[AlgorithmRun], labels: Mapping[tuple[str, str], str]) -
     return frame.assign(value=[float(np.mean(own)) for own in frame["values"]])
 
 
-def _phases(
-    frame: pd.DataFrame, runs: Sequence[AlgorithmRun]
-) -> tuple[list[pd.DataFrame], list[str]]:
+def _phases(frame: pd.DataFrame, is_exported: bool) -> tuple[list[pd.DataFrame], list[str]]:
     """Return the scores of each phase in long form, and notes on what is compared."""
     is_final = frame["step"] == FINAL
     series = frame[~is_final].assign(phase="training")
     final = frame[is_final].assign(phase="evaluation")
-    if _counts_episodes(runs):  # an exported study: a step is an episode
+    if is_exported:  # by this toolkit: a step is an episode
         return [series, *_final(final)], []
     chosen: dict[str, list[str]] = {}
     phases = []
@@ -373,6 +372,11 @@ def _measures(wide: pd.DataFrame, metrics: Sequence[str], better: Better) -> lis
             measures.insert(0, SUCCESS)
         else:
             measures.append(Measure(name, name, better=better, is_rate=kind == "rate"))
+    if RETURN.name in metrics and better == "lower":
+        raise ValueError(
+            "better = 'lower': the metric return is better if it is higher, allowed: higher, or "
+            "another name of the metric"
+        )
     if RETURN.name in metrics and (SUCCESS not in measures or not wide[SUCCESS.name].any()):
         measures = [NO_SUCCESS, *(m for m in measures if m != SUCCESS)]
     return measures

@@ -259,6 +259,8 @@ def pad_rows(rows: Sequence[Array]) -> Array:
 def row_means(values: pd.DataFrame) -> pd.Series:
     """Return the mean of each row without its missing values."""
     array = np.ascontiguousarray(values.to_numpy(dtype=float))
+    if not array.size:
+        return pd.Series(dtype=float)
     mean = np.nanmean if np.isnan(array).any() else np.mean
     return pd.Series(mean(array, axis=1), values.index)
 

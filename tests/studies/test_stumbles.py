@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 import nested_agents as na
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.measures import SUCCESS
-from nested_agents.studies.api import planning
 from nested_agents.studies.catalogue.learning_curve import metrics_of
 from nested_agents.studies.catalogue.wheel_failure import analyse as analyse_failures
 from nested_agents.studies.catalogue.wheel_failure import draw as draw_failures
@@ -204,12 +203,3 @@ def test_a_file_that_cannot_be_written_is_called_by_its_own_name(
     for path, reason in reasons.items():
         assert main(["cost", "--plot", path]) == 2
         assert capsys.readouterr().err == f"nested-agents: error: {path}: {reason}\n"
-
-
-def test_ctrl_c_in_a_plan_reaches_no_process_that_would_print_a_traceback(
-    tmp_path, monkeypatch, capsys
-) -> None:
-    monkeypatch.setattr(planning, "START", "import os; assert os.getpgid(0) == os.getpid()")
-    (tmp_path / "spec.toml").write_text('scenario.kind = "matrix-game"\nsteps = 2\nepisodes = 1')
-    assert main(["plan", str(tmp_path / "spec.toml")]) == 0
-    assert "time" in capsys.readouterr().out

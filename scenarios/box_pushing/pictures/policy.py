@@ -76,8 +76,8 @@ class BoxPolicyMap(PolicyMap):
 
     def lines(self) -> Iterator[str]:
         """Yield the frequency of each kind of motion by robot."""
-        yield "Predicted motion of a robot at rest that faces the box, the goal 60 cm ahead of the"
-        yield "box, the other robots behind it."
+        yield "Predicted motion of a robot at rest that faces the box, the goal 60 cm ahead"
+        yield "of the box, the other robots behind it."
         yield ""
         yield f"{'robot':<7}{'places':>7}{''.join(kind.rjust(12) for kind in COLORS)}"
         for number, field in enumerate(self.fields, 1):

@@ -228,7 +228,11 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
         store.verify()
         paths = {folder / name: content for name, content in _contents(store, form).items()}
     there = [path for path in paths if path.exists()]
-    if there and not overwrite:
+    # Of an export that was killed the first file is left, and is what would be written.
+    is_rest = len(there) < len(paths) and all(
+        path.is_file() and path.read_bytes() == paths[path] for path in there
+    )
+    if there and not (overwrite or is_rest):
         raise SpecError(f"{there[0]}: exists; --overwrite replaces it, --out writes elsewhere")
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,6 @@ from nested_agents.scenarios import SCENARIOS
 
 TABLES = {
     "spread": {"kind": "spread", "most_decisions": 7},
-    "line-up": {"kind": "line-up", "carts": 3},
     "arm": {"kind": "kinematic-chain", "joints": 4, "most_decisions": 9},
     "arm, limits": {"kind": "kinematic-chain", "joints": 5, "joint_limit": 1.0},
     "climbing": {"kind": "matrix-game", "game": "stochastic-climbing"},

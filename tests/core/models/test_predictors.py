@@ -20,6 +20,11 @@ ACROSS = np.array([1.0, -1.0, -1.0])
 """What a mirror along the x axis does to a pose."""
 
 
+def states(scenario, origin):
+    """Return the present states of all agents; the box was at `origin` a period before."""
+    return scenario.states_at(scenario._present(origin), scenario._speeds[None])[0]
+
+
 @pytest.mark.parametrize("state_space", ["paper", "relational", "pose", "crowd", "wide"])
 @pytest.mark.parametrize("robot", ["e-puck", "three-wheel", "four-wheel"])
 def test_the_image_of_a_state_is_the_state_of_the_mirrored_world(
@@ -31,12 +36,12 @@ def test_the_image_of_a_state_is_the_state_of_the_mirrored_world(
     poses, box = scenario.world.robot_poses.copy(), scenario.world.box_pose.copy()
     scenario._speeds = np.linspace(-0.13, 0.13, len(scenario.agents))
     origin = box + np.array([-0.03, 0.01, 0.05])
-    seen = scenario._observe(origin)
+    seen = states(scenario, origin)
 
     scenario.world.place(poses * ACROSS, box * ACROSS)
     scenario._goal = scenario._goal * ACROSS
     scenario._speeds = scenario._speeds[mirror.partners]
-    found = scenario._observe(origin * ACROSS)[mirror.partners]
+    found = states(scenario, origin * ACROSS)[mirror.partners]
     off = found - mirror.states(seen)[len(seen) :]
     is_angle = [variable.periodic for variable in scenario.state_space.variables]
     off[:, is_angle] = np.angle(np.exp(1j * off[:, is_angle]))

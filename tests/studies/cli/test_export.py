@@ -78,6 +78,20 @@ def test_the_second_time_only_on_request(study, tmp_path, capsys):
     assert (tmp_path / "episodes.csv").read_bytes() == before
 
 
+def test_what_a_kill_between_two_files_left_is_finished(study, tmp_path, capsys):
+    line = ["export", str(study), "--out", str(tmp_path)]
+    assert main(line) == 0
+    whole = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert main(line) == 2  # all of it is there
+    for left in whole:
+        left.unlink()
+        assert main(line) == 0
+        assert {path: path.read_bytes() for path in tmp_path.iterdir()} == whole
+    (tmp_path / "trials.csv").unlink()
+    (tmp_path / "episodes.csv").write_text("mine")
+    assert main(line) == 2
+
+
 def test_an_error_leaves_what_was_there(study, tmp_path, monkeypatch):
     line = ["export", str(study), "--out", str(tmp_path), "--overwrite"]
     assert main(line) == 0

@@ -17,8 +17,11 @@ LOADED = [
     (["presets"], set()),
     (["status", STUDY], set()),
     (["topology", "list"], {"numpy", "pydantic", "rich"}),
-    (["cost"], {"numpy", "pydantic", "rich", "core.agents.team"}),
-    (["topology", "show", "chain"], {"numpy", "pydantic", "rich", "core.agents.team", "networkx"}),
+    (["cost"], {"numpy", "pydantic", "rich", "core.agents.team", "pandas"}),
+    (
+        ["topology", "show", "chain"],
+        {"numpy", "pydantic", "rich", "core.agents.team", "networkx", "pandas"},
+    ),
     (
         ["results", STUDY],
         {"numpy", "pydantic", "rich", "core.agents.team", "networkx", "pandas"},

@@ -236,7 +236,6 @@ READING = {
     "results": ["results"],
     "table": ["table"],
     "compare": ["compare"],
-    "status --watch": ["status", "--watch"],
     "export csv": ["export", "--format", "csv"],
     "export json": ["export", "--format", "json"],
     "export marl-eval": ["export", "--format", "marl-eval"],

@@ -82,7 +82,7 @@ def test_what_there_is_not_is_refused(options: dict, complaint: str) -> None:
 def test_too_few_shared_seeds_leave_nothing_to_compare() -> None:
     results = hierarchies(CHANCES, seeds=1).frames()
     assert compare_conditions(results).notes == (
-        "Nothing to compare: no two conditions have two seeds each.",
+        "Nothing to compare: no two conditions have two runs each, on common items if any.",
     )
 
 

@@ -111,7 +111,7 @@ def files(directory):
 def refused(directory, capsys, reason="is damaged: "):
     """Assert that readers and `run` refuse a damaged database in one line and change nothing."""
     before = files(directory)
-    for command in ("results", "table", "compare", "export", "report", "status", "status --watch"):
+    for command in ("results", "table", "compare", "export", "report", "status"):
         name, *options = command.split()
         assert main([name, str(directory), *options]) == 2, command
         out, err = capsys.readouterr()
