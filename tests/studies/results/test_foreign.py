@@ -238,3 +238,36 @@ def test_columns_and_better_are_of_other_tools_alone(tmp_path: Path, capfd) -> N
     assert "columns: are of tables, .csv, .jsonl, .parquet" in capfd.readouterr().err
     assert main(["compare", str(study), "--better", "lower"]) == 2
     assert "better: is of results of other tools" in capfd.readouterr().err
+
+
+def test_scores_of_different_items_are_not_compared(tmp_path, capsys) -> None:
+    rows = [("a", seed, f"a{k}", 0.1 * k) for seed in range(4) for k in range(3)]
+    rows += [("b", seed, f"b{k}", 1.0 + 0.1 * k) for seed in range(4) for k in range(3)]
+    table = pd.DataFrame(rows, columns=["condition", "seed", "item", "score"])
+    table.to_csv(tmp_path / "scores.csv", index=False)
+    assert main(["compare", str(tmp_path / "scores.csv")]) == 0
+    out, err = capsys.readouterr()
+    assert "better" not in out
+    assert "Nothing to compare" in out
+    assert not err
+
+
+def test_the_direction_of_known_measures_is_refused(tmp_path, capsys) -> None:
+    rows = [(c, s, "training", e, 5) for c in "ab" for s in range(3) for e in range(2)]
+    columns = ["condition", "seed", "phase", "episode", "steps"]
+    pd.DataFrame(rows, columns=columns).to_csv(tmp_path / "log.csv", index=False)
+    assert main(["compare", str(tmp_path / "log.csv"), "--better", "lower"]) == 2
+    assert "better = 'lower'" in capsys.readouterr().err
+    with pytest.raises(ValueError, match="better = 'up', allowed: higher or lower"):
+        na.compare_table(tmp_path / "log.csv", better="up")
+
+
+def test_a_choice_of_trials_runs_no_code(tmp_path, capsys) -> None:
+    rows = [(c, s, 1.0) for c in "ab" for s in range(3)]
+    table = pd.DataFrame(rows, columns=["condition", "seed", "score"])
+    table.to_csv(tmp_path / "scores.csv", index=False)
+    made = tmp_path / "made"
+    for choice in (f"@pd.io.common.os.mkdir('{made}') == 0", "condition.__class__ == 0"):
+        assert main(["compare", str(tmp_path / "scores.csv"), "--where", choice]) == 2
+        assert "where = " in capsys.readouterr().err
+    assert not made.exists()
