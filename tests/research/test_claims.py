@@ -268,6 +268,8 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "fit-rings",
         "fit-games-ppo",
         "fit-ring-ppo",
+        "equal-computing-boxes",
+        "equal-computing-arms",
         "edges-classes",
         "edges-hierarchies",
         "edges-arms",
