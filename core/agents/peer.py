@@ -19,7 +19,7 @@ from ..interface.experience import Experience, Observation
 from ..interface.scenario import Transition
 from ..learners.learner import CORE, TeamSettings
 from ..numerics import AnyArray, FloatArray, IntArray
-from ..search.exploration import no_way_on
+from ..search.exploration import warm_start_refusal
 
 
 class PeerSettings(TeamSettings):
@@ -84,7 +84,7 @@ class Peer(ABC):
         ValueError
             If the learner does not support it; one line.
         """
-        raise ValueError(no_way_on("learner.kind", self, "warm_start"))
+        raise ValueError(warm_start_refusal("learner.kind", self))
 
 
 @dataclass

@@ -24,7 +24,7 @@ from ..search.exploration import (
     EXPLORATIONS,
     BurstExploration,
     ExplorationSettings,
-    no_way_on,
+    warm_start_refusal,
 )
 from ..search.settings import DecisionSettings
 from ..values.rule_base import RuleBase, RuleBaseSettings
@@ -117,7 +117,7 @@ class Learner(ABC):
         ValueError
             If this kind of learner does not support it.
         """
-        raise ValueError(no_way_on("learner.kind", self))
+        raise ValueError(warm_start_refusal("learner.kind", self))
 
 
 class MembersOf(NamedTuple):

@@ -30,10 +30,10 @@ def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
     return weights / weights.sum()
 
 
-def no_way_on(key: str, part: object, method: str = "warm_start") -> str:
+def warm_start_refusal(key: str, part: object) -> str:
     """Return the message that a part cannot be warm-started from another team."""
     return (
-        f"{key}: {type(part).__name__} has no {method}, which starting from another team requires"
+        f"{key}: {type(part).__name__} has no warm_start, which starting from another team requires"
     )
 
 
@@ -65,7 +65,7 @@ class Explorer(ABC):
         ValueError
             If this kind of exploration does not support it.
         """
-        raise ValueError(no_way_on("learner.exploration.kind", self))
+        raise ValueError(warm_start_refusal("learner.exploration.kind", self))
 
 
 class ExplorationSettings(PartSettings):

@@ -171,7 +171,7 @@ class StudyData:
         return Comparison(compared, (*missing, *self._of_controls, *self.remarks))
 
     def where(self, choice: str) -> Self:
-        """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `chosen`."""
+        """Return the trials that match a choice, such as ``"robots == 8 and seed < 5"``."""
         part = choose_trials(self.results, choice, self._settings)
         if not part.conditions:
             raise SpecError(f"where = {choice!r}: no finished trial matches")

@@ -228,7 +228,7 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
 
 
 def _check_better(better: Better) -> None:
-    """Refuse a direction for exported results, whose measures have their own."""
+    """Refuse ``lower`` for exported results: it is known which of their values are better."""
     if better == "lower":
         raise ValueError(
             "better = 'lower': the columns are those of an exported study, which knows what is "

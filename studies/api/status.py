@@ -34,7 +34,7 @@ class Progress:
     seconds: float | None
     """Estimate of the remaining time [s]; None if no trial has finished."""
     damaged: tuple[str, ...]
-    """One line for each finished trial whose results are damaged. These trials count as left."""
+    """One line for each finished trial with damaged results. Such a trial has to run again."""
     refusal: str | None
     """One line on why the installed code does not continue the study; None if it does."""
 

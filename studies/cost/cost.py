@@ -16,7 +16,6 @@ membership functions, because all of their rules fire.
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 from fractions import Fraction
-from functools import cache
 from statistics import median
 from typing import NamedTuple
 
@@ -160,26 +159,26 @@ def joint_actions(text: str, n: int, actions: int) -> list[int]:
     return [actions ** (1 + below) for below in agents_below(topology, n)]
 
 
-def within_budget(text: str, n: int, problem: Problem, budget: int) -> BudgetCost:
-    """Return the cost of n agents that may try `budget` joint actions in a decision.
+def within_budget(row: CostRow, needs: Sequence[int], budget: int) -> BudgetCost:
+    """Return the cost of a row if its team may try `budget` joint actions in a decision.
 
-    The budget is divided over the agents as in a running team.
+    The budget is divided over the agents as in a running team. `needs` are the joint actions that
+    each agent tries without it.
 
     Raises
     ------
     ValueError
         If the budget is less than one joint action for each agent; one line.
     """
-    needs = joint_actions(text, n, problem.actions)
     if budget < len(needs):
         raise ValueError(
-            f"budget = {budget}: {text} needs one joint action for each of {n} agents, allowed: "
-            f"{len(needs)} or more"
+            f"budget = {budget}: {row.topology} needs one joint action for each of {row.agents} "
+            f"agents, allowed: {len(needs)} or more"
         )
     tried = divide(budget, needs)
-    operations = problem.sweep(tried)
-    if text == SINGLE_AGENT:
-        operations *= problem.rules ** (n - 1)
+    operations = row.problem.sweep(tried)
+    if row.nested_exact is None:  # the single agent has the rules of all agents together
+        operations *= row.problem.rules ** (row.agents - 1)
     return BudgetCost(budget, sum(needs), sum(tried), operations)
 
 
@@ -206,7 +205,6 @@ def _hierarchy(text: str, n: int) -> Hierarchy:
     return build(text, [f"agent{i + 1}" for i in range(n)], pairs(n))
 
 
-@cache
 def agents_below(text: str, n: int) -> Sequence[int]:
     """Return the number of agents below each of n agents in a topology.
 

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
+from ...core.agents.cost import Problem
 from ..presentation import figures
 from .cost import ACTIONS, RULES, CostRow
 
@@ -31,13 +32,8 @@ Looks = Mapping[str, Mapping[str, Any]]
 """Looks of lines by their labels."""
 
 
-def draw(rows: Sequence[CostRow], path: Path) -> None:
-    """Write the figure: SVG, PNG or PDF by the suffix of `path`.
-
-    Each pair of rules and actions has a panel of the formulas. If anything was measured, two more
-    panels show rule evaluations per step (lines by formula, markers counted) and time per step
-    (markers timed, lines the formula's growth through the last of them). All values are drawn by
-    their logarithms, because those of many agents exceed every floating-point number.
+def check(rows: Sequence[CostRow], path: Path) -> tuple[list[Problem], list[str]]:
+    """Return the problems and the topologies of a figure that can be read.
 
     Raises
     ------
@@ -57,6 +53,23 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
             f"{path}: {len(problems)} pairs of rules and actions, allowed in a figure: "
             f"{MAX_PANELS}, one panel each"
         )
+    return problems, names
+
+
+def draw(rows: Sequence[CostRow], path: Path) -> None:
+    """Write the figure: SVG, PNG or PDF by the suffix of `path`.
+
+    Each pair of rules and actions has a panel of the formulas. If anything was measured, two more
+    panels show rule evaluations per step (lines by formula, markers counted) and time per step
+    (markers timed, lines the formula's growth through the last of them). All values are drawn by
+    their logarithms, because those of many agents exceed every floating-point number.
+
+    Raises
+    ------
+    ValueError
+        See `check`.
+    """
+    problems, names = check(rows, path)
     looks: Looks = {**dict(zip(names, LOOKS, strict=False)), SINGLE_AGENT: SINGLE_LOOK}
     is_measured = any(row.measured is not None for row in rows)
     with figures.apply_style():

@@ -215,18 +215,20 @@ def _row(
     n = row.agents
     below = () if text in {SINGLE_AGENT, *DECISION_METHODS} else agents_below(text, n)
     is_one = bool(below) and is_chain(below)
-    is_single = text == SINGLE_AGENT
-    return replace(
+    needs = joint_actions(text, n, problem.actions)
+    row = replace(
         row,
         problem=problem,
         memberships=memberships,
-        nested_exact=None if is_single else problem.sweep(joint_actions(text, n, problem.actions)),
+        nested_exact=None if text == SINGLE_AGENT else problem.sweep(needs),
         nested_closed_form=problem.chain_closed_form(n) if is_one else None,
         nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
         single_agent=problem.single_agent(n),
-        within_budget=None if budget is None else within_budget(text, n, problem, budget),
         free=1 + max(below, default=-1),
     )
+    if budget is None:
+        return row
+    return replace(row, within_budget=within_budget(row, needs, budget))
 
 
 def _labeled(topologies: Sequence[str]) -> list[tuple[str, str]]:

@@ -52,7 +52,7 @@ class Parts:
         return max(0.0, 1.0 - sum(map(self.share, self.singles))) if self.variance > 0 else 0.0
 
 
-def take_apart(rules: RuleBase, theta: FloatArray) -> Parts:
+def decompose(rules: RuleBase, theta: FloatArray) -> Parts:
     """Return the parts of f for one agent's consequent weights ``(n_rules,)``.
 
     Examples
@@ -60,7 +60,7 @@ def take_apart(rules: RuleBase, theta: FloatArray) -> Parts:
     Two variables with LOW and HIGH: the rule HIGH, HIGH pays, no other.
 
     >>> base = RuleBase([Partition((0.0, 1.0), "triangular")] * 2, [(0, 1)])
-    >>> parts = take_apart(base, np.array([0.0, 0.0, 0.0, 4.0]))
+    >>> parts = decompose(base, np.array([0.0, 0.0, 0.0, 4.0]))
     >>> parts.constant, parts.singles[0].tolist(), round(parts.rest, 2)
     (1.0, [-1.0, 1.0], 0.33)
     """
@@ -71,12 +71,12 @@ def take_apart(rules: RuleBase, theta: FloatArray) -> Parts:
     singles: list[FloatArray] = [np.zeros(size) for size in sizes]
     for term, tensor in tensors:
         for j in term:
-            singles[j] += _onto(tensor, term, (j,)) - tensor.mean()
+            singles[j] += _mean_over_others(tensor, term, (j,)) - tensor.mean()
     constant = float(sum(tensor.mean() for _, tensor in tensors))
     return Parts(constant, tuple(singles), _variance(tensors))
 
 
-def _onto(tensor: FloatArray, term: Sequence[int], kept: Sequence[int]) -> FloatArray:
+def _mean_over_others(tensor: FloatArray, term: Sequence[int], kept: Sequence[int]) -> FloatArray:
     """Return the mean over all variables of a term but some."""
     return np.asarray(tensor.mean(axis=tuple(i for i, j in enumerate(term) if j not in kept)))
 
@@ -86,8 +86,8 @@ def _variance(tensors: Sequence[tuple[tuple[int, ...], FloatArray]]) -> float:
     total = 0.0
     for (term, tensor), (other, second) in combinations_with_replacement(tensors, 2):
         if common := [j for j in term if j in other]:
-            first = _onto(tensor, term, common) - tensor.mean()
-            covariance = (first * (_onto(second, other, common) - second.mean())).mean()
+            first = _mean_over_others(tensor, term, common) - tensor.mean()
+            covariance = (first * (_mean_over_others(second, other, common) - second.mean())).mean()
             total += float(covariance) * (1.0 if other == term else 2.0)
     return total
 

@@ -31,7 +31,7 @@ from ..store.durable import TEAM
 from ..store.store import Store
 from ..trials.session import EVALUATION_WORLDS, Session
 from ..trials.trial import Trial
-from .functions import Parts, take_apart
+from .functions import Parts, decompose
 
 
 class WheelEffects(NamedTuple):
@@ -102,7 +102,7 @@ def explain(store: Store, trial: Trial) -> Explanation:
         else:
             session.team.load_state_dict(arrays)
         effects = zip(nominal, model.effects, model.deviations, strict=True) if model else ()
-        taken = [take_apart(agents.rules, theta) for theta in agents.learner.theta]
+        taken = [decompose(agents.rules, theta) for theta in agents.learner.theta]
         return Explanation(
             trial=trial,
             agents=session.scenario.agents,

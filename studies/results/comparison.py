@@ -243,8 +243,7 @@ def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[
         episodes = own.columns.intersection(base.columns)
         shared = [values.loc[seeds, episodes] for values in (own, base)]
         both = shared[0].notna() & shared[1].notna()
-        shared = [values.where(both).dropna(how="all") for values in shared]
-        own, base = (values if len(episodes) else values.iloc[:0] for values in shared)
+        own, base = (values.where(both).dropna(how="all") for values in shared)
     return row_means(own), row_means(base)
 
 

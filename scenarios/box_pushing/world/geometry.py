@@ -25,8 +25,8 @@ LANES = 16
 def block_of(*rows: str) -> np.dtype[np.void]:
     """Return the type of a record with `LANES` numbers in each of the named rows.
 
-    A compiled record does not keep its array alive: a kernel must use the array later than the
-    record, for example by taking the record anew within a loop.
+    A compiled record does not keep its array alive. A kernel must therefore use the array after
+    the last use of the record; indexing the array in every pass of a loop is enough.
     """
     return np.dtype((np.record, [(row, np.float64, (LANES,)) for row in rows]))
 

@@ -64,7 +64,7 @@ def infrared_readings(
 ) -> FloatArray:
     """Return the readings of the box ``(M, S)`` by the sensors of all robots.
 
-    Other robots neither hide the box nor are they seen.
+    Other robots are not seen, and do not hide the box.
 
     Parameters
     ----------

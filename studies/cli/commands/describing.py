@@ -183,11 +183,16 @@ def cost(
             quantities["memberships"] = numbers("memberships", typed["memberships"])
         if typed["rules"]:
             quantities["rules"] = numbers("rules", typed["rules"])
+        sizes = numbers("agents", agents)
         if measured:
+            if plot is not None:  # a figure that cannot be read is refused before anything is timed
+                from ...cost.figure import check
+
+                check(costs.cost_table(topology, sizes, **quantities).rows, plot)
             say("measuring, first compiling what is not: no steps of more than a second or so")
         rows = costs.cost_table(
             topology,
-            numbers("agents", agents),
+            sizes,
             budget=budget,
             measured=measured,
             network=network,

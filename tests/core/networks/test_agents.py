@@ -276,7 +276,7 @@ def test_agents_whose_messages_may_fail_begin_as_others_do() -> None:
 
 
 def test_what_arrives_is_learned_from() -> None:
-    """Agent c is rewarded for repeating the action of b, of whom it is told among others."""
+    """Agent c is rewarded for repeating the action of b, which is one of its senders."""
     failures = failures_of({"kind": "lost", "agents": "a"})
     world = Players("abc", 2)
     table = {"rollout": 32, "learning_rate": 0.003, "entropy": 0.05}

@@ -371,7 +371,7 @@ def test_what_was_measured_has_one_line_whatever_the_rules(said) -> None:
 
 
 def test_a_budget_is_divided_as_in_a_running_team(said) -> None:
-    """Of a budget of 64, the first of three agents in a chain may try 44 joint actions."""
+    """The first of three agents in a chain may try 44 of 64 joint actions."""
     command = ("--agents", "3", "--topology", "chain", "single-agent", "--budget")
     chain, single = json.loads(said(*command, "64", "--rules", "7", "--format", "json")[1])
     keys = ("budget", "joint_actions", "joint_actions_tried", "operations")

@@ -14,7 +14,7 @@ from nested_agents.core.values.rule_base import RuleBase
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import team as explain
-from nested_agents.studies.explain.functions import labels, take_apart
+from nested_agents.studies.explain.functions import decompose, labels
 from nested_agents.studies.explain.text import _table
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE, RESULTS_VERSION
@@ -233,7 +233,7 @@ def corners():
 def test_the_parts_add_up_to_f():
     rules = base(1)
     theta = theta_for(rules)
-    parts = take_apart(rules, theta)
+    parts = decompose(rules, theta)
     states = np.random.default_rng(1).uniform(-1, 2, size=(50, 4))
     strengths = [p.strengths(states[:, j]) for j, p in enumerate(PARTITIONS)]
     f = parts.constant + sum(s @ g for s, g in zip(strengths, parts.singles, strict=True))
@@ -245,7 +245,7 @@ def test_the_parts_add_up_to_f():
 def test_variance_and_functions_of_one_variable_are_those_of_all_rules(orders):
     rules = base(*orders)
     theta = theta_for(rules)
-    parts = take_apart(rules, theta)
+    parts = decompose(rules, theta)
     f = rules.values(theta, corners()).reshape([p.size for p in PARTITIONS])
     assert parts.variance == pytest.approx(f.var(), rel=1e-12)
     assert parts.constant == pytest.approx(f.mean(), rel=1e-9)
