@@ -96,7 +96,7 @@ def test_growth_is_that_of_what_is_tried_times_that_of_each() -> None:
 
 def test_teams_without_a_predictor_have_profiles() -> None:
     spec = {"steps": 10, "scenario": {"kind": "line-up"}, "learner": {"kind": "fitted-q"}}
-    (row,) = na.profile(spec, seconds=0.05).rows
+    (row,) = na.profile(spec, seconds=0.5).rows
     assert row.seconds["value"] > 0.0
     assert row.evaluator == "fitted-q"
 
