@@ -18,14 +18,14 @@ from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 
 import nested_agents as na
 from nested_agents.analysis import Estimate, Results, format_number
-from nested_agents.figures import COLOURS
+from nested_agents.figures import COLORS
 from nested_agents.parts import Problem
 from research import RESULTS, load
 from research.experience import TASKS
 from research.studies.games import analyse as analyse_games
 
 FIGURES = Path(__file__).resolve().parent / "figures"
-BLUE, ORANGE, GREEN = COLOURS[:3]
+BLUE, ORANGE, GREEN = COLORS[:3]
 GRAY = "#666666"
 WIDTH = 5.4
 """Width of a figure [inches]: with letters of 10 points it can be read at 390 pixels."""

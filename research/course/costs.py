@@ -18,7 +18,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import nested_agents as na
-from nested_agents.figures import COLOURS, STYLES
+from nested_agents.figures import COLORS, STYLES
 from nested_agents.parts import Problem, below_counts
 
 from grade import grade
@@ -55,7 +55,7 @@ figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 sizes = range(1, 17)
 for number, (name, topology) in enumerate(TOPOLOGIES.items()):
     counts = [tried(topology, n) for n in sizes]
-    ax.plot(sizes, counts, color=COLOURS[number], linestyle=STYLES[number], linewidth=4)
+    ax.plot(sizes, counts, color=COLORS[number], linestyle=STYLES[number], linewidth=4)
     beside = (12, (14, -14, 0)[number])  # chain and tree end close together
     ax.annotate(name, (16, counts[-1]), xytext=beside, textcoords="offset points", va="center")
 ax.set(yscale="log", xlabel="agents", ylabel="joint actions of a decision")

@@ -113,7 +113,7 @@ def analyse(results: Results) -> Analysis:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: evaluations against experience, a panel for each condition.
 
-    The condition's line has a colour, and a band for its 95% intervals; those of the others are
+    The condition's line has a color, and a band for its 95% intervals; those of the others are
     grey.
     """
     from matplotlib.ticker import LogLocator

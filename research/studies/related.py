@@ -112,7 +112,7 @@ def name_world(swept: Mapping[str, object]) -> str:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: the systems one below the other, a colour for each world.
+    """Return the figure: the systems one below the other, a color for each world.
 
     Bars are 95% intervals.
     """
@@ -129,9 +129,9 @@ def draw(analysis: Analysis) -> Figures:
     for axes, (name, title) in zip(panels, PANELS.items(), strict=True):
         for case in cases:
             which = worlds.index(case.setting)
-            colour = f.look(which)["color"]
+            color = f.look(which)["color"]
             row = systems.index(case.system) + places[which]
-            f.draw_row(axes, row, case.values[name], color=colour, markersize=3)
+            f.draw_row(axes, row, case.values[name], color=color, markersize=3)
         axes.set_title(title, loc="left")
         axes.grid(axis="x", alpha=0.25)
         if name in LEAST:

@@ -24,7 +24,7 @@ from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")
 """Formats that figures are written in."""
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colors distinct to color-blind readers (Okabe and Ito 2008), without the palest."""
 STYLES = (
     "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1.5, 1, 1.5, 1, 1.5)),
@@ -93,8 +93,8 @@ def grid(
 
 def look(index: int) -> dict[str, Any]:
     """Return color and dashes of a line."""
-    cycle = index // len(COLOURS)  # a colour that comes again has other dashes
-    return {"color": COLOURS[index % len(COLOURS)], "ls": STYLES[(index + cycle) % len(STYLES)]}
+    cycle = index // len(COLORS)  # a color that comes again has other dashes
+    return {"color": COLORS[index % len(COLORS)], "ls": STYLES[(index + cycle) % len(STYLES)]}
 
 
 def marker(index: int) -> str:
@@ -296,10 +296,10 @@ def draw_forest(
     for axes, (title, lines) in zip(all_axes[0], compared.items(), strict=True):
         axes.axvline(null, color="#888888", linewidth=0.8)
         for line in lines:
-            colour = COLOURS[0] if line.estimate.value >= null else COLOURS[1]
-            face = colour if line.p < LEVEL else "white"
+            color = COLORS[0] if line.estimate.value >= null else COLORS[1]
+            face = color if line.p < LEVEL else "white"
             row = names.index(line.condition)
-            draw_row(axes, row, line.estimate, color=colour, markerfacecolor=face, markersize=5)
+            draw_row(axes, row, line.estimate, color=color, markerfacecolor=face, markersize=5)
         axes.grid(axis="x", alpha=0.25)
         axes.set_title(title, loc="left")
         axes.set_xlabel(unit)
@@ -313,8 +313,8 @@ def _forest_legend(figure: Figure, lines: Sequence[Difference]) -> None:
     handles = [
         handle("significantly different (adjusted p < 0.05)", **point),
         handle("no significant difference", **point, markerfacecolor="white"),
-        handle("higher than the reference", color=COLOURS[0], linewidth=1.5),
-        handle("lower than the reference", color=COLOURS[1], linewidth=1.5),
+        handle("higher than the reference", color=COLORS[0], linewidth=1.5),
+        handle("lower than the reference", color=COLORS[1], linewidth=1.5),
     ]
     seeds = count_seeds(line.seeds for line in lines)
     add_legend(figure, handles, f"means over {seeds} seeds, bars: 95% intervals", ncols=2)

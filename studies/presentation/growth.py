@@ -60,13 +60,13 @@ def draw_laws(analysis: ScalingLaw) -> Figure:
 
 def _draw(figure: Figure, index: int, law: Law, last: float) -> None:
     (axes,) = figure.axes
-    colour = figures.look(index)["color"]
+    color = figures.look(index)["color"]
     measured = law.sample.observed
     places = np.broadcast_to(law.sample.sizes, measured.shape)
-    axes.scatter(places, measured, s=6, alpha=0.35, color=colour, linewidths=0)
+    axes.scatter(places, measured, s=6, alpha=0.35, color=color, linewidths=0)
     line = np.geomspace(law.sample.sizes[0], last, POINTS)
     predicted = [law.predict(float(n)) for n in line]
-    axes.plot(line, law.curve_at(line), color=colour, lw=1.4)
+    axes.plot(line, law.curve_at(line), color=color, lw=1.4)
     low = [float(e.low) for e in predicted]
     high = [float(e.high) for e in predicted]
-    axes.fill_between(line, low, high, color=colour, alpha=0.15, linewidth=0)
+    axes.fill_between(line, low, high, color=color, alpha=0.15, linewidth=0)

@@ -69,7 +69,7 @@ MUTE = "class Mute:\n    def __str__(self): raise RuntimeError('no name')\n"
         ("def f(agents): return []", "f raised TypeError"),
         ("def f(agents, groups): return groups[9]", "f raised IndexError"),
         ("def f(agents, groups): return 3", "f returned int, allowed: a networkx DiGraph"),
-        ("def f(agents, groups): return [('a', 'b', 'c')]", "a list of nothing but pairs"),
+        ("def f(agents, groups): return [('a', 'b', 'c')]", "a list of pairs"),
         ("def f(agents, groups): return [('a', 'b')] * 2", "edge a -> b is given more than once"),
         ("def f(agents, groups): return [('a', 'x')]", "unknown agent 'x' in the graph"),
         ("def f(agents, groups): return [('a', 'b'), ('b', 'a')]", "cycle a -> b -> a"),

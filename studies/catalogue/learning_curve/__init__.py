@@ -118,7 +118,7 @@ def _of_evaluations(results: Results) -> Analysis:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure, a panel for every measure that is followed.
 
-    Lines are means over seeds, bands their 95% intervals. A condition has a colour and a style of
+    Lines are means over seeds, bands their 95% intervals. A condition has a color and a style of
     line of its own, so that lines upon each other are distinguished.
     """
     from ...presentation import figures as f  # matplotlib takes its time
