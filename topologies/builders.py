@@ -3,8 +3,8 @@
 Every agent is a node, and an edge leads from a superior to its subordinate. An undirected graph
 joins neighbors instead. Agents are given in agent order; *bodies* groups the same names by body,
 such as the wheels of each robot. Keyword-only parameters are the settings of a topology, which are
-the keys of its ``[topology]`` table in a spec. `nested_agents.topologies.build` turns the graph into
-a `Hierarchy`. Errors name the agent that is unknown, missing or repeated.
+the keys of its ``[topology]`` table in a spec. `nested_agents.topologies.build` turns the graph
+into a `Hierarchy`. Errors name the agent that is unknown, missing or repeated.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """Settings of topologies: a ``[topology]`` table of a spec, or a string.
 
 A string is ``"kind"`` or ``"kind:argument"``, see `parse`. To add a topology, write one function in
-`builders` and add one line to `TOPOLOGIES`; the function's keyword-only parameters are its settings.
-`strings.ARGUMENTS` defines what may follow ``kind:``.
+`builders` and add one line to `TOPOLOGIES`; the function's keyword-only parameters are its
+settings. `strings.ARGUMENTS` defines what may follow ``kind:``.
 
 Users bring hierarchies as files of graphs or groups, as functions in Python files, and in installed
-packages. A user's topology is a function ``(agents, bodies) -> graph``. It receives the names of the
-agents and the same names by body (robot), and returns a networkx DiGraph over all agents, or pairs
-(superior, subordinate). An agent in no pair has no edges.
+packages. A user's topology is a function ``(agents, bodies) -> graph``. It receives the names of
+the agents and the same names by body (robot), and returns a networkx DiGraph over all agents, or
+pairs (superior, subordinate). An agent in no pair has no edges.
 """
 
 from __future__ import annotations
@@ -52,18 +52,18 @@ class TopologySettings(PartSettings):
 
     communication: Communication = "ancestors"
     """Agents that send an agent their actions: all its ancestors, its parents only, or none. A list
-    restricts the ancestors to those in the agent's own ``body``, in the ``next`` bodies in the order
-    of bodies, or in bodies ``farther`` away."""
+    restricts the ancestors to those in the agent's own ``body``, in the ``next`` bodies in the
+    order of bodies, or in bodies ``farther`` away."""
     lookahead: Lookahead = "descendants"
-    """Agents over whose actions an agent searches besides its own: all its descendants, its children
-    only, or none. A list restricts the descendants by body, as in `communication`."""
+    """Agents over whose actions an agent searches besides its own: all its descendants, its
+    children only, or none. A list restricts the descendants by body, as in `communication`."""
     decision_order: DecisionOrder | None = None
     """Decision order of agents that undirected edges join: agent order (``listed``), the reverse,
     or all names in order. Each edge then leads from the earlier agent to the later one. By default,
     neighbors decide at the same time."""
     fill_in: bool = False
-    """Whether the superiors of each agent are joined to each other, too, as in variable elimination.
-    The best action of an agent then depends on no other agent that has decided."""
+    """Whether the superiors of each agent are joined to each other, too, as in variable
+    elimination. The best action of an agent then depends on no other agent that has decided."""
     failures: tuple[AnyMessageFailure, ...] = ()
     """Failures of messages and absences of agents, with their times."""
 

@@ -136,8 +136,8 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
 
     The agents of a level have longest paths of the same length from the top. Each level is a column
     in which agents are ordered by the positions of their superiors. After `COLUMNS` levels the
-    picture folds and continues below in the opposite direction. Neighbors stand on a circle, so that
-    all lines between them are visible.
+    picture folds and continues below in the opposite direction. Neighbors stand on a circle, so
+    that all lines between them are visible.
     """
     n = len(hierarchy)
     if hierarchy.neighbors:

@@ -33,10 +33,10 @@ def read_file(path: str) -> nx.Graph | dict[str, object]:
     """Read a graph or a ``[topology]`` table from GraphML, JSON or TOML, selected by suffix.
 
     JSON and TOML files hold a table, alone or under the key ``topology``: with edges, ``{"edges":
-    [["a", "b"], ...], "alone": [...]}``, with nested groups, ``{"members": [...]}``, or with the key
-    ``kind``. A table with the key ``nodes`` is a graph in the format of `networkx.node_link_data`.
-    The id of a node is the name of its agent. If all ids are numbers, such as ``3`` or ``n3``, and
-    nodes have labels, the label is the name.
+    [["a", "b"], ...], "alone": [...]}``, with nested groups, ``{"members": [...]}``, or with the
+    key ``kind``. A table with the key ``nodes`` is a graph in the format of
+    `networkx.node_link_data`. The id of a node is the name of its agent. If all ids are numbers,
+    such as ``3`` or ``n3``, and nodes have labels, the label is the name.
 
     Returns
     -------

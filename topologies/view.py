@@ -114,8 +114,8 @@ def team_of(
     """Return the names of a number of agents or robots, and agent indices by body.
 
     A robot has two wheels unless the numbers say otherwise. Its agents are called ``robot1.left``
-    and ``robot1.right``, with more wheels ``robot1.wheel1`` and so on, and ``agent1`` if it has one.
-    Names in `named`, which the topology uses, take precedence.
+    and ``robot1.right``, with more wheels ``robot1.wheel1`` and so on, and ``agent1`` if it has
+    one. Names in `named`, which the topology uses, take precedence.
 
     Raises
     ------
