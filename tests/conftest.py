@@ -37,11 +37,11 @@ def permuted() -> Callable[[Hierarchy, Sequence[int]], Hierarchy]:
     """Gives the same hierarchy with agent ``permutation[k]`` listed as k-th."""
 
     def of(hierarchy: Hierarchy, permutation: Sequence[int]) -> Hierarchy:
-        edges, neighbours = (
+        edges, neighbors = (
             [(hierarchy.agents[a], hierarchy.agents[b]) for a, b in pairs]
             for pairs in (hierarchy.edges, hierarchy.neighbors)
         )
-        return Hierarchy([hierarchy.agents[i] for i in permutation], edges, neighbours)
+        return Hierarchy([hierarchy.agents[i] for i in permutation], edges, neighbors)
 
     return of
 

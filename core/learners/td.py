@@ -162,7 +162,7 @@ class TDLambdaSettings(LearnerSettings):
     """Step size, alpha of Eq. 13."""
     trace_decay: Fraction = 0.4
     """Trace decay, lambda of Eq. 8."""
-    normalised: bool = False
+    normalized: bool = False
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
     """Number of updates over which the agents average the learned weights to decide; 1: none."""
@@ -180,7 +180,7 @@ class TDLambda(Online):
         e     = gamma lambda e + phi(s)            (Eq. 8, 12)
         theta = theta + alpha delta e              (Eq. 13)
 
-    With a normalised step size alpha is divided by the squared length of phi(s), so that
+    With a normalized step size alpha is divided by the squared length of phi(s), so that
     ``step_size = 1`` would remove the TD error of s at once.
 
     With ``reward_of = "entered"``, R(s') replaces R(s), another reading of Section V: a value then
@@ -205,7 +205,7 @@ class TDLambda(Online):
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         lengths: FloatArray = np.ones(len(states))
-        if self.settings.normalised:
+        if self.settings.normalized:
             lengths = self.rules.squared_lengths(states)
         discount = 0.0 if entered is None else self.discount
         step_sizes = self.settings.step_size / lengths
@@ -364,8 +364,8 @@ class QLearning(OneStep):
                 "over, use td-lambda"
             )
         self._columns = sorted(rules.actions)
-        centres = [rules.partitions[column].centres for column in self._columns]
-        self._choices = np.array(list(product(*centres)))
+        centers = [rules.partitions[column].centers for column in self._columns]
+        self._choices = np.array(list(product(*centers)))
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         delta = self.errors(states, rewards, None)

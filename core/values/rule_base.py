@@ -36,10 +36,10 @@ class RuleBaseSettings(Settings):
     membership: Literal["triangular", "sigmoid"] = "triangular"
     """Shape of the membership functions. The paper uses differences of sigmoids (Eq. 6)."""
     memberships: Annotated[int, Field(ge=2, le=15)] | None = None
-    """Number of evenly spread membership functions per variable. With none, the centres of the
+    """Number of evenly spread membership functions per variable. With none, the centers of the
     state space are used."""
     steepness: Positive = 8.0
-    """Slope of a sigmoid times the distance of neighboring centres (c_j of Eq. 6)."""
+    """Slope of a sigmoid times the distance of neighboring centers (c_j of Eq. 6)."""
     order: Annotated[int, Field(ge=1, le=12)] | Literal["full"] = 1
     """Number of variables per rule. 1 is a sum of functions of one variable; ``full``, or the
     number of variables, is the paper's product of all. Use 2 if the effect of one variable depends

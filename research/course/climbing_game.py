@@ -35,7 +35,7 @@ print(payments)
 learner = {
     "kind": "td-lambda",
     "step_size": 0.1,
-    "normalised": True,
+    "normalized": True,
     "discount": 0.0,
     "rule_base": {"order": "full"},
     "exploration": {"kind": "boltzmann"},

@@ -114,7 +114,7 @@ def draw(analysis: Analysis) -> Figures:
     """Return the figure: evaluations against experience, a panel for each condition.
 
     The condition's line has a color, and a band for its 95% intervals; those of the others are
-    grey.
+    gray.
     """
     from matplotlib.ticker import LogLocator
 

@@ -7,7 +7,7 @@ it succeeds when evaluated, and after how many decisions; and of a decision of a
 - its time;
 - the memory of all that is learned;
 - messages: the actions that agents tell one another. A superior tells each agent below it what it
-  has decided. Neighbours tell each other what they have done, or in a coordination graph what would
+  has decided. Neighbors tell each other what they have done, or in a coordination graph what would
   be best; max-plus does so in every round, of which one is counted;
 - operations: joint actions tried times the rules that value each, by the formula of the topology
   (sum over agents of ``|A| ** (1 + |below|)``, times |S|) and as counted in the running system.

@@ -66,7 +66,7 @@ class Spec(Settings):
 
     >>> from nested_agents.core.learners.td import TDLambdaSettings
     >>> ridges = [{"name": f"ridge {r}", "learner": {"ridge": r}} for r in (1.0, 100.0)]
-    >>> online = {"name": "online", "learner": TDLambdaSettings(step_size=0.1, normalised=True)}
+    >>> online = {"name": "online", "learner": TDLambdaSettings(step_size=0.1, normalized=True)}
     >>> [c.label for c in Spec(overrides=[*ridges, online]).conditions()]
     ['ridge 1.0', 'ridge 100.0', 'online']
     """

@@ -49,7 +49,7 @@ def test_pairs_or_a_graph(written, body: str) -> None:
     assert build(settings, AGENTS).edges == ((0, 1), (1, 2), (2, 3))
 
 
-def test_an_undirected_graph_is_one_of_neighbours(written) -> None:
+def test_an_undirected_graph_is_one_of_neighbors(written) -> None:
     body = "import networkx as nx\n    return nx.cycle_graph(agents)"
     hierarchy = build(parse(written(f"def f(agents, groups):\n    {body}\n")), AGENTS)
     assert hierarchy.edges == ()

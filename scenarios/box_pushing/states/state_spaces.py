@@ -75,7 +75,7 @@ _SPEED = Variable(
     "m/s",
     -_E_PUCK_SPEED,
     _E_PUCK_SPEED,
-    centres=(-0.13, -0.065, 0.0, 0.065, 0.13),
+    centers=(-0.13, -0.065, 0.0, 0.065, 0.13),
     labels=("fast back", "back", "still", "forward", "fast forward"),
     mirrored="same",
 )
@@ -107,8 +107,8 @@ def _space_of_paper() -> BoxStateSpace:
     coarse = Variable("box_distance", "m", 0.0, 1.2, mirrored="same")
     shared = (orientation, bearing, replace(distance, variable=coarse))
     angles = (
-        Variable(name, "rad", -pi, pi, True, centres, mirrored="opposite")
-        for name, centres in (("heading", _EVEN), ("goal_bearing", ()))
+        Variable(name, "rad", -pi, pi, True, centers, mirrored="opposite")
+        for name, centers in (("heading", _EVEN), ("goal_bearing", ()))
     )
     goal_distance = Variable("goal_distance", "m", 0.0, 1.5, mirrored="same")
     described = (*angles, goal_distance, _SPEED, *(each.variable for each in shared))
@@ -148,7 +148,7 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
 
     Examples
     --------
-    >>> state_space_for("paper", 0.26).space.variables[3].centres
+    >>> state_space_for("paper", 0.26).space.variables[3].centers
     (-0.26, -0.13, 0.0, 0.13, 0.26)
     """
     space = (
@@ -157,7 +157,7 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
     factor = max_speed / _E_PUCK_SPEED
     if factor == 1.0:
         return space
-    centres = tuple(factor * centre for centre in _SPEED.centres)
-    speed = replace(_SPEED, low=factor * _SPEED.low, high=factor * _SPEED.high, centres=centres)
+    centers = tuple(factor * center for center in _SPEED.centers)
+    speed = replace(_SPEED, low=factor * _SPEED.low, high=factor * _SPEED.high, centers=centers)
     variables = tuple(speed if v.name == speed.name else v for v in space.space.variables)
     return replace(space, space=replace(space.space, variables=variables))

@@ -1,6 +1,6 @@
 """Initial poses of robots, box and goal.
 
-The goal pose is always (1 m, 0, 0): one metre away in the easier starts' mean direction, unless
+The goal pose is always (1 m, 0, 0): one meter away in the easier starts' mean direction, unless
 distances are in units of the box. *Bearing* is the direction from box to goal, *behind* the back of
 the box (its -x side). A further distribution is one `Start` and one line in `STARTS`.
 """

@@ -125,9 +125,9 @@ def test_an_episode_starts_without_traces() -> None:
     assert (learner.theta[0] - before[0]).tolist() == [0, 0, 0.5, 0, 0]
 
 
-def test_a_normalised_step_removes_the_error_at_once() -> None:
+def test_a_normalized_step_removes_the_error_at_once() -> None:
     # alpha = 1 without discount and trace: f(s) becomes R(s), whatever the features.
-    learner = learner_of(FUZZY, step_size=1.0, discount=0.0, trace_decay=0.0, normalised=True)
+    learner = learner_of(FUZZY, step_size=1.0, discount=0.0, trace_decay=0.0, normalized=True)
     states = np.random.default_rng(1).uniform(-1, 1, (6, 2))
     for state in states:
         feed(learner, np.stack([state, np.zeros(2)]), np.array([0.7, 0.0]), False)
@@ -292,7 +292,7 @@ def test_averaged_weights_decide_and_others_learn(rules: RuleBase) -> None:
         "step_size": 0.3,
         "discount": 0.9,
         "trace_decay": 0.7,
-        "normalised": True,
+        "normalized": True,
     }
     plain, averaged = learner_of(rules, **common), learner_of(rules, averaging=4.0, **common)
     rng = np.random.default_rng(6)

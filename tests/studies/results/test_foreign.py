@@ -219,7 +219,7 @@ def test_a_file_and_a_frame_have_the_same_defaults(scores, tmp_path) -> None:
     [
         ("", "", "holds no table of scores: no columns"),
         ("a,b\n1,2\n", "", "columns: condition = 'condition': no such column; known: a, b"),
-        ("condition,score\na,1\n", "colour=b", "must be ROLE=COLUMN"),
+        ("condition,score\na,1\n", "color=b", "must be ROLE=COLUMN"),
         ("condition,score\na,\n", "", "score = 'score': no row has one"),
     ],
 )

@@ -16,7 +16,7 @@ from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
 
 ON_GRAPHS = ("variable-elimination", "max-plus")
-"""Evaluators that need neighbours."""
+"""Evaluators that need neighbors."""
 BUILT = [
     kind
     for kind in LEARNERS.built_in

@@ -151,7 +151,7 @@ def test_memberships_of_wheel_speeds_span_those_of_the_robot(name: str) -> None:
             assert variable == like
         else:
             assert (variable.low, variable.high) == pytest.approx((-0.39, 0.39))
-            assert variable.centres == pytest.approx(np.multiply(3, like.centres))
+            assert variable.centers == pytest.approx(np.multiply(3, like.centers))
             assert variable.labels == like.labels
 
 
