@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..spec.tables import label_but
 from . import laws
@@ -88,10 +88,27 @@ class ScalingLaw(NamedTuple):
         lines: list[str] = []
         for fitted in self.fits:
             lines += wrapped(_sentence(fitted, self.size))
+            lines += self._limited(fitted)
         lines += self._comparisons()
         for remark in self.remarks:
             lines += wrapped(remark)
         return tuple(lines)
+
+    def _limited(self, fitted: Fitted) -> list[str]:
+        """Return a sentence for each prediction that the range of the measure limits."""
+        if fitted.law is None:
+            return []
+        head = f"{fitted.group}: " if fitted.group else ""
+        lines = []
+        for n in self.predicted:
+            value = float(fitted.law.curve_at(np.array([float(n)]))[0])
+            limit = float(np.clip(value, *fitted.law.sample.bounds))
+            if value != limit:
+                lines += wrapped(
+                    f"{head}at {n} the law gives {format_number(value)}, outside "
+                    f"the range of {self.title}, so that {format_number(limit)} is predicted."
+                )
+        return lines
 
     def _comparisons(self) -> list[str]:
         """Return how exponents differ from that of the first group, of equal seeds and sizes."""
@@ -277,7 +294,7 @@ def decisions_to_criterion(
     if measure not in rates:
         raise SpecError(f"measure = {measure!r}: {closest(measure, rates)}; a rate has a criterion")
     if not 0.0 < criterion <= 1.0:
-        raise SpecError(f"criterion = {criterion!r}: must be above 0 and at most 1")
+        raise SpecError(f"criterion = {show(criterion)}: must be above 0 and at most 1")
     samples = {}
     for condition in results.of_phase("training"):
         if not results.has(condition, "training", measure):
