@@ -353,7 +353,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             left = self.mirror.states(left)
             taken = np.tile(taken, 2)
         terminated = transition.terminated
-        self.count(self.learner.observe_decision(left, taken, states, reward, terminated))
+        outcome = states, reward, terminated, experience.duration
+        self.count(self.learner.observe_decision(left, taken, *outcome))
         if experience.last:
             self.end_episode()
 

@@ -24,6 +24,7 @@ from ..plugins.settings import Settings
 from ..plugins.words import expect
 from .inspection import inspect_agents
 from .kept import begin_with
+from .leader import Leader, options_of
 
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
@@ -112,6 +113,8 @@ class Team:
         )
         self._present = hierarchy
         self._actions_of_left = _actions_of_left(failures, checked)
+        options = options_of(checked)
+        self.leader = None if options is None else Leader(options, seed.spawn(1)[0])
 
     @cached_property
     def _stages(self) -> tuple[DecisionStage, ...]:
@@ -188,11 +191,15 @@ class Team:
     def reset(self, seed: int | np.random.SeedSequence, episode: int) -> None:
         """Start an episode; random message failures follow from `seed`."""
         self.messages.reset(seed, episode)
+        if self.leader is not None:
+            self.leader.reset(episode)
         for part in self.parts:
             part.reset(episode)
 
     def begin_episode(self) -> None:
         """Start an episode of training."""
+        if self.leader is not None:
+            self.leader.begin_episode()
         for part in self.parts:
             part.begin_episode()
 
@@ -229,6 +236,12 @@ class Team:
             self._rearrange()
         if inspect and observation.present.ndim > 2:
             raise ValueError("inspect = True: a decision of one environment only")
+        options = options_of(observation.scenario)
+        if options is not None and self.leader is not None:
+            observation, given = self.leader.lead(options, observation, explore=explore)
+            if given is not None:
+                return Decision(given, ())
+            explore = False
         inputs = tuple(part.observe(observation, explore=explore) for part in self.parts)
         inboxes: list[Inbox] | None = None
         if inspect:
@@ -335,7 +348,11 @@ class Team:
         return total
 
     def learn(self, experience: Experience) -> None:
-        """Learn from a step."""
+        """Learn from a step. Below a leader, only the leader learns."""
+        options = options_of(experience.before.scenario)
+        if options is not None and self.leader is not None:
+            self.leader.learn(options, experience)
+            return
         for part, inputs in zip(self.parts, experience.decision.inputs, strict=True):
             part.learn(experience, inputs)
 
@@ -354,6 +371,8 @@ class Team:
         """
         for part, before in zip(self.parts, former.parts, strict=True):
             part.warm_start(before)
+        if self.leader is not None and former.leader is not None:
+            self.leader.warm_start(former.leader)
 
     def save(self, path: Path | str) -> None:
         """Write the `state_dict` to an ``.npz`` file."""

@@ -15,6 +15,7 @@ class FunctionSettings(TeamSettings):
     """Agents that decide by a function; its keyword-only parameters are further keys."""
 
     uses_hierarchy = True
+    counts_durations = True
     kind_of_agents = f"{CORE}.functions.agents:FunctionAgents"
 
     hears: Literal["contents", "actions"] = "contents"

@@ -46,6 +46,7 @@ class FittedQSettings(LearnerSettings):
     kind: Literal["fitted-q"] = "fitted-q"
     factory: ClassVar[str] = f"{__name__}:FittedQ"
     values_actions = True
+    counts_durations = True
     ridge: Positive = 0.1
     """Penalty on squared weights, relative to squared errors of rewards scaled by 100."""
     regression_iterations: Annotated[int, Field(ge=1, le=10_000)] = 8
@@ -151,9 +152,11 @@ class FittedQ(BatchTD, Evaluator):
         states: FloatArray,
         reward: float | FloatArray,
         terminated: bool,
+        duration: int = 1,
     ) -> int:
         """Remember what the agents knew, did and got; regress if the episode has gone on."""
-        return self.observe(np.column_stack([left, joint_action]), reward, terminated)
+        known = np.column_stack([left, joint_action])
+        return self.observe(known, reward, terminated, duration)
 
     def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the active rules of decisions, by the action that was taken, and strengths."""

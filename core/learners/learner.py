@@ -75,6 +75,7 @@ class Learner(ABC):
         states: FloatArray,
         reward: float | FloatArray,
         terminated: bool,
+        duration: int = 1,
     ) -> int:
         """Learn from a decision and its outcome. Learners of state values use the outcome only.
 
@@ -87,6 +88,8 @@ class Learner(ABC):
             ``(n,)`` actions taken.
         states, reward, terminated
             As of `observe`.
+        duration
+            Number of decision periods that the actions lasted. What follows is discounted as often.
         """
         return self.observe(states, reward, terminated)
 
@@ -139,6 +142,8 @@ class TeamSettings(PartSettings):
 
     uses_hierarchy: ClassVar[bool] = False
     """Whether the agents communicate in a hierarchy."""
+    counts_durations: ClassVar[bool] = False
+    """Whether the agents discount by the duration of their actions, as leaders must."""
     kind_of_agents: ClassVar[str] = ""
     """Location of the configured subclass of `Agents`, imported on use."""
 

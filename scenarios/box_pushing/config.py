@@ -5,7 +5,11 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ...core.plugins.settings import Positive, ScenarioSettings, team_size
+from ...core.learners import LEARNERS, TeamSettings
+from ...core.learners.fitted_q import FittedQSettings
+from ...core.plugins.registry import Plugged
+from ...core.plugins.settings import Positive, ScenarioSettings, Settings, team_size
+from ...core.search.exploration import BurstExploration
 from ..state_variables import names_of
 from .prediction.settings import BeliefSettings
 from .states.variables import STATE_VARIABLES
@@ -19,6 +23,26 @@ from .world.settings import (
     RobotSettings,
     label,
 )
+
+
+
+class LeaderSettings(Settings):
+    """Leader above all robots, which decides on straight pushes and second sides."""
+
+    decides: Literal["none", "rule", "learner"] = "none"
+    """Whether there is no leader, one that decides by a given rule, or one that learns."""
+    learner: Annotated[TeamSettings, Plugged(LEARNERS)] = FittedQSettings(
+        discount=0.995,
+        ridge=0.1,
+        regression_iterations=60,
+        exploration=BurstExploration(rate=0.5, decay=0.97, floor=0.05, length=1.0),
+    )
+    """Settings of a leader that learns."""
+    limit: Annotated[int, Field(ge=1)] = 300
+    """Number of decisions of the wheels after which an option ends."""
+    standing: Annotated[float, Field(gt=0, le=1)] = 0.6
+    """Fraction of the robots that must stand at the second side before they push."""
+
 
 WRITTEN = {
     "box_distance": -1.0,
@@ -57,6 +81,8 @@ class BoxTaskSettings(ScenarioSettings):
     """Distance of the box from the goal that counts as reached [m]."""
     termination_radius: Positive = 1.5
     """Distance of the box from the goal [m] beyond which an episode is broken off."""
+    leader: LeaderSettings = LeaderSettings()
+    """Leader above all robots."""
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
 

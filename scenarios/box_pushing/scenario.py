@@ -15,14 +15,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.interface.environments import Transitions
+from ...core.interface.options import LedScenario
 from ...core.interface.prediction import Prediction
-from ...core.interface.scenario import Embodiment, Scenario, Transition
+from ...core.interface.scenario import Embodiment, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
-from .measurements import MEASURES
+from .leading import BoxOptions
+from .measurements import MEASURES, OPTIONS
 from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap, model_of
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
@@ -45,7 +47,7 @@ SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
 
 
-class BoxPushing(Scenario, Embodiment):
+class BoxPushing(LedScenario, Embodiment):
     """Box pushing: the agents are the wheels of robots, which push a box to a goal.
 
     It can be drawn, calibrated and predicted exactly.
@@ -126,6 +128,9 @@ class BoxPushing(Scenario, Embodiment):
             horizon=settings.prediction_horizon * CONTROL_PERIOD,
         )
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
+        self.options = None if settings.leader.decides == "none" else BoxOptions(self)
+        if self.options is not None:
+            self.measures = (*MEASURES, OPTIONS)
         # Robots that do not fit around the box are refused now, not in the middle of a study.
         BoxPushing.reset(self, 0)
 
@@ -155,15 +160,31 @@ class BoxPushing(Scenario, Embodiment):
         self._sensing = stream_of(seed, SENSING)
         rng = np.random.default_rng(seed)
         start = self.settings.start
-        robots, box, self._goal = place(start, rng, self.world.robots, self.box, self._unit)
+        robots, box, self.goal = place(start, rng, self.world.robots, self.box, self._unit)
+        self.aim = self.goal
         self.world.place(robots, box)
         self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
         self._failures.begin(seed, episode)
         self.world.set_grip(self._failures.grip)
+        if self.options is not None:
+            self.options.reset()
         self._save()
-        present = self._present(self.world.box_pose)
-        return self.states_at(present, self._speeds[None])[0]
+        return self._states()
+
+    def aim_at(self, aim: FloatArray) -> FloatArray:
+        """Return the states ``(n, d)`` of agents for which a pose ``(3,)`` replaces the goal."""
+        self.aim = aim
+        return self._states()
+
+    def _states(self) -> FloatArray:
+        """Return the states ``(n, d)`` at rest."""
+        return self.states_at(self._present(self.world.box_pose), self._speeds[None])[0]
+
+    @property
+    def wheel_speeds(self) -> FloatArray:
+        """``(M, w)`` commanded wheel speeds by robot [m/s]."""
+        return self._speeds.reshape(len(self.groups), -1)
 
     def commanded(self, speeds: FloatArray, joint_actions: IntArray) -> FloatArray:
         """Return the wheel speeds ``(..., n)`` that joint actions command, given those before."""
@@ -181,7 +202,7 @@ class BoxPushing(Scenario, Embodiment):
         readings = self.world.infrared()
         if self._is_noisy:
             readings = self.settings.infrared.noisy(readings, self._sensing)
-        distance, approach, turn = progress_of(present)
+        distance, approach, turn = progress_of(present._replace(goal=self.goal))
         contact = self.world.contact[None]
         strongest = np.maximum.reduce(readings, axis=1)[None]
         gained = reward(self.task, distance, approach, turn, contact, strongest)[0]
@@ -194,7 +215,7 @@ class BoxPushing(Scenario, Embodiment):
         if terminated:
             # The wheels stop; the box may leave the tolerance before it comes to rest.
             self._advance(np.zeros(len(self.agents)))
-            there = self.task.reached(self._distance(), self._orientation())
+            there = self.task.reached(self.distance, self._orientation())
             measured["stopped_at_goal"] = bool(there)
         self._step += 1
         self._save()
@@ -225,7 +246,7 @@ class BoxPushing(Scenario, Embodiment):
         situation = PresentState(
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),
-            self._goal,
+            self.aim,
             self._speeds,
             tuple(effects),
         )
@@ -245,7 +266,7 @@ class BoxPushing(Scenario, Embodiment):
 
     def constants_of_episode(self) -> dict[str, object]:
         """Return the goal pose of the episode and the constants of drawing."""
-        return {"goal_pose": self._goal, **self.settings.drawing}
+        return {"goal_pose": self.goal, **self.settings.drawing}
 
     def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
         """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""
@@ -291,14 +312,14 @@ class BoxPushing(Scenario, Embodiment):
         `stopped_at_goal` is known after the step that ends the episode: whether the box stayed at
         the goal once the wheels had stopped.
         """
-        return self._measured(self._distance(), self._orientation())
+        return self._measured(self.distance, self._orientation())
 
     def _measured(self, distance: float, orientation: float) -> dict[str, object]:
         times = self.world.contact_time
         return {
             "robot_poses": self.world.robot_poses.copy(),
             "box_pose": self.world.box_pose.copy(),
-            "goal_pose": self._goal,
+            "goal_pose": self.goal,
             "wheel_speeds": self._speeds,
             "contact": self.world.contact.copy(),
             "contact_time": times.copy(),
@@ -308,17 +329,20 @@ class BoxPushing(Scenario, Embodiment):
             "orientation_rad": orientation,
             "orientation_error_rad": abs(orientation),
             "stopped_at_goal": False,
+            "options": 0 if self.options is None else self.options.count,
         }
 
     def _advance(self, commands: FloatArray) -> None:
         """Simulate one decision period with the given wheel speeds."""
         self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
 
-    def _distance(self) -> float:
-        return float(np.hypot(*(self._goal - self.world.box_pose)[:2]))
+    @property
+    def distance(self) -> float:
+        """Distance of the box from the goal [m]."""
+        return float(np.hypot(*(self.goal - self.world.box_pose)[:2]))
 
     def _orientation(self) -> float:
-        return float(wrap(self.world.box_pose[2] - self._goal[2]))
+        return float(wrap(self.world.box_pose[2] - self.goal[2]))
 
     def _present(self, origin: FloatArray) -> SituationBatch:
         """Return the present situation; `origin` is the former pose ``(3,)`` of the box."""
@@ -340,7 +364,7 @@ class BoxPushing(Scenario, Embodiment):
         """
         last = np.ascontiguousarray(poses.transpose(1, 2, 0))
         apart, before = np.ascontiguousarray(gaps.T), np.ascontiguousarray(origins.T)
-        return SituationBatch(last[1:], last[0], apart, self._goal, before, 1.0, self.box.shape)
+        return SituationBatch(last[1:], last[0], apart, self.aim, before, 1.0, self.box.shape)
 
     def states_at(self, batch: SituationBatch, speeds: FloatArray) -> FloatArray:
         """Return the states ``(m, n, d)`` of all agents in m situations.
@@ -354,7 +378,7 @@ class BoxPushing(Scenario, Embodiment):
         if self.space.own_needs_pose:
             poses = poses[:, self.body]
         states = np.empty((m, n_robots, len(self.groups[0]), self.state_space.n_variables))
-        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), self._goal)
+        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), self.aim)
         states[..., :n_own] = own.reshape(*states.shape[:3], -1)
         states[..., n_own:] = shared[:, :, None]
         return states.reshape(*speeds.shape, -1)
