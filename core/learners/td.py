@@ -167,8 +167,8 @@ class TDLambdaSettings(LearnerSettings):
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
     """Number of updates over which the agents average the learned weights to decide; 1: none."""
     initial_weight: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    """Consequent weight of every rule before learning: the value of an unknown state, divided by
-    the number of products (1 with full order)."""
+    """Consequent weight of every rule before learning. With ``order = "full"`` it is the value of
+    every state; above attainable values it favors states that were not visited."""
     reward_of: Literal["left", "entered"] = "left"
     """Reward R in Eq. 7: that of the state left, s_previous, as printed; or that of the state
     entered, as in Section V, where rewards are computed after the move."""

@@ -170,7 +170,10 @@ class RuleBase:
                 )
             terms.append(tuple(sorted(names.index(name) for name in product)))
         counts = dict.fromkeys(names, settings.memberships) | dict.fromkeys(space.actions)
-        partitions = {v.name: Partition.of(v, settings.membership, counts[v.name], settings.steepness) for v in space.variables}
+        partitions = {
+            v.name: Partition.of(v, settings.membership, counts[v.name], settings.steepness)
+            for v in space.variables
+        }
         for name, centers in settings.centers.items():
             if name not in partitions or name in space.actions:
                 known = set(names) - set(space.actions)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import reduce
 from typing import NamedTuple
 
 from pydantic import ValidationError
@@ -84,13 +85,13 @@ def resolve(
 
 
 def _without(base: SpecTable, key: str, where: str) -> SpecTable:
-    """Return the table of a preset without a dotted key, which it must set."""
-    head, _, rest = key.partition(".")
-    if head not in base or (rest and not isinstance(base[head], Mapping)):
-        raise SpecError(f"unset: the preset does not set {key!r}{where}")
-    if rest:
-        return {**base, head: _without(base[head], rest, where)}
-    return {name: value for name, value in base.items() if name != head}
+    """Return the table of a preset without a dotted key and the keys below it."""
+    entries = dict(flat(base))
+    kept = {name: value for name, value in entries.items() if not f"{name}.".startswith(f"{key}.")}
+    if len(kept) == len(entries):
+        raise SpecError(f"unset: the preset does not set {key!r}; {closest(key, entries)}{where}")
+    empty: TomlTable = {}
+    return reduce(merge, (nested(name, value) for name, value in kept.items()), empty)
 
 
 def conditions_of(spec: UserTables) -> tuple[Condition, ...]:

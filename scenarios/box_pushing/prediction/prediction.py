@@ -200,7 +200,8 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         r, wheel = divmod(agent, len(self.groups[0]))
         space = self.settings.space
         speeds = self.wheel_commands.speeds[r, :, wheel]
-        poses = boxes = np.zeros((len(speeds), 3))
+        poses: FloatArray = np.zeros((len(speeds), 3))
+        boxes = poses
         if space.own_needs_pose:
             poses, boxes = self._poses_alone(r)
         return Blocks(
@@ -242,7 +243,8 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         actions, batch = self._at_horizon(joint_actions)
         space = self.settings.space
         speeds = speeds_of(actions, self.wheel_commands.speeds)
-        poses = boxes = np.zeros((0, 3))
+        poses: FloatArray = np.zeros((0, 3))
+        boxes = poses
         if space.own_needs_pose:
             of_robots = batch.robots.transpose(0, 2, 1)
             poses = np.repeat(of_robots, len(speeds) // len(of_robots), axis=0).reshape(-1, 3)
