@@ -203,9 +203,20 @@ class TDLambda(Online):
         self.reward_of = settings.reward_of
         self.theta += settings.initial_weight
         self.updates: FloatArray = np.zeros(())
+        self._entered: tuple[IntArray, FloatArray] | None = None
         if settings.averaging > 1:
             self.weights = self.theta.copy()
             self.kept = (*self.kept, "weights", "updates")
+
+    def begin_episode(self) -> None:
+        """Clear the traces."""
+        super().begin_episode()
+        self._entered = None
+
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        super().load_state_dict(state)
+        self._entered = None
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         lengths: FloatArray = np.ones(len(states))
@@ -214,8 +225,10 @@ class TDLambda(Online):
         discount = 0.0 if entered is None else self.discount
         step_sizes = self.settings.step_size / lengths
         decay = self.discount * self.settings.trace_decay
-        active = self.rules.active(states)
+        # The states left are those entered before: their features are computed once.
+        active = self._entered or self.rules.active(states)
         active_next = active if entered is None else self.rules.active(entered)
+        self._entered = active_next
         constants = discount, step_sizes, decay
         td_lambda_update(
             self.weights, self.rows, self.trace, active, active_next, rewards, constants

@@ -210,7 +210,7 @@ class RuleBase:
         """
         strengths = self._strengths(states)
         of_terms = [_products([strengths[j] for j in term], len(states)) for term in self.terms]
-        return np.concatenate(of_terms, axis=1)
+        return of_terms[0] if len(of_terms) == 1 else np.concatenate(of_terms, axis=1)
 
     def values(self, theta: FloatArray, states: FloatArray) -> FloatArray:
         """Return values ``(m,)`` of states ``(m, d)`` by the weights ``(n_rules,)`` of one agent.
