@@ -21,6 +21,7 @@ from platform import python_version
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Generic, Literal, NamedTuple, Protocol, Self, TypeVar
 
+from ...core.numerics import working_seconds
 from ..store.store import Store
 from ..store.writer import Running
 
@@ -81,7 +82,7 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
 
     SystemExit and KeyboardInterrupt are failures of the trial, too, because workers ignore Ctrl-C.
     """
-    start = time.perf_counter()
+    start = working_seconds()
     error = None
     result = None
     try:
@@ -89,7 +90,7 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
             result = run_trial(trial)
     except BaseException:
         error = storable(traceback.format_exc())
-    return Outcome(trial, error, time.perf_counter() - start, result)
+    return Outcome(trial, error, working_seconds() - start, result)
 
 
 def storable(error: str) -> str:
