@@ -9,12 +9,12 @@ import pandas as pd
 import pytest
 
 import nested_agents as na
-from nested_agents.core.interface.measures import SUCCESS
+from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.laws.scaling import scaling_law
 from nested_agents.studies.presentation.growth import growth_figures
 from nested_agents.studies.results.results import from_arrays
-from nested_agents.studies.results.scaling_law import scaling_law
 from research import RESULTS
 
 SIZES = (2, 4, 8)
@@ -84,6 +84,28 @@ def test_a_size_below_one_is_refused_and_named(size) -> None:
 def test_a_predicted_size_out_of_range_is_refused(size) -> None:
     with pytest.raises(SpecError, match=re.escape(f"predict = {size:g}: allowed are sizes from 1")):
         scaling_law(made_up({"chain": 1.0}), "steps", predict=[size])
+
+
+def test_a_truth_value_is_no_size() -> None:
+    with pytest.raises(SpecError, match="predict = True: allowed are sizes from 1"):
+        scaling_law(made_up({"chain": 1.0}), "steps", predict=[True])
+
+
+def test_a_prediction_that_leaves_the_range_of_the_measure_is_explained() -> None:
+    share = Measure("share", "share", least=0.0, greatest=1.0)
+    columns = {str(n): {"robots": n} for n in (2, 4, 8, 16)}
+    means = [min(1.0, 0.25 * n**0.6) for n in (2, 4, 8, 16)]
+    values = {c: {"share": np.full((3, 1), m)} for c, m in zip(columns, means, strict=True)}
+    of_seeds = {c: range(3) for c in columns}
+    results = from_arrays({"evaluation": values}, of_seeds, {}, {}, columns, (share,))
+    law = scaling_law(results, "share", predict=[8, 64])
+    (fitted,) = law.fits
+    assert float(law.table[0].estimates["at 64 (90%)"].value) == 1.0
+    raw = float(fitted.law.curve_at(np.array([64.0]))[0])
+    said = " ".join(" ".join(law.notes).split())
+    assert f"At 64 robots the law gives {raw:.4g}, but" in said
+    assert "is at most 1, which is predicted instead" in said
+    assert "At 8 robots" not in said or float(fitted.law.curve_at(np.array([8.0]))[0]) > 1.0
 
 
 @pytest.mark.filterwarnings("error")
