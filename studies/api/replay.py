@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..store.store import Store
 
@@ -55,7 +55,7 @@ def draw_episode(
         if episode == "first" and episode not in recorded:
             episode = "last"  # of one episode
         if episode not in recorded:
-            raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
+            raise SpecError(f"episode = {show(episode)}: {closest(episode, recorded)}")
         scenario = trial.world()
         if not scenario.draws:
             raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")

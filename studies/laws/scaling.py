@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core.numerics import pd
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..results.analysis import Summary
 from ..results.comparison import title_of, values_of
@@ -84,26 +84,27 @@ class ScalingLaw(NamedTuple):
         lines: list[str] = []
         for fitted in self.fits:
             lines += wrapped(_sentence(fitted, self.size))
-            lines += wrapped(" ".join(self._limited(fitted)))
+            lines += self._limited(fitted)
         lines += self._comparisons()
         for remark in self.remarks:
             lines += wrapped(remark)
         return tuple(lines)
 
-    def _limited(self, fitted: Fitted) -> Iterator[str]:
-        """Yield why a prediction is not the law, where the law leaves the range of the measure."""
+    def _limited(self, fitted: Fitted) -> list[str]:
+        """Return a sentence for each prediction that the range of the measure limits."""
         if fitted.law is None:
-            return
+            return []
+        head = f"{fitted.group}: " if fitted.group else ""
+        lines = []
         for n in self.predicted:
-            value = float(fitted.law.curve_at(np.array([n]))[0])
-            least, most = fitted.law.sample.bounds
-            if not least <= value <= most:
-                head = f"{fitted.group}: " if fitted.group else ""
-                end, bound = ("least", least) if value < least else ("most", most)
-                yield (
-                    f"{head}At {n} {self.size} the law gives {value:.4g}, but {self.title} is at "
-                    f"{end} {bound:g}, which is predicted instead."
+            value = float(fitted.law.curve_at(np.array([float(n)]))[0])
+            limit = float(np.clip(value, *fitted.law.sample.bounds))
+            if value != limit:
+                lines += wrapped(
+                    f"{head}at {n} the law gives {format_number(value)}, outside "
+                    f"the range of {self.title}, so that {format_number(limit)} is predicted."
                 )
+        return lines
 
     def _comparisons(self) -> list[str]:
         """Return how exponents differ from that of the first group, of equal seeds and sizes."""
@@ -255,7 +256,7 @@ def decisions_to_criterion(
     if measure not in rates:
         raise SpecError(f"measure = {measure!r}: {closest(measure, rates)}; a rate has a criterion")
     if not 0.0 < criterion <= 1.0:
-        raise SpecError(f"criterion = {criterion!r}: must be above 0 and at most 1")
+        raise SpecError(f"criterion = {show(criterion)}: must be above 0 and at most 1")
     samples = {}
     for condition in results.of_phase("training"):
         if not results.has(condition, "training", measure):

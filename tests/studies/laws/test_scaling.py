@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import nested_agents as na
-from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.laws.scaling import scaling_law
@@ -91,21 +91,23 @@ def test_a_truth_value_is_no_size() -> None:
         scaling_law(made_up({"chain": 1.0}), "steps", predict=[True])
 
 
-def test_a_prediction_that_leaves_the_range_of_the_measure_is_explained() -> None:
-    share = Measure("share", "share", least=0.0, greatest=1.0)
-    columns = {str(n): {"robots": n} for n in (2, 4, 8, 16)}
-    means = [min(1.0, 0.25 * n**0.6) for n in (2, 4, 8, 16)]
-    values = {c: {"share": np.full((3, 1), m)} for c, m in zip(columns, means, strict=True)}
-    of_seeds = {c: range(3) for c in columns}
-    results = from_arrays({"evaluation": values}, of_seeds, {}, {}, columns, (share,))
-    law = scaling_law(results, "share", predict=[8, 64])
-    (fitted,) = law.fits
-    assert float(law.table[0].estimates["at 64 (90%)"].value) == 1.0
-    raw = float(fitted.law.curve_at(np.array([64.0]))[0])
-    said = " ".join(" ".join(law.notes).split())
-    assert f"At 64 robots the law gives {raw:.4g}, but" in said
-    assert "is at most 1, which is predicted instead" in said
-    assert "At 8 robots" not in said or float(fitted.law.curve_at(np.array([8.0]))[0]) > 1.0
+def test_a_law_beyond_the_range_of_a_measure_is_explained() -> None:
+    law = scaling_law(made_up({"chain": 1.0}), "steps", predict=[4, 10**6])
+    assert float(law.table[0].estimates["at 4 (90%)"].value) == pytest.approx(40.0)
+    assert "outside the range" not in " ".join(law.notes)
+    share = replace(SUCCESS, name="share", is_rate=False, least=0.0, greatest=1.0)
+    results = made_up({"chain": 1.0})
+    lengths = results.episodes["condition"].str.extract(r"robots=(\d)")[0].astype(float)
+    results = replace(
+        results,
+        episodes=results.episodes.assign(share=lengths / 10.0),
+        measures=(*results.measures, share),
+    )
+    law = scaling_law(results, "share", predict=[4, 100])
+    text = " ".join(" ".join(law.notes).split())
+    assert "chain: at 100 the law gives 10, outside the range" in text
+    assert "so that 1 is predicted" in text
+    assert "at 4 the law" not in text
 
 
 @pytest.mark.filterwarnings("error")
