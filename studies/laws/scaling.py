@@ -209,7 +209,7 @@ def scaling_law(
     return ScalingLaw(measured.title, axis.name, tuple(fits), tuple(predict))
 
 
-class Measured(NamedTuple):
+class SizedValues(NamedTuple):
     """Values that laws are fitted to, by condition."""
 
     title: str
@@ -223,22 +223,22 @@ class Measured(NamedTuple):
     """For times to a criterion: whether each seed has not reached it."""
 
 
-def _measured(results: Results, measure: str, phase: str | None) -> Measured:
+def _measured(results: Results, measure: str, phase: str | None) -> SizedValues:
     """Return the means of seeds of a measure."""
     phases = [phase] if phase else ["evaluation", "training"]
     own = next((p for p in phases if p in results.phases), phases[0])
     shown_as, values, own = values_of(results, measure, own)
     series = {condition: pd.Series(each) for condition, each in values.items()}
     episodes = _episodes(results, own) if shown_as.is_rate else {}
-    return Measured(title_of(shown_as, own), series, shown_as.bounds, episodes)
+    return SizedValues(title_of(shown_as, own), series, shown_as.bounds, episodes)
 
 
-def _until_criterion(results: Results, measure: str, criterion: float) -> Measured:
+def _until_criterion(results: Results, measure: str, criterion: float) -> SizedValues:
     """Return the decisions of seeds until a criterion."""
     samples = decisions_to_criterion(results, measure, criterion)
     values, censored = ({c: own[k] for c, own in samples.items()} for k in (0, 1))
     title = f"decisions to {format_number(criterion)} of {measure}"
-    return Measured(title, values, NOT_NEGATIVE, censored=censored)
+    return SizedValues(title, values, NOT_NEGATIVE, censored=censored)
 
 
 def _episodes(results: Results, phase: str) -> dict[str, float]:
@@ -275,7 +275,7 @@ def decisions_to_criterion(
     return samples
 
 
-def _fit(group: str, sizes_of: Mapping[str, float], measured: Measured) -> Fitted:
+def _fit(group: str, sizes_of: Mapping[str, float], measured: SizedValues) -> Fitted:
     """Return the law of a group, from the seeds that ran at all sizes, which are in order."""
     sizes = np.array(list(sizes_of.values()))
     if not (np.diff(sizes) > 0.0).all():
