@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import SpecError
-from ..results.laws import Law
+from ..laws.fitting import Law
+from ..laws.samples import LOGIT
+from ..laws.scaling import ScalingLaw, scaling_law
 from ..results.results import Results
-from ..results.samples import LOGIT
-from ..results.scaling_law import ScalingLaw, scaling_law
 from . import figures
 
 POINTS = 60

@@ -179,6 +179,8 @@ class Override(Settings):
     """Name of its conditions."""
     preset: str | None = None
     """Preset of its conditions. By default, the preset of the spec."""
+    unset: tuple[str, ...] = ()
+    """Dotted keys of the preset that return to their defaults, in addition to those of the spec."""
     scenario: SpecTable = Field(default_factory=dict)
     """Changes of the scenario of the spec."""
     agents: Granularity | None = None

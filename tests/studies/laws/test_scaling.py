@@ -12,9 +12,9 @@ import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.laws.scaling import scaling_law
 from nested_agents.studies.presentation.growth import growth_figures
 from nested_agents.studies.results.results import from_arrays
-from nested_agents.studies.results.scaling_law import scaling_law
 from research import RESULTS
 
 SIZES = (2, 4, 8)
@@ -84,6 +84,11 @@ def test_a_size_below_one_is_refused_and_named(size) -> None:
 def test_a_predicted_size_out_of_range_is_refused(size) -> None:
     with pytest.raises(SpecError, match=re.escape(f"predict = {size:g}: allowed are sizes from 1")):
         scaling_law(made_up({"chain": 1.0}), "steps", predict=[size])
+
+
+def test_a_truth_value_is_no_size() -> None:
+    with pytest.raises(SpecError, match="predict = True: allowed are sizes from 1"):
+        scaling_law(made_up({"chain": 1.0}), "steps", predict=[True])
 
 
 def test_a_law_beyond_the_range_of_a_measure_is_explained() -> None:
