@@ -1,5 +1,6 @@
 """Style of all figures, and writing of figures to files."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -33,6 +34,8 @@ STYLES = (
 """Line styles, one for each color, because most colors are the same gray on paper."""
 MARKERS = "osD^vPX"
 """Markers of points, one for each color."""
+MAX_STEM = 100
+"""Maximum number of characters of the name of a file, without numbers and the suffix."""
 IN_ROW = 0.2
 """Distance between the points of one row of a chart [rows]."""
 SETTINGS: dict[str, Any] = {
@@ -181,10 +184,27 @@ def save(
 
     `formats` are suffixes without a dot.
     """
-    paths = [folder / f"{name}.{suffix}" for name in figures for suffix in formats]
-    for path in paths:
-        write(figures[path.stem], path)
+    paths = []
+    for stem, figure in zip(file_stems(figures), figures.values(), strict=True):
+        for suffix in formats:
+            paths.append(folder / f"{stem}.{suffix}")
+            write(figure, paths[-1])
     return paths
+
+
+def file_stems(names: Iterable[str]) -> list[str]:
+    """Return distinct names of files, without suffixes, spaces, commas and slashes.
+
+    >>> file_stems(["transient, topology=chain", "a/b", "a b"])
+    ['transient-topology=chain', 'a-b', 'a-b-2']
+    """
+    stems: list[str] = []
+    for name in names:
+        stem = re.sub(r"[^\w.=+-]+", "-", name)[:MAX_STEM].strip("-.") or "figure"
+        while stem in stems:
+            stem = f"{stem}-2"
+        stems.append(stem)
+    return stems
 
 
 def write(figure: Figure, path: Path) -> None:

@@ -80,6 +80,8 @@ class Resilience:
     tolerance: float
     """Share of the intact performance that a tolerated loss may cost."""
     teams: tuple[TeamLosses, ...]
+    left_out: tuple[str, ...] = ()
+    """Conditions with an intact performance of 0 or below, of which losses say nothing."""
 
     @cached_property
     def single(self) -> Mapping[str, tuple[Difference, ...]]:
@@ -219,12 +221,23 @@ class Resilience:
 
     @property
     def legend(self) -> tuple[str, ...]:
-        """Sentences on what was lost and what counts as tolerated."""
+        """Sentences on what was lost, what counts as tolerated, and what was left out."""
         share = format_number(100.0 * self.tolerance)
-        return (
+        text = (
             f"Fault: {self.fault}, from the first step on; teams are not trained again. A loss is "
             f"tolerated if it costs at most {share}% of the intact performance. Changes are paired "
-            "by seed, on the same initial states.",
+            "by seed, on the same initial states."
+        )
+        return (text, self.remark) if self.remark else (text,)
+
+    @property
+    def remark(self) -> str:
+        """Sentence that names the conditions that were left out; empty if there are none."""
+        if not self.left_out:
+            return ""
+        return (
+            f"Left out, because {self.title} of their intact teams is 0 or below: "
+            f"{'; '.join(self.left_out)}."
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -234,6 +247,7 @@ class Resilience:
             "measure": self.measure.name,
             "tolerance": self.tolerance,
             "teams": [self._team_to_dict(own) for own in self.teams],
+            "left_out": list(self.left_out),
             "comparison": [
                 {
                     "condition": d.condition,
