@@ -157,7 +157,7 @@ def communication_lookahead() -> Figure:
         axes.set_xticks((0.0, 0.5, 1.0))
         axes.set_yticks(range(len(cases)), list(cases))
     axes.invert_yaxis()
-    return titled(figure, "Teams need lookahead; communication adds less")
+    return titled(figure, "Teams by own value need lookahead; communication alone is below neither")
 
 
 def nested_decision() -> Figure:

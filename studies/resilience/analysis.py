@@ -23,6 +23,12 @@ from .losses import LosableTeam
 
 HALF = 0.5
 """Share of the intact performance at which the number of losses stops growing."""
+VERDICTS = {
+    "yes": "the team tolerates any single loss",
+    "no": "the team does not tolerate every single loss",
+    "undecided": "it is undecided whether the team tolerates any single loss",
+}
+"""Verdicts of `Resilience.verdict` in words."""
 
 
 @dataclass
@@ -206,7 +212,7 @@ class Resilience:
             return
         place = own.team.positions[own.team.units.index(worst.condition)]
         yield (
-            f"{own.condition}: the team tolerates any single loss: {self.verdict(own)}. The worst "
+            f"{own.condition}: {VERDICTS[self.verdict(own)]}. The worst "
             f"is that of {worst.condition} ({place}), which changes {self.title} by "
             f"{format_estimate(worst.estimate, signed=True)}."
         )
@@ -217,7 +223,10 @@ class Resilience:
             yield f"Performance does not halve with up to {largest} of {n} lost."
         else:
             value = format_estimate(mean_estimate(self.measure, own.joined(own.by_number[halving])))
-            yield f"Performance is at most half with {halving} of {n} lost: {value}."
+            yield (
+                f"With {halving} of {n} lost, {self.title} is at most half of its intact value: "
+                f"{value}."
+            )
 
     @property
     def legend(self) -> tuple[str, ...]:

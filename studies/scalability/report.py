@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ASSUMED = (
     "The scenario does not say whether its task grows with the team: strong scaling is assumed. "
-    "The option scaling sets it."
+    "Set it with --scaling strong or --scaling weak."
 )
 
 
