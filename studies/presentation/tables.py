@@ -219,8 +219,8 @@ class SummaryTable:
                 "Intervals: Wilson's for rates, otherwise bootstrap (too short for skewed values)."
             )
         return (
-            f"Intervals of fewer than {FEW} seeds: Wilson's for rates, otherwise Student's (too short "
-            "for skewed values)."
+            f"Intervals of fewer than {FEW} seeds: Wilson's for rates, otherwise Student's (too "
+            "short for skewed values)."
         )
 
     @cached_property
