@@ -25,10 +25,10 @@ from ..core.numerics import FloatArray, nx
 COLUMNS = 6
 """Levels in a row before the picture is folded."""
 WIDTH = 1.25
-HEIGHT = 0.34
+HEIGHT = 0.32
 """Size of an agent [in]."""
 ACROSS = 1.7
-DOWN = 0.48
+DOWN = 0.46
 """Distance of columns and of rows [in]."""
 BODY_COLORS = (
     "#cfe2f3",
