@@ -215,13 +215,8 @@ class SummaryTable:
     def remark(self) -> str:
         """Remark on the intervals."""
         if all(seeds >= FEW for _, seeds, _ in self.rows):
-            return (
-                "Intervals: Wilson's for rates, otherwise bootstrap (too short for skewed values)."
-            )
-        return (
-            f"Intervals of fewer than {FEW} seeds: Wilson's for rates, otherwise Student's (too "
-            "short for skewed values)."
-        )
+            return "Intervals: Wilson's for rates, else bootstrap (too short for skewed values)."
+        return f"Fewer than {FEW} seeds: Wilson's intervals for rates, else Student's intervals."
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:

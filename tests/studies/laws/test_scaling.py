@@ -148,7 +148,7 @@ def test_seeds_that_agree_do_not_make_a_law_certain() -> None:
 
 def test_figures_of_a_report_are_of_measures_with_a_law() -> None:
     results = made_up({"chain": 3.0, "star": 5.0})
-    assert list(growth_figures(results)) == ["growth of success"]
+    assert list(growth_figures(results)) == ["growth-of-success"]
     assert growth_figures(made_up({"chain": 3.0}, sizes=(2, 4))) == {}
 
 
