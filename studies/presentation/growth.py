@@ -69,8 +69,8 @@ def _draw(axes: Axes, law: Law, index: int, lines: int, last: float) -> None:
     places = figures.beside_each_other(sample.sizes, index, lines)
     color = figures.look(index)["color"]
     axes.scatter(
-        np.broadcast_to(places, sample.observed.shape), sample.observed, s=20, alpha=0.6,
-        marker=figures.marker(index), facecolor="white", edgecolor=color, linewidths=1.0, zorder=3,
+        np.broadcast_to(places, sample.observed.shape), sample.observed, s=24, alpha=0.8,
+        marker=figures.marker(index), color=color, edgecolor="white", linewidths=0.6, zorder=3,
     )  # fmt: skip
     line = np.geomspace(sample.sizes[0], last, POINTS)
     predicted = stack_estimates([law.predict(float(n)) for n in line])
@@ -82,9 +82,9 @@ def _limit(axes: Axes, laws: Sequence[Law], last: float) -> None:
     if laws[0].sample.scale is LOGIT:
         figures.as_rates(axes)
         return
-    figures.log_axis(axes)
     shown = [law.sample.observed for law in laws] + [law.curve_at(np.array([last])) for law in laws]
     values = np.concatenate([array.ravel() for array in shown])
-    values = values[values > 0.0]
-    if axes.get_yscale() == "log":
-        axes.set_ylim(values.min() / MARGIN, values.max() * MARGIN)
+    positive = values[values > 0.0]
+    if positive.size:
+        axes.set_ylim(positive.min() / MARGIN, positive.max() * MARGIN)
+    figures.log_axis(axes)
