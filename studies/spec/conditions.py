@@ -44,6 +44,8 @@ Length = Annotated[int, Field(ge=1, le=1_000_000)]
 def _printable(name: str) -> str:
     if not name.strip() or not name.isprintable():
         raise ValueError("must be a name that can be printed")
+    if name != name.strip():
+        raise ValueError("must not begin or end with a blank")
     return name
 
 

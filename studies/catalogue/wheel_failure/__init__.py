@@ -94,12 +94,14 @@ def check(spec: Spec) -> None:
                 f"episodes = {spec.episodes}: wheel-failure needs {2 * BLOCK} or more, {BLOCK} "
                 f"before the failure and {BLOCK} with it"
             )
-        if not BLOCK <= onset <= spec.episodes - BLOCK:
-            raise SpecError(
-                f"scenario.failures: the first begins in episode {onset}, allowed {BLOCK} to "
-                f"{spec.episodes - BLOCK} of {spec.episodes} episodes "
-                f"(condition {condition.label!r})"
-            )
+        onsets = [begin for begin, _ in condition.settings.failure_spans]
+        for which, episode in (("first", onset), ("last", max(onsets))):
+            if not BLOCK <= episode <= spec.episodes - BLOCK:
+                raise SpecError(
+                    f"scenario.failures: the {which} begins in episode {episode}, allowed {BLOCK} "
+                    f"to {spec.episodes - BLOCK} of {spec.episodes} episodes "
+                    f"(condition {condition.label!r})"
+                )
 
 
 def _keeping_weights(session: Session) -> Team:
@@ -145,12 +147,14 @@ class Course(NamedTuple):
         }
         if self.end is not None:
             estimates["failure ends [episode]"] = exactly(self.end)
-            estimates["after its end"] = rate(course.from_episode(self.end))
+            if self.end <= course.success.shape[1] - BLOCK:
+                estimates["after its end"] = rate(course.from_episode(self.end))
         estimates["end"] = rate(course.end)
-        if course.before.any():  # otherwise loss and recovery are undefined
+        if course.had_success.any():
             for name, values in course.measured.items():
                 measure = bounded(name, [course], self.longest)
-                estimates[measure.heading] = estimate_over_seeds(values, measure)
+                known = values[course.had_success]
+                estimates[measure.heading] = estimate_over_seeds(known, measure)
         return Summary(f"{self.fault}: {self.adapts}", len(course.success), estimates)
 
 
@@ -162,12 +166,20 @@ def analyse(results: Results) -> Analysis:
     courses = courses_of(results)
     gains, lines = judged({AT_END: _gains(courses)}, "nothing adapting")
     notes = ["Rows: fault, then the parts that adapt to it."] if courses else []
-    if not all(course.measured.before.any() for course in courses):
-        notes.append("Recovery is not measured without successes before the failure.")
+    if not all(course.measured.had_success.all() for course in courses):
+        notes += _unmeasured(courses)
     if any(course.end is not None for course in courses):
         notes.append("Recovery after the end of a failure is not adaptation.")
     table = tuple(course.summary for course in courses)
     return Analysis(table, (*notes, *lines), courses, gains)
+
+
+def _unmeasured(courses: Sequence[Course]) -> Iterator[str]:
+    """Yield how many seeds had no success before the failure, a line for each fault."""
+    yield "Recovery and loss are not measured for seeds without success before the failure:"
+    for fault, had in {c.fault: c.measured.had_success for c in courses}.items():
+        if not had.all():
+            yield f"  {fault}: {len(had) - had.sum()} of {len(had)} seeds"
 
 
 def courses_of(results: Results) -> list[Course]:
