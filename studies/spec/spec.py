@@ -350,7 +350,10 @@ class Spec(Settings):
     def table(self) -> TomlTable:
         """Return the spec as a table that `of` reads back."""
         table = _filled(self.model_dump())
-        table["overrides"] = [_filled(override) for override in table.get("overrides", ())]
+        table["overrides"] = [
+            _filled({**override, "unset": override["unset"] or None})
+            for override in table.get("overrides", ())
+        ]
         if self.seeds == tuple(range(len(self.seeds))):
             table["seeds"] = len(self.seeds)
         if not self.keep_teams:

@@ -21,7 +21,6 @@ from platform import python_version
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Generic, Literal, NamedTuple, Protocol, Self, TypeVar
 
-from ...core.numerics import working_seconds
 from ..store.store import Store
 from ..store.writer import Running
 
@@ -82,6 +81,8 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
 
     SystemExit and KeyboardInterrupt are failures of the trial, too, because workers ignore Ctrl-C.
     """
+    from ...core.numerics import working_seconds  # status does without NumPy
+
     start = working_seconds()
     error = None
     result = None
