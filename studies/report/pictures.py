@@ -9,6 +9,7 @@ from itertools import islice
 from typing import NamedTuple
 
 from markupsafe import Markup
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox, BboxBase
 
@@ -84,21 +85,26 @@ def crops(figure: Figure) -> tuple[Crop, ...]:
     panels = [axes for axes in figure.axes if axes.get_visible()]
     if len(panels) < 2:
         return ()
-    found = [_crop(figure, [legend.get_tightbbox()]) for legend in figure.legends]
+    found = [_crop(figure, [legend.get_window_extent()]) for legend in figure.legends]
     for axes in panels:
-        own = axes.get_tightbbox().padded(PANEL_MARGIN * figure.dpi / 72.0)
+        own = _extent(axes).padded(PANEL_MARGIN * figure.dpi / 72.0)
         row = [
             sibling
             for sibling in axes.get_shared_y_axes().get_siblings(axes)
             if sibling.bbox.y0 == axes.bbox.y0
         ]
         first = min(row, key=lambda sibling: sibling.bbox.x0)
-        left = first.get_tightbbox().x0 - PANEL_MARGIN * figure.dpi / 72.0
+        left = _extent(first).x0 - PANEL_MARGIN * figure.dpi / 72.0
         ticks = TICK * figure.dpi / 72.0
         axis = Bbox.from_extents(left, own.y0, first.bbox.x0 - ticks, own.y1)
         panel = Bbox.from_extents(axes.bbox.x0 - ticks, own.y0, own.x1, own.y1)
         found.append(_crop(figure, [own] if first is axes else [axis, panel]))
     return tuple(found)
+
+
+def _extent(axes: Axes) -> BboxBase:
+    """Return the box of a panel with its labels [pixels]."""
+    return axes.get_tightbbox() or axes.bbox
 
 
 def _crop(figure: Figure, boxes: Sequence[BboxBase]) -> Crop:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,9 @@ from ...trials.arrangement import arrange
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases, distinct
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
 
 NUMBERS = ("onset",)
 """Numbers of whole trials that the analysis needs."""
@@ -272,7 +275,7 @@ def draw(analysis: Analysis) -> Figures:
         axes.grid(axis="y", alpha=0.25)
     for axes in panels[:, 0]:
         axes.set_ylabel("success")
-    entries = [f.handle(case, **f.look(i)) for i, case in enumerate(cases)]
+    entries: list[Artist] = [f.handle(case, **f.look(i)) for i, case in enumerate(cases)]
     entries.append(f.handle("a failure begins", **ONSET))
     if any(course.end is not None for course in courses):
         entries.append(Patch(label="transient failure", **TRANSIENT))
