@@ -73,11 +73,11 @@ def pictures(figures: Mapping[str, Figure], prefix: str = "figure") -> list[Pict
             pdf = io.BytesIO()
             figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
             encoded = base64.b64encode(pdf.getvalue()).decode("ascii")
-            drawings.append(Picture(name, Markup(text), encoded, name_space, crops(figure)))
+            drawings.append(Picture(name, Markup(text), encoded, name_space, crops_of(figure)))
     return drawings
 
 
-def crops(figure: Figure) -> tuple[Crop, ...]:
+def crops_of(figure: Figure) -> tuple[Crop, ...]:
     """Return the legends and the panels of a figure.
 
     A panel that shares the vertical axis of the first panel in its row is shown beside that axis.
@@ -85,7 +85,7 @@ def crops(figure: Figure) -> tuple[Crop, ...]:
     panels = [axes for axes in figure.axes if axes.get_visible()]
     if len(panels) < 2:
         return ()
-    found = [_crop(figure, [legend.get_window_extent()]) for legend in figure.legends]
+    crops = [_crop(figure, [legend.get_window_extent()]) for legend in figure.legends]
     for axes in panels:
         own = _extent(axes).padded(PANEL_MARGIN * figure.dpi / 72.0)
         row = [
@@ -98,8 +98,8 @@ def crops(figure: Figure) -> tuple[Crop, ...]:
         ticks = TICK * figure.dpi / 72.0
         axis = Bbox.from_extents(left, own.y0, first.bbox.x0 - ticks, own.y1)
         panel = Bbox.from_extents(axes.bbox.x0 - ticks, own.y0, own.x1, own.y1)
-        found.append(_crop(figure, [own] if first is axes else [axis, panel]))
-    return tuple(found)
+        crops.append(_crop(figure, [own] if first is axes else [axis, panel]))
+    return tuple(crops)
 
 
 def _extent(axes: Axes) -> BboxBase:
