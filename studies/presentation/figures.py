@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -163,7 +164,7 @@ def handle(label: str, **kwargs: Any) -> Line2D:
     return Line2D([], [], label=label, **kwargs)
 
 
-def add_legend(figure: Figure, handles: Sequence[Line2D], title: str = "", ncols: int = 4) -> None:
+def add_legend(figure: Figure, handles: Sequence[Artist], title: str = "", ncols: int = 4) -> None:
     """Add a legend above the panels."""
     figure.legend(
         handles=handles, title=title or None, loc="outside upper center", ncols=ncols,

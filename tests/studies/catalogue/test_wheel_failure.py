@@ -122,7 +122,7 @@ def test_cases_are_told_apart_by_what_adapts() -> None:
     assert [line.condition.rpartition(": ")[2] for line in analysis.table] == [
         "nothing", "weights", "self-model", "both",
     ] * 2  # fmt: skip
-    ends = {line.condition: float(line.estimates["end"].value) for line in analysis.table}
+    ends = {line.condition: float(line.estimates[AT_END].value) for line in analysis.table}
     assert ends["4 wheels, seized: both"] > 0.85
     assert ends["4 wheels, seized: nothing"] < 0.2
     gains = {gain.condition: gain for gain in analysis.differences[AT_END]}
@@ -138,7 +138,7 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
             arrays["success"][:] = 0
     analysis = analyse(results.frames())
     for line in analysis.table:
-        assert list(line.estimates) == ["before", "just after", "end"]
+        assert list(line.estimates) == ["before", "just after", AT_END]
     text = " ".join(" ".join(analysis.notes).split())
     assert "not measured for seeds without success before the failure: fault:" in text
     with pytest.raises(SpecError, match="'recovered': no seed succeeded before a failure began"):
