@@ -1,4 +1,4 @@
-"""Leaders: agents above all others, whose actions are options (Sutton, Precup and Singh 1999).
+"""Leader of a team, whose actions are options (Sutton, Precup and Singh 1999).
 
 A decision of a leader and what follows until its option ends is one step of a semi-Markov decision
 process. If the option lasts k decisions with rewards r_1 to r_k, the leader learns from::
@@ -8,38 +8,27 @@ process. If the option lasts k decisions with rewards r_1 to r_k, the leader lea
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox
-from ..interface.agents import AgentContext, Agents, StateDict
+from ..interface.agents import AgentContext
 from ..interface.experience import Decision, Experience, Observation
-from ..interface.options import LedScenario, Options
+from ..interface.options import Options
 from ..interface.scenario import Scenario, Transition
-from ..learners.learner import TeamSettings
-from ..numerics import AnyArray, FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
+from .fuzzy import FuzzyAgents
+from .views import FuzzyInputs
 
-NAME = "leader"
 NO_MESSAGES = np.zeros(0, np.int64)
 INBOX = Inbox(np.zeros(1, np.int64), NO_MESSAGES, NO_MESSAGES, NO_MESSAGES)
 """A leader has no superior that sends it messages."""
 
 
-def options_of(scenario: Scenario) -> Options | None:
-    """Return the options of a leader in a scenario; None without a leader."""
-    return scenario.options if isinstance(scenario, LedScenario) else None
-
-
 class LeaderView(Scenario):
-    """A scenario as its leader sees it, which is the only agent.
+    """Spaces of a leader, for which a learner is built. `Leader` makes its steps."""
 
-    The leader's steps are those of `Leader`.
-    """
-
-    agents = (NAME,)
+    agents = ("leader",)
 
     def __init__(self, options: Options) -> None:
         self.state_space = options.state_space
@@ -50,8 +39,8 @@ class LeaderView(Scenario):
         raise NotImplementedError("the scenario below starts episodes")
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Refuse; the scenario below carries out options."""
-        raise NotImplementedError("the scenario below carries out options")
+        """Refuse; the agents below carry out options."""
+        raise NotImplementedError("the agents below carry out options")
 
 
 class Leader:
@@ -60,125 +49,87 @@ class Leader:
     Parameters
     ----------
     options
-        Options of the scenario in which the leader is built. In decisions, those of the observed
-        scenario count.
+        Options of the scenario in which the leader is built.
     seed
         Seed of the leader's random numbers.
 
     Attributes
     ----------
     agents
-        The agent that decides; None for the leader by rule.
-
-    Raises
-    ------
-    ValueError
-        If the settings are of a learner that does not count how long actions last; one line.
+        The agent that decides and learns; empty for a leader by rule.
     """
 
     def __init__(self, options: Options, seed: np.random.SeedSequence) -> None:
-        self.view = LeaderView(options)
-        self.agents: Agents[Any] | None = None
-        settings = options.learner
-        if settings is not None:
-            _check(settings)
-            self._discount = settings.discount
-            hierarchy = Hierarchy(self.view.agents, [])
-            context = AgentContext(self.view, hierarchy, np.arange(1), seed)
-            self.agents = settings.agents(context)
-        self.reset(0)
+        self.agents: tuple[FuzzyAgents, ...] = ()
+        self._view = LeaderView(options)
+        if options.learner is not None:
+            hierarchy = Hierarchy(self._view.agents, [])
+            context = AgentContext(self._view, hierarchy, np.arange(1), seed)
+            self.agents = (FuzzyAgents(options.learner, context),)
+        self.reset()
 
-    def reset(self, episode: int) -> None:
-        """Start an episode, of training or of evaluation."""
-        self._decision: tuple[Observation, Decision] | None = None
+    def reset(self) -> None:
+        """Start an episode."""
+        self._decided: tuple[Observation, IntArray, FuzzyInputs] | None = None
         self._duration = 0
-        self._reward: float | None = None
-        if self.agents is not None:
-            self.agents.reset(episode)
-
-    def begin_episode(self) -> None:
-        """Start an episode of training."""
-        if self.agents is not None:
-            self.agents.begin_episode()
+        self._return = 0.0
 
     def lead(
         self, options: Options, observation: Observation, *, explore: bool
     ) -> tuple[Observation, IntArray | None]:
-        """Decide on an option if none is under way.
+        """Decide on an option if none goes on.
 
         Returns
         -------
         Observation
             Observation of the agents below.
         IntArray or None
-            Their actions ``(n,)``, if the option is a given skill.
+            Their actions ``(n,)``, if a given skill acts for them.
         """
-        if self._duration == 0 or options.has_ended() or self._duration >= options.limit:
-            own = Observation(options.observe()[None], self.view)
-            if self._reward is not None:
-                self._learn(Transition(own.present, self._reward, False, False, {}), last=False)
-            states = options.begin(self._decide(options, own, explore=explore))
+        goes_on = 0 < self._duration < options.limit and options.advance()
+        if not goes_on:
+            states = options.begin(self._decide(options, explore=explore))
             observation = observation._replace(present=states)
             self._duration = 0
         self._duration += 1
         return observation, options.joint_action()
 
-    def _decide(self, options: Options, own: Observation, *, explore: bool) -> int:
-        """Return an option."""
-        if options.learner is None:
+    def _decide(self, options: Options, *, explore: bool) -> int:
+        """Return an option; a leader that learns has first learned from the last one."""
+        if not self.agents:
             return options.rule()
-        assert self.agents is not None
-        inputs = self.agents.observe(own, explore=explore)
-        action = self.agents.act(inputs, INBOX)
-        self.agents.conclude(inputs, action)
-        self._decision = own, Decision(action, (inputs,))
+        (agent,) = self.agents
+        observation = Observation(options.observe()[None], self._view)
+        if self._decided is not None and explore:
+            self._learn(observation.present, terminated=False, last=False)
+        inputs = agent.observe(observation, explore=explore)
+        action = agent.act(inputs, INBOX)
+        agent.conclude(inputs, action)
+        self._decided = observation, action, inputs
         return int(action[0])
 
     def learn(self, options: Options, experience: Experience) -> None:
-        """Learn from a step of the scenario below."""
-        if self.agents is None:
+        """Add the mean reward of a step below, and learn if the episode ends with it.
+
+        A lost task is terminal to the leader. A terminal reward repeats forever if the state does.
+        """
+        if not self.agents:
             return
         transition = experience.transition
-        discounted = self._discount ** (self._duration - 1)
-        reward = options.reward(transition)
-        has_ended = transition.terminated or transition.truncated
-        # The last reward repeats forever, because a terminal state lasts.
-        reward = reward / (1.0 - self._discount) if has_ended else reward
-        self._reward = (self._reward or 0.0) + discounted * reward
+        discount = self.agents[0].settings.discount
+        reward = float(np.mean(transition.reward))
+        if transition.terminated and transition.absorbing:
+            reward /= 1.0 - discount
+        self._return += discount ** (self._duration - 1) * reward
         if experience.last:
-            states = options.observe()[None]
-            end = Transition(states, self._reward, has_ended, False, {}, absorbing=False)
-            self._learn(end, last=True)
+            is_terminal = transition.terminated or transition.truncated
+            self._learn(options.observe()[None], terminated=is_terminal, last=True)
 
-    def _learn(self, transition: Transition, *, last: bool) -> None:
-        """Learn from an option that has ended."""
-        assert self.agents is not None
-        assert self._decision is not None
-        before, decision = self._decision
-        experience = Experience(before, decision, transition, last, self._duration)
-        self.agents.learn(experience, decision.inputs[0])
-        self._reward = None
-
-    def warm_start(self, former: Leader) -> None:
-        """Start with what the leader of another team learned."""
-        if self.agents is not None and former.agents is not None:
-            self.agents.warm_start(former.agents)
-
-    def state_dict(self) -> StateDict:
-        """Return the saved state."""
-        arrays = {} if self.agents is None else self.agents.state_dict()
-        return {f"{NAME}.{name}": array for name, array in arrays.items()}
-
-    def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
-        """Continue from a `state_dict`."""
-        if self.agents is not None:
-            self.agents.load_state_dict(state)
-
-
-def _check(settings: TeamSettings) -> None:
-    """Refuse settings of agents that do not discount by the duration of an option."""
-    if not settings.counts_durations:
-        raise ValueError(
-            f"scenario.leader.learner.kind = {settings.kind!r}: does not count how long an option "
-            "lasts; use fitted-q or a function"
-        )
+    def _learn(self, states: FloatArray, *, terminated: bool, last: bool) -> None:
+        """Learn from an option that has ended in some states ``(1, d)`` of the leader."""
+        assert self._decided is not None
+        before, action, inputs = self._decided
+        result = Transition(states, self._return, terminated, False, {}, absorbing=False)
+        decision = Decision(action, (inputs,))
+        self.agents[0].learn(Experience(before, decision, result, last, self._duration), inputs)
+        self._return = 0.0

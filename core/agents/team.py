@@ -24,7 +24,7 @@ from ..plugins.settings import Settings
 from ..plugins.words import expect
 from .inspection import inspect_agents
 from .kept import begin_with
-from .leader import Leader, options_of
+from .leader import Leader
 
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
@@ -54,6 +54,8 @@ class Team:
     ----------
     parts
         The agents, one part for each kind.
+    leader
+        The leader above all agents, if the scenario has options for one.
     messages
         Delivery of messages.
     costs
@@ -113,8 +115,13 @@ class Team:
         )
         self._present = hierarchy
         self._actions_of_left = _actions_of_left(failures, checked)
-        options = options_of(checked)
-        self.leader = None if options is None else Leader(options, seed.spawn(1)[0])
+        self.leader = None
+        if checked.options is not None:
+            if failures or settings.n_environments > 1:
+                key = "topology.failures" if failures else "learner.environments"
+                raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
+            self.leader = Leader(checked.options, seed.spawn(1)[0])
+        self._all = self.parts if self.leader is None else (*self.parts, *self.leader.agents)
 
     @cached_property
     def _stages(self) -> tuple[DecisionStage, ...]:
@@ -148,19 +155,19 @@ class Team:
     def counts(self) -> Counts:
         """Number of evaluations of all parts so far."""
         total = Counts()
-        for part in self.parts:
+        for part in self._all:
             total.add(part.counts)
         return total
 
     @property
     def weight_bytes(self) -> int:
         """Memory of all learned weights [bytes]."""
-        return sum(part.weight_bytes for part in self.parts)
+        return sum(part.weight_bytes for part in self._all)
 
     @contextmanager
     def drawing_apart(self) -> Iterator[None]:
         """Restore the states of all random generators on exit."""
-        generators = [part.rng.bit_generator for part in self.parts]
+        generators = [part.rng.bit_generator for part in self._all]
         states = [generator.state for generator in generators]
         yield
         for generator, state in zip(generators, states, strict=True):
@@ -174,6 +181,8 @@ class Team:
         ValueError
             One line.
         """
+        if (self.leader is None) != (observation.scenario.options is None):
+            raise ValueError("scenario.leader: build the team in a scenario with the same leader")
         for part in self.parts:
             part.check(observation)
 
@@ -192,15 +201,13 @@ class Team:
         """Start an episode; random message failures follow from `seed`."""
         self.messages.reset(seed, episode)
         if self.leader is not None:
-            self.leader.reset(episode)
-        for part in self.parts:
+            self.leader.reset()
+        for part in self._all:
             part.reset(episode)
 
     def begin_episode(self) -> None:
         """Start an episode of training."""
-        if self.leader is not None:
-            self.leader.begin_episode()
-        for part in self.parts:
+        for part in self._all:
             part.begin_episode()
 
     def act(
@@ -236,11 +243,12 @@ class Team:
             self._rearrange()
         if inspect and observation.present.ndim > 2:
             raise ValueError("inspect = True: a decision of one environment only")
-        options = options_of(observation.scenario)
+        options = observation.scenario.options
         if options is not None and self.leader is not None:
-            observation, given = self.leader.lead(options, observation, explore=explore)
-            if given is not None:
-                return Decision(given, ())
+            observation, skilled = self.leader.lead(options, observation, explore=explore)
+            if skilled is not None:
+                self.decision_costs = {measure.name: 0.0 for measure in self.costs}
+                return Decision(skilled, ())
             explore = False
         inputs = tuple(part.observe(observation, explore=explore) for part in self.parts)
         inboxes: list[Inbox] | None = None
@@ -349,7 +357,7 @@ class Team:
 
     def learn(self, experience: Experience) -> None:
         """Learn from a step. Below a leader, only the leader learns."""
-        options = options_of(experience.before.scenario)
+        options = experience.before.scenario.options
         if options is not None and self.leader is not None:
             self.leader.learn(options, experience)
             return
@@ -369,10 +377,9 @@ class Team:
         ValueError
             If it cannot be used here; one line.
         """
-        for part, before in zip(self.parts, former.parts, strict=True):
+        # Only one of the teams may have a leader that learns, which is the last.
+        for part, before in zip(self._all, former._all, strict=False):
             part.warm_start(before)
-        if self.leader is not None and former.leader is not None:
-            self.leader.warm_start(former.leader)
 
     def save(self, path: Path | str) -> None:
         """Write the `state_dict` to an ``.npz`` file."""
@@ -392,11 +399,11 @@ class Team:
 
     def state_dict(self) -> StateDict:
         """Return the saved state of all parts as named arrays."""
-        if len(self.parts) == 1:
-            return self.parts[0].state_dict()
+        if len(self._all) == 1:
+            return self._all[0].state_dict()
         return {
             f"part{k}.{name}": array
-            for k, part in enumerate(self.parts)
+            for k, part in enumerate(self._all)
             for name, array in part.state_dict().items()
         }
 
@@ -408,10 +415,10 @@ class Team:
         ValueError
             If it is that of another team.
         """
-        if len(self.parts) == 1:
-            self.parts[0].load_state_dict(state)
+        if len(self._all) == 1:
+            self._all[0].load_state_dict(state)
             return
-        for k, part in enumerate(self.parts):
+        for k, part in enumerate(self._all):
             part.load_state_dict(select_prefix(f"part{k}.", state))
 
 

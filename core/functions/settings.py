@@ -15,7 +15,6 @@ class FunctionSettings(TeamSettings):
     """Agents that decide by a function; its keyword-only parameters are further keys."""
 
     uses_hierarchy = True
-    counts_durations = True
     kind_of_agents = f"{CORE}.functions.agents:FunctionAgents"
 
     hears: Literal["contents", "actions"] = "contents"

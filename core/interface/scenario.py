@@ -26,6 +26,8 @@ from .spaces import ActionSet, StateSpace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from .options import Options
+
 Twists = FloatArray | Callable[[], FloatArray | None] | None
 """Twists of a transition, a function that measures them, or None."""
 
@@ -176,6 +178,8 @@ class Scenario(ABC):
     agents take the neutral action, or the same action again if `repeats` is true."""
     repeats: bool = False
     """Whether predictions assume that all agents repeat their first action."""
+    options: Options | None = None
+    """Options of a leader above the agents; None without a leader."""
     recorded: tuple[str, ...] = ()
     """Names of the recorded measurements, one array ``(T + 1, ...)`` each."""
 

@@ -46,7 +46,6 @@ class FittedQSettings(LearnerSettings):
     kind: Literal["fitted-q"] = "fitted-q"
     factory: ClassVar[str] = f"{__name__}:FittedQ"
     values_actions = True
-    counts_durations = True
     ridge: Positive = 0.1
     """Penalty on squared weights, relative to squared errors of rewards scaled by 100."""
     regression_iterations: Annotated[int, Field(ge=1, le=10_000)] = 8

@@ -142,8 +142,6 @@ class TeamSettings(PartSettings):
 
     uses_hierarchy: ClassVar[bool] = False
     """Whether the agents communicate in a hierarchy."""
-    counts_durations: ClassVar[bool] = False
-    """Whether the agents discount by the duration of their actions, as leaders must."""
     kind_of_agents: ClassVar[str] = ""
     """Location of the configured subclass of `Agents`, imported on use."""
 

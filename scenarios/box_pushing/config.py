@@ -5,9 +5,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ...core.learners import LEARNERS, TeamSettings
 from ...core.learners.fitted_q import FittedQSettings
-from ...core.plugins.registry import Plugged
 from ...core.plugins.settings import Positive, ScenarioSettings, Settings, team_size
 from ...core.search.exploration import BurstExploration
 from ..state_variables import names_of
@@ -25,22 +23,22 @@ from .world.settings import (
 )
 
 
-
 class LeaderSettings(Settings):
-    """Leader above all robots, which decides on straight pushes and second sides."""
+    """Leader above all robots, which decides between a straight push and a second side."""
 
-    decides: Literal["none", "rule", "learner"] = "none"
-    """Whether there is no leader, one that decides by a given rule, or one that learns."""
-    learner: Annotated[TeamSettings, Plugged(LEARNERS)] = FittedQSettings(
+    policy: Literal["none", "rule", "learned"] = "none"
+    """Policy of the leader: there is ``none``, it pushes from a second side if the goal is more
+    than 20 degrees off (``rule``), or it is ``learned`` while all other agents keep their
+    weights."""
+    learner: FittedQSettings = FittedQSettings(
         discount=0.995,
-        ridge=0.1,
         regression_iterations=60,
         exploration=BurstExploration(rate=0.5, decay=0.97, floor=0.05, length=1.0),
     )
-    """Settings of a leader that learns."""
+    """Learner of the leader, see `learner` with `kind` fitted-q."""
     limit: Annotated[int, Field(ge=1)] = 300
-    """Number of decisions of the wheels after which an option ends."""
-    standing: Annotated[float, Field(gt=0, le=1)] = 0.6
+    """Number of decisions after which an option ends."""
+    quorum: Annotated[float, Field(gt=0, le=1)] = 0.6
     """Fraction of the robots that must stand at the second side before they push."""
 
 
@@ -82,8 +80,6 @@ class BoxTaskSettings(ScenarioSettings):
     """Distance of the box from the goal that counts as reached [m]."""
     termination_radius: Positive = 1.5
     """Distance of the box from the goal [m] beyond which an episode is broken off."""
-    leader: LeaderSettings = LeaderSettings()
-    """Leader above all robots."""
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
 
@@ -127,6 +123,9 @@ class BoxPushingSettings(BoxTaskSettings):
     prediction_horizon: Periods = 24
     """Control periods that predictions look ahead, the decision being held for all of them: so far
     that what agents do shows."""
+
+    leader: LeaderSettings = LeaderSettings()
+    """Leader above all robots."""
 
     @model_validator(mode="after")
     def _believes(self) -> Self:

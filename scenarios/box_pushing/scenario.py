@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.interface.environments import Transitions
-from ...core.interface.options import LedScenario
+from ...core.interface.measures import Measure
 from ...core.interface.prediction import Prediction
-from ...core.interface.scenario import Embodiment, Transition
+from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, stream_of, working_seconds, wrap
@@ -46,7 +46,7 @@ SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
 
 
-class BoxPushing(LedScenario, Embodiment):
+class BoxPushing(Scenario, Embodiment):
     """Box pushing: the agents are the wheels of robots, which push a box to a goal.
 
     It can be drawn, calibrated and predicted exactly.
@@ -70,7 +70,8 @@ class BoxPushing(LedScenario, Embodiment):
     (4, 8)
     """
 
-    measures = MEASURES
+    measures: tuple[Measure, ...] = MEASURES
+    options: BoxOptions | None = None
     recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
@@ -127,8 +128,8 @@ class BoxPushing(LedScenario, Embodiment):
             horizon=settings.prediction_horizon * CONTROL_PERIOD,
         )
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        self.options = None if settings.leader.decides == "none" else BoxOptions(self)
-        if self.options is not None:
+        if settings.leader.policy != "none":
+            self.options = BoxOptions(self)
             self.measures = (*MEASURES, OPTIONS)
         # Robots that do not fit around the box are refused now, not in the middle of a study.
         BoxPushing.reset(self, 0)
@@ -223,10 +224,11 @@ class BoxPushing(LedScenario, Embodiment):
         return Transition(states, received, terminated, truncated, measured, twists)
 
     def environments(self, count: int) -> BoxEnvironments | None:
-        """Return a batch of environments; None with failures, noise or user-defined variables."""
+        """Return a batch; None with failures, noise, a leader or user-defined variables."""
         settings = self.settings
         is_noisy = settings.failures or settings.infrared.noise or self._playground is not None
-        if is_noisy or not self.space.is_built_in or step_address() is None:
+        is_single = is_noisy or self.options is not None
+        if is_single or not self.space.is_built_in or step_address() is None:
             return None
         return BoxEnvironments(self, count)
 

@@ -1,20 +1,29 @@
-"""Robots that walk around a box to another of its sides, keeping their order.
+"""Robots that walk around a box to another of its sides, a given skill.
 
-Robots walk along a curve at a small distance around the box. A robot searches over sequences of
-`DEPTH` of its own actions. The robot at the front searches first; those behind know its plan.
+They walk along a curve at a small distance around the box and keep their order. A robot searches
+over sequences of `DEPTH` of its own actions. The robot at the front searches first; the robots
+behind know its plan.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from itertools import pairwise
+from math import atan2, cos, hypot, sin
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from shapely.geometry import Polygon
+from shapely.geometry.polygon import orient
 
-from ...core.numerics import FloatArray, IntArray, njit, wrap_one
+from ...core.numerics import FloatArray, IntArray, njit, wrap, wrap_one
 from ..angles import angle_of, rotate
 from .world.boxes import BoxSpec
+from .world.robots import nominal_effect, side_actions
 
+if TYPE_CHECKING:
+    from .scenario import BoxPushing
+
+Pose = tuple[float, float, float]
+"""Position [m, m] and heading [rad], or other three numbers of a robot."""
 GAP_M = 0.04
 """Distance of walking robots from the box [m]."""
 CLEARANCE_M = 0.012
@@ -25,6 +34,17 @@ ARRIVAL_M = 0.1
 """Way to its place over which a robot turns from its course to the box [m]."""
 STANDING = 0.1, 0.03, 0.6
 """Largest way [m], distance from the curve [m] and angle [rad] of a robot that stands."""
+
+
+class Side(NamedTuple):
+    """A side of the convex hull of a box, in the frame of the box."""
+
+    direction: float
+    """Direction straight into the side [rad]."""
+    middle: tuple[float, float]
+    """Middle of the side [m]."""
+    half: float
+    """Half its length [m]."""
 
 
 class Path(NamedTuple):
@@ -53,20 +73,99 @@ class Wheels(NamedTuple):
     """Radius of the robot [m]."""
 
 
+def sides_of(box: BoxSpec) -> list[Side]:
+    """Return the sides of the convex hull of a box, counterclockwise.
+
+    Raises
+    ------
+    ValueError
+        If the box has no sides.
+    """
+    if box.polygon is None:
+        raise ValueError(f"scenario.leader: box {box.name!r} has no sides, use a polygon")
+    corners = np.array(orient(box.polygon.convex_hull).exterior.coords)
+    sides = []
+    for a, b in pairwise(corners):
+        along = b - a
+        middle = (a + b) / 2
+        direction = atan2(along[0], -along[1])
+        sides.append(Side(direction, (middle[0], middle[1]), hypot(*along) / 2))
+    return sides
+
+
 def path_around(box: BoxSpec, margin: float) -> Path:
-    """Return the curve at a distance from the convex hull of a box."""
-    hull: Polygon = box.polygon.convex_hull
-    points = np.array(hull.buffer(margin, quad_segs=4).normalize().exterior.coords)[::-1]
-    points = np.ascontiguousarray(points)
+    """Return the curve at a distance [m] from the convex hull of a box."""
+    assert box.polygon is not None
+    around = orient(box.polygon.convex_hull.buffer(margin, quad_segs=4))
+    points = np.ascontiguousarray(around.exterior.coords)
     ways = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
     return Path(points, ways)
 
 
+def poses_in_box(scenario: BoxPushing) -> FloatArray:
+    """Return the poses ``(M, 3)`` of all robots in the frame of the box."""
+    box = scenario.world.box_pose
+    robots = scenario.world.robot_poses
+    x, y = rotate(cos(box[2]), -sin(box[2]), *(robots[:, :2] - box[:2]).T)
+    return np.column_stack([x, y, wrap(robots[:, 2] - box[2])])
+
+
+class Walk:
+    """Robots on their way around a box.
+
+    Parameters
+    ----------
+    scenario
+        Robots and box.
+    side, destination
+        The side that the robots leave, and the side to which they walk.
+    """
+
+    def __init__(self, scenario: BoxPushing, side: Side, destination: Side) -> None:
+        self._scenario = scenario
+        robot = scenario.robot
+        actions = scenario.action_set
+        unit = scenario.settings.speed_increment * robot.max_speed
+        self._choices = side_actions(robot, len(actions))
+        self._wheels = Wheels(
+            np.array(actions.gains)[self._choices],
+            unit * np.array(actions.increments)[self._choices],
+            robot.max_speed,
+            nominal_effect(robot),
+            scenario.settings.period,
+            robot.radius,
+        )
+        self._path = path_around(scenario.box, robot.radius + GAP_M)
+        self._middle = locate(self._path, *destination.middle)[0]
+        n_robots = len(scenario.groups)
+        room = destination.half - robot.radius - 0.01
+        self._spread = np.linspace(room, -room, n_robots) if n_robots > 1 else np.zeros(1)
+        self._sense = float(np.sign(wrap_one(destination.direction - side.direction)))
+        self._places = np.zeros((n_robots, 3))
+        self._places[:, 1:] = destination.direction, self._sense
+
+    def joint_action(self) -> IntArray:
+        """Return the actions ``(n,)`` of all wheels; the robot ahead has the farthest place."""
+        poses = poses_in_box(self._scenario)
+        length = self._path.ways[-1]
+        ways = np.array([locate(self._path, x, y)[0] for x, y, _ in poses])
+        left = np.mod(self._sense * (self._middle - ways) + 0.25 * length, length)
+        order: IntArray = np.argsort(left)
+        self._places[order, 0] = np.mod(self._middle + self._sense * self._spread, length)
+        speeds = self._scenario.wheel_speeds
+        actions = walk(order, poses, speeds, self._places, self._path, self._wheels)
+        return self._choices[actions].ravel()
+
+    def fraction_standing(self) -> float:
+        """Return the fraction of the robots that stand at their places and face the box."""
+        return standing(poses_in_box(self._scenario), self._places, self._path)
+
+
 @njit(cache=True)
-def locate(path: Path, x: float, y: float) -> tuple[float, float, float]:
+def locate(path: Path, x: float, y: float) -> Pose:
     """Return way along the curve, signed distance from it, and its direction at a point.
 
-    Ways and distances are in m, the direction in rad; distances on the side of the box are positive.
+    Ways and distances are in m, the direction in rad. Distances towards the box are positive.
     """
     nearest = np.inf
     way = course = side = 0.0
@@ -88,9 +187,7 @@ def locate(path: Path, x: float, y: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True)
-def errors_of(
-    path: Path, pose: tuple[float, float, float], place: tuple[float, float, float]
-) -> tuple[float, float, float]:
+def errors_of(path: Path, pose: Pose, place: Pose) -> Pose:
     """Return the way to a place [m], the signed distance from the curve [m], and the angle [rad].
 
     Parameters
@@ -116,16 +213,14 @@ def errors_of(
 
 
 @njit(cache=True)
-def _cost(path: Path, pose: tuple[float, float, float], place: tuple[float, float, float]) -> float:
+def _cost(path: Path, pose: Pose, place: Pose) -> float:
     left, off, turn = errors_of(path, pose, place)
     too_near = max(off - (GAP_M - CLEARANCE_M), 0.0)
     return left + 2.0 * abs(off) + 20.0 * too_near + 0.06 * turn
 
 
 @njit(cache=True)
-def _moved(
-    wheels: Wheels, pose: tuple[float, float, float], speeds: FloatArray, action: int, out: FloatArray
-) -> tuple[float, float, float]:
+def _moved(wheels: Wheels, pose: Pose, speeds: FloatArray, action: int, out: FloatArray) -> Pose:
     """Return the pose after a decision period, and write the wheel speeds to `out`."""
     ahead, left, turn = wheels.effect[0, -1], wheels.effect[1, -1], wheels.effect[2, -1]
     for w in range(len(speeds)):
