@@ -14,8 +14,9 @@ from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox
 from ..interface.agents import AgentContext
 from ..interface.experience import Decision, Experience, Observation
-from ..interface.options import Options
+from ..interface.options import LeaderOptions
 from ..interface.scenario import Scenario, Transition
+from ..learners.fitted_q import FittedQSettings
 from ..numerics import FloatArray, IntArray
 from .fuzzy import FuzzyAgents
 from .views import FuzzyInputs
@@ -30,7 +31,7 @@ class LeaderView(Scenario):
 
     agents = ("leader",)
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: LeaderOptions) -> None:
         self.state_space = options.state_space
         self.action_set = options.action_set
 
@@ -59,10 +60,11 @@ class Leader:
         The agent that decides and learns; empty for a leader by rule.
     """
 
-    def __init__(self, options: Options, seed: np.random.SeedSequence) -> None:
+    def __init__(self, options: LeaderOptions, seed: np.random.SeedSequence) -> None:
         self.agents: tuple[FuzzyAgents, ...] = ()
         self._view = LeaderView(options)
         if options.learner is not None:
+            assert isinstance(options.learner, FittedQSettings)
             hierarchy = Hierarchy(self._view.agents, [])
             context = AgentContext(self._view, hierarchy, np.arange(1), seed)
             self.agents = (FuzzyAgents(options.learner, context),)
@@ -75,7 +77,7 @@ class Leader:
         self._return = 0.0
 
     def lead(
-        self, options: Options, observation: Observation, *, explore: bool
+        self, options: LeaderOptions, observation: Observation, *, explore: bool
     ) -> tuple[Observation, IntArray | None]:
         """Decide on an option if none goes on.
 
@@ -94,7 +96,7 @@ class Leader:
         self._duration += 1
         return observation, options.joint_action()
 
-    def _decide(self, options: Options, *, explore: bool) -> int:
+    def _decide(self, options: LeaderOptions, *, explore: bool) -> int:
         """Return an option; a leader that learns has first learned from the last one."""
         if not self.agents:
             return options.rule()
@@ -108,7 +110,7 @@ class Leader:
         self._decided = observation, action, inputs
         return int(action[0])
 
-    def learn(self, options: Options, experience: Experience) -> None:
+    def learn(self, options: LeaderOptions, experience: Experience) -> None:
         """Add the mean reward of a step below, and learn if the episode ends with it.
 
         A lost task is terminal to the leader. A terminal reward repeats forever if the state does.

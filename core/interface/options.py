@@ -8,24 +8,21 @@ they observe, or a given skill acts for them.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
 
 from ..numerics import FloatArray, IntArray
+from ..plugins.settings import PartSettings
 from .spaces import ActionSet, StateSpace
 
-if TYPE_CHECKING:
-    from ..learners.fitted_q import FittedQSettings
 
-
-class Options(ABC):
+class LeaderOptions(ABC):
     """Options of the leader in one scenario, see `Scenario.options`."""
 
     state_space: StateSpace
     """Variables of the leader."""
     action_set: ActionSet
     """Names of the options."""
-    learner: FittedQSettings | None
-    """Settings of a leader that learns; None for a leader by rule."""
+    learner: PartSettings | None
+    """Settings of a leader that learns, `FittedQSettings`; None for a leader by rule."""
     limit: int
     """Number of decisions of the agents below after which an option ends."""
 

@@ -26,7 +26,7 @@ from .spaces import ActionSet, StateSpace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .options import Options
+    from .options import LeaderOptions
 
 Twists = FloatArray | Callable[[], FloatArray | None] | None
 """Twists of a transition, a function that measures them, or None."""
@@ -178,7 +178,7 @@ class Scenario(ABC):
     agents take the neutral action, or the same action again if `repeats` is true."""
     repeats: bool = False
     """Whether predictions assume that all agents repeat their first action."""
-    options: Options | None = None
+    options: LeaderOptions | None = None
     """Options of a leader above the agents; None without a leader."""
     recorded: tuple[str, ...] = ()
     """Names of the recorded measurements, one array ``(T + 1, ...)`` each."""

@@ -106,7 +106,7 @@ class BoxPushingSettings(BoxTaskSettings):
     """The box-pushing scenario (Section IX)."""
 
     kind: Literal["box-pushing"] = "box-pushing"
-    factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
+    factory: ClassVar[str] = f"{__package__}.leading:built"
     state_space: Annotated[
         Literal["paper", "paper-box", "relational", "pose", "crowd", "wide"] | tuple[str, ...],
         names_of(STATE_VARIABLES),

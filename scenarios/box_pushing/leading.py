@@ -9,17 +9,16 @@ agents below. Then the robots walk around the box to the next side, a given skil
 from __future__ import annotations
 
 from math import atan2, cos, pi, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.interface.options import Options
+from ...core.interface.options import LeaderOptions
 from ...core.interface.spaces import ActionSet, StateSpace, Variable
 from ...core.numerics import FloatArray, IntArray, wrap_one
+from .config import BoxPushingSettings
+from .measurements import MEASURES, OPTIONS
+from .scenario import BoxPushing
 from .walking import Walk, poses_in_box, sides_of
-
-if TYPE_CHECKING:
-    from .scenario import BoxPushing
 
 MAX_STRAIGHT_RAD = 0.35
 """Angle of the goal off the side pushed beyond which the rule pushes from a second side, about 20
@@ -39,7 +38,7 @@ of a straight push, both from the box, and the distance of the box from the goal
 ACTIONS = ActionSet(("straight", "second side"), (1.0, 1.0), (0.0, 0.0), neutral=0)
 
 
-class BoxOptions(Options):
+class BoxOptions(LeaderOptions):
     """Options of a leader of box pushing.
 
     Parameters
@@ -102,7 +101,8 @@ class BoxOptions(Options):
                 self._heading = turn + self._sides[side].direction
                 waypoint = x + way * cos(self._heading), y + way * sin(self._heading)
                 aim = np.array([*waypoint, aim[2]])
-        return self._scenario.aim_at(aim)
+        self._scenario.aim = aim
+        return self._scenario.states_at_rest()
 
     def advance(self) -> bool:
         """Return whether the option goes on; begin to walk if the box is at the waypoint."""
@@ -145,3 +145,33 @@ class BoxOptions(Options):
         """Return the length of the push after which the other side leads to the goal [m]."""
         between = wrap_one(self._sides[other].direction - self._sides[side].direction)
         return self._scenario.distance * sin(between - self._angle(side)) / sin(between)
+
+
+class LedBoxPushing(BoxPushing):
+    """Box pushing with a leader above all wheels."""
+
+    has_leader = True
+    measures = (*MEASURES, OPTIONS)
+
+    def __init__(self, settings: BoxPushingSettings) -> None:
+        super().__init__(settings)
+        self._options = BoxOptions(self)
+        self.options = self._options
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Start an episode, see `BoxPushing.reset`."""
+        self._options.reset()
+        return super().reset(seed, episode)
+
+    def environments(self, count: int) -> None:
+        """Return None: a leader leads in one environment."""
+
+    def _measured(self, distance: float, orientation: float) -> dict[str, object]:
+        options = {"options": self._options.count}
+        return super()._measured(distance, orientation) | options
+
+
+def built(settings: BoxPushingSettings) -> BoxPushing:
+    """Return the scenario of the settings, with or without a leader."""
+    kind = BoxPushing if settings.leader.policy == "none" else LedBoxPushing
+    return kind(settings)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -22,8 +22,7 @@ from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, stream_of, working_seconds, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
-from .leading import BoxOptions
-from .measurements import MEASURES, OPTIONS
+from .measurements import MEASURES
 from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap, model_of
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
@@ -71,11 +70,17 @@ class BoxPushing(Scenario, Embodiment):
     """
 
     measures: tuple[Measure, ...] = MEASURES
-    options: BoxOptions | None = None
+    has_leader: ClassVar[bool] = False
+    """Whether there is a leader above the agents, see `leading`."""
     recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
         expect("settings of box pushing", BoxPushingSettings, settings=settings)
+        if settings.leader.policy != "none" and not self.has_leader:
+            raise ValueError(
+                f"scenario.leader.policy = {settings.leader.policy!r}: a leader is part of a team; "
+                "build the scenario by settings.build(), or leave out leader"
+            )
         self.settings = settings
         self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
@@ -128,9 +133,6 @@ class BoxPushing(Scenario, Embodiment):
             horizon=settings.prediction_horizon * CONTROL_PERIOD,
         )
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        if settings.leader.policy != "none":
-            self.options = BoxOptions(self)
-            self.measures = (*MEASURES, OPTIONS)
         # Robots that do not fit around the box are refused now, not in the middle of a study.
         BoxPushing.reset(self, 0)
 
@@ -163,28 +165,18 @@ class BoxPushing(Scenario, Embodiment):
         robots, box, self.goal = place(start, rng, self.world.robots, self.box, self._unit)
         self.aim = self.goal
         self.world.place(robots, box)
-        self._speeds: FloatArray = np.zeros(len(self.agents))
+        self.commanded_speeds: FloatArray = np.zeros(len(self.agents))
+        """Commanded speeds ``(n,)`` of all wheels [m/s]."""
         self._step = 0
         self._failures.begin(seed, episode)
         self.world.set_grip(self._failures.grip)
-        if self.options is not None:
-            self.options.reset()
         self._save()
-        return self._states()
+        return self.states_at_rest()
 
-    def aim_at(self, aim: FloatArray) -> FloatArray:
-        """Return the states ``(n, d)`` of agents for which a pose ``(3,)`` replaces the goal."""
-        self.aim = aim
-        return self._states()
-
-    def _states(self) -> FloatArray:
-        """Return the states ``(n, d)`` at rest."""
-        return self.states_at(self._present(self.world.box_pose), self._speeds[None])[0]
-
-    @property
-    def wheel_speeds(self) -> FloatArray:
-        """``(M, w)`` commanded wheel speeds by robot [m/s]."""
-        return self._speeds.reshape(len(self.groups), -1)
+    def states_at_rest(self) -> FloatArray:
+        """Return the states ``(n, d)`` of all agents if the box has not moved."""
+        present = self._present(self.world.box_pose)
+        return self.states_at(present, self.commanded_speeds[None])[0]
 
     def commanded(self, speeds: FloatArray, joint_actions: IntArray) -> FloatArray:
         """Return the wheel speeds ``(..., n)`` that joint actions command, given those before."""
@@ -192,13 +184,13 @@ class BoxPushing(Scenario, Embodiment):
 
     def step(self, joint_action: IntArray) -> Transition:
         """Command the wheels, simulate one decision period, observe and reward."""
-        self._speeds = self.commanded(self._speeds, joint_action)
+        self.commanded_speeds = self.commanded(self.commanded_speeds, joint_action)
         before = self.world.poses
         begin = working_seconds()
-        self._advance(self._speeds)
+        self._advance(self.commanded_speeds)
         moved = working_seconds()
         present = self._present(before[0])
-        states = self.states_at(present, self._speeds[None])[0]
+        states = self.states_at(present, self.commanded_speeds[None])[0]
         readings = self.world.infrared()
         if self._is_noisy:
             readings = self.settings.infrared.noisy(readings, self._sensing)
@@ -224,11 +216,10 @@ class BoxPushing(Scenario, Embodiment):
         return Transition(states, received, terminated, truncated, measured, twists)
 
     def environments(self, count: int) -> BoxEnvironments | None:
-        """Return a batch; None with failures, noise, a leader or user-defined variables."""
+        """Return a batch of environments; None with failures, noise or user-defined variables."""
         settings = self.settings
         is_noisy = settings.failures or settings.infrared.noise or self._playground is not None
-        is_single = is_noisy or self.options is not None
-        if is_single or not self.space.is_built_in or step_address() is None:
+        if is_noisy or not self.space.is_built_in or step_address() is None:
             return None
         return BoxEnvironments(self, count)
 
@@ -248,7 +239,7 @@ class BoxPushing(Scenario, Embodiment):
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),
             self.aim,
-            self._speeds,
+            self.commanded_speeds,
             tuple(effects),
         )
         model = self._model if constants is None else model_of(self._belief, constants)
@@ -321,7 +312,7 @@ class BoxPushing(Scenario, Embodiment):
             "robot_poses": self.world.robot_poses.copy(),
             "box_pose": self.world.box_pose.copy(),
             "goal_pose": self.goal,
-            "wheel_speeds": self._speeds,
+            "wheel_speeds": self.commanded_speeds,
             "contact": self.world.contact.copy(),
             "contact_time": times.copy(),
             "contact_fraction": float(np.add.reduce(times) / len(times)),
@@ -330,7 +321,6 @@ class BoxPushing(Scenario, Embodiment):
             "orientation_rad": orientation,
             "orientation_error_rad": abs(orientation),
             "stopped_at_goal": False,
-            "options": 0 if self.options is None else self.options.count,
         }
 
     def _advance(self, commands: FloatArray) -> None:

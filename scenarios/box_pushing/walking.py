@@ -9,18 +9,16 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import atan2, cos, hypot, sin
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from shapely.geometry.polygon import orient
 
 from ...core.numerics import FloatArray, IntArray, njit, wrap, wrap_one
 from ..angles import angle_of, rotate
+from .scenario import BoxPushing
 from .world.boxes import BoxSpec
 from .world.robots import nominal_effect, side_actions
-
-if TYPE_CHECKING:
-    from .scenario import BoxPushing
 
 Pose = tuple[float, float, float]
 """Position [m, m] and heading [rad], or other three numbers of a robot."""
@@ -36,7 +34,7 @@ STANDING = 0.1, 0.03, 0.6
 """Largest way [m], distance from the curve [m] and angle [rad] of a robot that stands."""
 
 
-class Side(NamedTuple):
+class HullSide(NamedTuple):
     """A side of the convex hull of a box, in the frame of the box."""
 
     direction: float
@@ -73,7 +71,7 @@ class Wheels(NamedTuple):
     """Radius of the robot [m]."""
 
 
-def sides_of(box: BoxSpec) -> list[Side]:
+def sides_of(box: BoxSpec) -> list[HullSide]:
     """Return the sides of the convex hull of a box, counterclockwise.
 
     Raises
@@ -89,7 +87,7 @@ def sides_of(box: BoxSpec) -> list[Side]:
         along = b - a
         middle = (a + b) / 2
         direction = atan2(along[0], -along[1])
-        sides.append(Side(direction, (middle[0], middle[1]), hypot(*along) / 2))
+        sides.append(HullSide(direction, (middle[0], middle[1]), hypot(*along) / 2))
     return sides
 
 
@@ -121,7 +119,7 @@ class Walk:
         The side that the robots leave, and the side to which they walk.
     """
 
-    def __init__(self, scenario: BoxPushing, side: Side, destination: Side) -> None:
+    def __init__(self, scenario: BoxPushing, side: HullSide, destination: HullSide) -> None:
         self._scenario = scenario
         robot = scenario.robot
         actions = scenario.action_set
@@ -152,7 +150,7 @@ class Walk:
         left = np.mod(self._sense * (self._middle - ways) + 0.25 * length, length)
         order: IntArray = np.argsort(left)
         self._places[order, 0] = np.mod(self._middle + self._sense * self._spread, length)
-        speeds = self._scenario.wheel_speeds
+        speeds = self._scenario.commanded_speeds.reshape(len(poses), -1)
         actions = walk(order, poses, speeds, self._places, self._path, self._wheels)
         return self._choices[actions].ravel()
 
