@@ -119,8 +119,17 @@ def checked_reward(reward: object, agents: Sequence[str]) -> float | FloatArray:
     return array if array.ndim else array.item()
 
 
+class Regression(NamedTuple):
+    """Symmetry of a linear regression: signs of its quantities in a mirror image."""
+
+    features: FloatArray
+    """``(f,)`` 1 or -1."""
+    targets: FloatArray
+    """``(t,)`` 1 or -1."""
+
+
 class Embodiment(ABC):
-    """Bodies with actuators, for self-models and calibration."""
+    """Bodies with actuators, for self-models, calibration and learned models of poses."""
 
     nominal_effects: tuple[FloatArray, ...]
     """Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body."""
@@ -129,6 +138,22 @@ class Embodiment(ABC):
     levers: FloatArray = np.zeros(0)
     """``(K + M,)`` speed per turning rate of moved objects and of bodies [m], with constants
     only."""
+
+    regressions: tuple[Regression, ...] = ()
+    """Linear regressions that predict poses; empty if `predict_poses` is not supported."""
+
+    def predict_poses(self, weights: Sequence[FloatArray], decisions: int) -> EmbodiedPrediction:
+        """Return the prediction by the weights ``(f, t)`` of all regressions.
+
+        The first joint action is held for a number of decisions.
+        """
+        raise TypeError(f"{type(self).__name__} predicts no poses by regression")
+
+    def pose_experience(
+        self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return features ``(m, f)`` and targets ``(m, t)`` of all regressions for one decision."""
+        raise TypeError(f"{type(self).__name__} predicts no poses by regression")
 
     @abstractmethod
     def predict_with(

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Generic, Self, TypeVar
 
+from ..interface.experience import Observation
 from ..interface.prediction import Prediction
 from ..interface.scenario import Transition
 from ..numerics import FloatArray, IntArray
@@ -14,11 +15,11 @@ P = TypeVar("P", bound=Prediction)
 
 
 class DynamicsModel(ABC):
-    """Predicts from states alone, instead of the scenario."""
+    """Predicts instead of the scenario."""
 
     @abstractmethod
-    def predict(self, states: FloatArray) -> Prediction:
-        """Predict from states ``(n, d)``."""
+    def predict(self, seen: Observation) -> Prediction:
+        """Predict from an observation."""
 
 
 class Adaptive(ABC, Generic[P]):

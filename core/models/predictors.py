@@ -20,6 +20,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from ..interface.experience import Observation
 from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray, IntArray, njit
@@ -67,8 +68,22 @@ class LearnedPredictorSettings(PartSettings):
     declares a mirror symmetry."""
 
 
+class PosePredictorSettings(PartSettings):
+    """A model of poses learned online: outlines and kinematics are known, contacts are not."""
+
+    kind: Literal["poses"] = "poses"
+    factory: ClassVar[str] = f"{__package__}.pose_model:PoseModel"
+    horizon: Annotated[int, Field(ge=1, le=50)] = 4
+    """Number of decisions to predict; the first joint action is held."""
+    ridge: Positive = 0.001
+    """Penalty on squared weights, relative to squared errors [m2/s2]."""
+    mirrored: bool = True
+    """Whether to learn from the mirror image of every step, too."""
+
+
 Predictor = Annotated[
-    GivenPredictor | StaticPredictor | LearnedPredictorSettings, Field(discriminator="kind")
+    GivenPredictor | StaticPredictor | LearnedPredictorSettings | PosePredictorSettings,
+    Field(discriminator="kind"),
 ]
 """The settings of any predictor, distinguished by ``kind``."""
 
@@ -79,9 +94,9 @@ class Persistence(DynamicsModel):
     def __init__(self, settings: StaticPredictor, scenario: Scenario) -> None:
         pass
 
-    def predict(self, states: FloatArray) -> StaticPrediction:
-        """Predict from states ``(n, d)``."""
-        return StaticPrediction(states)
+    def predict(self, seen: Observation) -> StaticPrediction:
+        """Predict from the present states."""
+        return StaticPrediction(seen.present)
 
 
 class StaticPrediction(Prediction):

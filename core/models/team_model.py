@@ -83,7 +83,7 @@ class TeamModel:
         if seen.imagined is not None:
             return seen.imagined
         if self.predictor is not None:
-            return self.predictor.predict(seen.present)
+            return self.predictor.predict(seen)
         if self.self_model is None and self.calibration is None and errors is None:
             return _checked(seen.scenario.predict())
         bodies = seen.scenario.embodiment()

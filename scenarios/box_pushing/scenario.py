@@ -7,6 +7,7 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.interface.environments import Transitions
-from ...core.interface.prediction import Prediction
+from ...core.interface.prediction import EmbodiedPrediction, Prediction
 from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
@@ -23,10 +24,12 @@ from ...core.numerics import FloatArray, IntArray, stream_of, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES
-from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap, model_of
+from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap, model_of
+from .prediction.poses import REGRESSIONS, Bodies, LearnedPush, push_experience
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
+from .prediction.twists import mean_twists
 from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
 from .states.variables import progress_of
@@ -70,6 +73,7 @@ class BoxPushing(Scenario, Embodiment):
     """
 
     measures = MEASURES
+    regressions = REGRESSIONS
     recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
@@ -236,6 +240,27 @@ class BoxPushing(Scenario, Embodiment):
             self._playground, self._saved, self._failures, self._step, self.settings.action_repeat
         )
         return ExactPrediction(situation, model, self._prediction, future)
+
+    def predict_poses(self, weights: Sequence[FloatArray], decisions: int) -> BoxPrediction:
+        """Predict by learned pushing, see `box_pushing.prediction.poses`."""
+        present = BoxPushing.predict(self).situation
+        model = self._model._replace(learned=LearnedPush(self._period, *weights))
+        settings = replace(self._prediction, horizon=decisions * self._period)
+        return BoxPrediction(present, model, settings)
+
+    def pose_experience(
+        self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return features and targets of the twist of the box and of the robots' deflections."""
+        assert isinstance(prediction, BoxPrediction)
+        before = np.vstack([prediction.situation.box, prediction.situation.robots])
+        after = np.vstack([transition.info["box_pose"], transition.info["robot_poses"]])
+        bodies = Bodies(self._model.shape, self._model.radii)
+        commands = prediction.twists(joint_action)
+        of_box, motion, of_robots, deflections = push_experience(
+            before, after, commands, self._period, bodies
+        )
+        return [(of_box, motion), (of_robots, deflections)]
 
     def with_exact_prediction(self) -> BoxPushing:
         """Return an equal scenario that predicts one decision period by simulation."""

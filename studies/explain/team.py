@@ -22,6 +22,7 @@ from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import PolicyMap, Scenario
 from ...core.interface.spaces import Variable
 from ...core.models.learned_predictor import LearnedPredictor
+from ...core.models.pose_model import PoseModel
 from ...core.numerics import FloatArray, IntArray
 from ...core.values.rule_base import RuleBase
 from ...scenarios.checking.predictions import state_differences
@@ -200,7 +201,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
     """
     agents = team.parts[0]
     predictor = agents.model.predictor if isinstance(agents, FuzzyAgents) else None
-    if not isinstance(predictor, LearnedPredictor):
+    if not isinstance(predictor, LearnedPredictor | PoseModel):
         return None
     horizon = predictor.horizon
     errors: defaultdict[str, list[FloatArray]] = defaultdict(list)
@@ -209,8 +210,9 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         states = scenario.reset(world, episode)
         team.reset(world, episode)
         for _ in range(DECISIONS):
-            joint = team.act(Observation(states, scenario), explore=False).joint_action
-            guesses = {"learned": _states(predictor.predict(states), joint), "persistence": states}
+            seen = Observation(states, scenario)
+            joint = team.act(seen, explore=False).joint_action
+            guesses = {"learned": _states(predictor.predict(seen), joint), "persistence": states}
             given = scenario.predict() if scenario.horizon == horizon else None
             if given is not None:
                 guesses["given"] = _states(given, joint)

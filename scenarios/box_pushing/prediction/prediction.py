@@ -23,9 +23,10 @@ from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
 from ..world.reward import Task, reward
 from ..world.settings import InfraredSettings
-from .calibration import PushBelief, mean_twists, outcomes
+from .calibration import PushBelief, outcomes
 from .push import PushModel, push
 from .responses import Outlook, respond
+from .twists import mean_twists
 from .wheel_commands import WheelCommands, robot_actions, speeds_of, twist_table, wheel_commands_of
 
 CONTACT_GAP_M = 0.002
@@ -267,7 +268,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         actions = self._robot_actions(joint_action[None])
         return speeds_of(actions, self.wheel_commands.speeds)[:, 0]
 
-    def _twists(self, joint_action: IntArray) -> FloatArray:
+    def twists(self, joint_action: IntArray) -> FloatArray:
         """Return the commanded twists ``(M, 3)`` of a joint action ``(n,)``."""
         actions = self._robot_actions(joint_action[None])[:, 0]
         return self.wheel_commands.twists[np.arange(len(actions)), actions]
@@ -276,13 +277,13 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         """Return the predicted change of the robots' mean twists by contact, ``(M, 3)``."""
         after = self.poses(joint_action[None]).robots[:, :, 0]
         moved = mean_twists(self.situation.robots, after, self.settings.period)
-        return moved - self._twists(joint_action)
+        return moved - self.twists(joint_action)
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return mean twists ``(k, M + 1, 3)``, the box's first, under constants ``(k, 3)``."""
         now = self.situation
         period = self.settings.period
-        twists = self._twists(joint_action)
+        twists = self.twists(joint_action)
         constants = np.ascontiguousarray(constants)
         return outcomes(now.robots, now.box, twists, period, self.settings.belief, constants)
 

@@ -24,6 +24,7 @@ import numpy as np
 from ....core.numerics import BoolArray, FloatArray, IntArray, njit
 from ...angles import cos_sin, rotate
 from ..world.geometry import LANES, NEAREST, ON_SURFACE_M, BoxShape, block_of, nearest_points
+from .poses import NOTHING_LEARNED, Bodies, LearnedPush, push_by_weights
 
 SUBSTEPS = 4
 SWEEPS = 4
@@ -77,6 +78,8 @@ class PushModel(NamedTuple):
     """Maximum ground friction of the box, F [N]."""
     contact_friction: float
     """Coefficient of friction between robot and box."""
+    learned: LearnedPush = NOTHING_LEARNED
+    """Learned weights that replace all constants but the geometry, see `poses`."""
 
 
 @njit(cache=True)
@@ -110,6 +113,10 @@ def push(
     robots, box, gaps : FloatArray
         Robot poses ``(M, 3, m)``, box poses ``(3, m)`` and gaps ``(M, m)`` [m].
     """
+    if model.learned.period > 0.0:
+        decisions = round(seconds / model.learned.period)
+        bodies = Bodies(model.shape, model.radii)
+        return push_by_weights(robots, box, twists, choices, decisions, bodies, model.learned)
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     bodies, boxes, blocks = np.zeros(n, ROBOT), np.zeros(1, BOX), np.zeros(1, NEAREST)
