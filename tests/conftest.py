@@ -22,9 +22,9 @@ from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, labe
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parent)]
 
-# The first example of a test may compile a kernel.
-settings.register_profile("no deadline", deadline=None)
-settings.load_profile("no deadline")
+# The first example of a test may compile a kernel. CI draws the same examples each time.
+settings.register_profile("toolkit", deadline=None, derandomize=bool(os.environ.get("CI")))
+settings.load_profile("toolkit")
 
 
 def decode(codes: np.ndarray, n_agents: int, n_actions: int) -> np.ndarray:

@@ -137,6 +137,10 @@ def parse(text: str | Mapping[str, object]) -> TopologySettings:
         if sources.is_file(text):
             return TOPOLOGIES.parsed("file", path=text)
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
+            reference, _, suffix = text.rpartition(":")
+            if ".py:" in reference and suffix:
+                table = f'{{ kind = "{reference}", PARAMETER = VALUE }}'
+                raise ValueError(f"a function has its parameters in a table of the spec: {table}")
             return TOPOLOGIES.parsed(text)
     except SettingsError as error:
         raise ValueError(f"topology {text!r}: {error.problem}") from None

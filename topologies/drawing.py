@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
@@ -22,10 +25,10 @@ from ..core.numerics import FloatArray, nx
 COLUMNS = 6
 """Levels in a row before the picture is folded."""
 WIDTH = 1.25
-HEIGHT = 0.3
+HEIGHT = 0.32
 """Size of an agent [in]."""
 ACROSS = 1.7
-DOWN = 0.44
+DOWN = 0.46
 """Distance of columns and of rows [in]."""
 BODY_COLORS = (
     "#cfe2f3",
@@ -38,6 +41,14 @@ BODY_COLORS = (
     "#d9d2e9",
 )
 """Colors of agents by body; further bodies use them again."""
+FONT_SIZE = 8.0
+"""Size of names and notes [pt]."""
+MAX_CHARACTERS = 14
+"""Characters of a name that fit into a line of an agent; a name has two lines at most."""
+CHARACTERS_PER_INCH = 16
+"""Characters of a note that fit into an inch."""
+LUMINANCE = np.array([0.299, 0.587, 0.114])
+"""Weights of red, green and blue (ITU-R BT.601)."""
 
 
 def draw(
@@ -99,36 +110,44 @@ def picture(
     places = positions(hierarchy)
     low = places.min(axis=0)
     high = places.max(axis=0)
-    width, height = high - low + (WIDTH + 0.6, HEIGHT + 1.1)
+    # Edges that change neither ancestors nor descendants.
+    implied = set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
+    head = 0.65 if title else 0.25
+    width, height = high - low + (WIDTH + 0.6, HEIGHT + head + 0.35)
     width = max(width, 4.5, 0.09 * len(title))
+    notes = [*_notes(hierarchy, bodies), *[note] * bool(note)]
+    notes += ["gray arrows: implied by the others"] * bool(implied)
+    notes += ["dashed frame: messages fail"] * bool(failing)
+    legend = wrap("; ".join(notes), int(CHARACTERS_PER_INCH * width))
+    height += 0.15 * len(legend)
     center = (low[0] + high[0]) / 2
     figure = Figure(figsize=(width, height))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.set_xlim(center - width / 2, center + width / 2)
-    top = low[1] - HEIGHT / 2 - 0.65
+    top = low[1] - HEIGHT / 2 - head
     axes.set_ylim(top + height, top)
-    # Edges that change neither ancestors nor descendants.
-    implied = set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
     _arrows(axes, hierarchy, places, implied)
     body_of = {i: number for number, members in enumerate(bodies or []) for i in members}
     body_fills = [BODY_COLORS[body_of.get(i, 0) % len(BODY_COLORS)] for i in range(len(hierarchy))]
     _agents(axes, hierarchy, places, fills or body_fills, failing)
+    axes.text(center, top + 0.27, title, fontsize=10, ha="center", va="center", parse_math=False)
+    axes.text(
+        center, top + height - 0.1, "\n".join(legend),
+        fontsize=FONT_SIZE, color="#444444", ha="center", va="bottom",
+    )  # fmt: skip
+    return figure
+
+
+def _notes(hierarchy: Hierarchy, bodies: Sequence[Sequence[int]] | None) -> list[str]:
+    """Return the meaning of numbers, lines, colors and styles of arrows."""
     notes = ["numbers: decision order"]
     if hierarchy.neighbors:
         notes = ["lines: neighbors, which decide at the same time"]
     elif bodies and max(map(len, bodies)) > 1:
         notes.append("colors: bodies")
-    notes += [note] * bool(note)
-    notes += ["gray arrows: implied by the others"] * bool(implied)
     styles = {_style(hierarchy, edge)[1] for edge in hierarchy.edges} - {""}
-    notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
-    axes.text(center, top + 0.27, title, fontsize=10, ha="center", va="center")
-    bottom = top + height - 0.17
-    axes.text(
-        center, bottom, "; ".join(notes), fontsize=7.5, color="#555555", ha="center", va="center"
-    )
-    return figure
+    return [*notes, *sorted(styles)]
 
 
 def positions(hierarchy: Hierarchy) -> FloatArray:
@@ -217,7 +236,6 @@ def _agents(
 ) -> None:
     for rank, i in enumerate(hierarchy.order, 1):
         x, y = places[i]
-        name = hierarchy.agents[i]
         corner = x - WIDTH / 2 + 0.05, y - HEIGHT / 2 + 0.05
         box = FancyBboxPatch(
             corner,
@@ -231,7 +249,22 @@ def _agents(
             zorder=3,
         )
         axes.add_patch(box)
-        size = min(8.5, 8.5 * 15 / len(name))
-        left = x - WIDTH / 2 + 0.07
-        axes.text(left, y, str(rank), fontsize=6.5, va="center", color="#777777", zorder=4)
-        axes.text(x + 0.06, y, name, fontsize=size, ha="center", va="center", zorder=4)
+        ink = "black" if np.array(to_rgb(fills[i])) @ LUMINANCE > 0.5 else "white"
+        style: dict[str, Any] = {"fontsize": FONT_SIZE, "va": "center", "color": ink, "zorder": 4}
+        axes.text(x - WIDTH / 2 + 0.07, y, str(rank), **style)
+        name = axes.text(x + 0.08, y, _in_two_lines(hierarchy.agents[i]), ha="center", **style)
+        name.set(linespacing=1.0, parse_math=False)
+
+
+def _in_two_lines(name: str) -> str:
+    r"""Return a name in at most two lines, without its middle if it is too long.
+
+    >>> _in_two_lines("robot1.left"), _in_two_lines("north.junction12")
+    ('robot1.left', 'north.ju\nnction12')
+    """
+    if len(name) <= MAX_CHARACTERS:
+        return name
+    if len(name) <= 2 * MAX_CHARACTERS:
+        half = -(-len(name) // 2)
+        return f"{name[:half]}\n{name[half:]}"
+    return f"{name[: MAX_CHARACTERS - 1]}…\n{name[-MAX_CHARACTERS:]}"

@@ -166,6 +166,9 @@ class TDLambdaSettings(LearnerSettings):
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
     """Number of updates over which the agents average the learned weights to decide; 1: none."""
+    initial_weight: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    """Consequent weight of every rule before learning. With ``order = "full"`` it is the value of
+    every state; above attainable values it favors states that were not visited."""
     reward_of: Literal["left", "entered"] = "left"
     """Reward R in Eq. 7: that of the state left, s_previous, as printed; or that of the state
     entered, as in Section V, where rewards are computed after the move."""
@@ -198,10 +201,22 @@ class TDLambda(Online):
     def __init__(self, settings: TDLambdaSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
         self.reward_of = settings.reward_of
+        self.theta += settings.initial_weight
         self.updates: FloatArray = np.zeros(())
+        self._entered: tuple[IntArray, FloatArray] | None = None
         if settings.averaging > 1:
-            self.weights = np.zeros_like(self.theta)
+            self.weights = self.theta.copy()
             self.kept = (*self.kept, "weights", "updates")
+
+    def begin_episode(self) -> None:
+        """Clear the traces."""
+        super().begin_episode()
+        self._entered = None
+
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        super().load_state_dict(state)
+        self._entered = None
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         lengths: FloatArray = np.ones(len(states))
@@ -210,8 +225,10 @@ class TDLambda(Online):
         discount = 0.0 if entered is None else self.discount
         step_sizes = self.settings.step_size / lengths
         decay = self.discount * self.settings.trace_decay
-        active = self.rules.active(states)
+        # The states left are those entered before: their features are computed once.
+        active = self._entered or self.rules.active(states)
         active_next = active if entered is None else self.rules.active(entered)
+        self._entered = active_next
         constants = discount, step_sizes, decay
         td_lambda_update(
             self.weights, self.rows, self.trace, active, active_next, rewards, constants

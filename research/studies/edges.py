@@ -73,7 +73,7 @@ def check(spec: Spec) -> None:
 
 def measure(trial: Trial) -> TrialResult:
     """Train a team, let it act under all hierarchies; imported by name in workers."""
-    session = Session.compiled(trial)
+    session = Session(trial)
     session.train(trial.episodes)
     deciding: dict[str, list[float]] = {n: [] for n in (TRAINED, *dict(trial.evaluations))}
 

@@ -46,7 +46,7 @@ def stops(episodes: int) -> list[int]:
 
 def measure(trial: Trial) -> TrialResult:
     """Train, with evaluations on the way; imported by name in workers."""
-    session = Session.compiled(trial)
+    session = Session(trial)
     done = 0
     seconds = 0.0
     usage = {}

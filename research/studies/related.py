@@ -58,7 +58,7 @@ def check(spec: Spec) -> None:
 
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and count what it takes; imported by name in workers."""
-    session = Session.compiled(trial)
+    session = Session(trial)
     session.train(trial.episodes)
     team = session.team.only(FuzzyAgents)
     hierarchy = team.hierarchy

@@ -9,6 +9,8 @@ from functools import cached_property
 from itertools import permutations
 from typing import NamedTuple
 
+from ..laws.inference import sign_change
+from ..laws.universal import MIN_SIZES, Speedup, UniversalLaw, fit_universal_law, speedups
 from ..results.analysis import Summary
 from ..results.notation import format_estimate, format_number
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
@@ -21,8 +23,6 @@ from .fronts import (
     parse_budget,
     probability_of_best,
 )
-from .inference import sign_change
-from .laws import MIN_SIZES, Speedup, UniversalLaw, fit_universal_law, speedups
 
 LIKELY = 0.5
 """Probability above which a sentence names a best size or a member of a front."""
@@ -298,7 +298,10 @@ def _place(law: UniversalLaw, largest: float, size: str) -> str:
             f"{math.floor(low)} {size}"
         )
     if math.isinf(high):
-        return f"the throughput is at its maximum from {math.floor(low)} {size} on, no upper bound"
+        return (
+            f"the throughput is at its maximum with {math.floor(low)} {size} or more; these seeds "
+            "give no upper bound"
+        )
     return f"the throughput is at its maximum with {format_estimate(law.best_size)} {size}"
 
 

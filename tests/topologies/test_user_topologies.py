@@ -122,6 +122,11 @@ def test_a_file_may_have_dataclasses_and_postponed_annotations(written) -> None:
     assert build(parse(text), AGENTS).edges == ((0, 1),)
 
 
+def test_a_parameter_after_a_colon_is_refused_with_the_table_that_sets_it() -> None:
+    with pytest.raises(ValueError, match=r"mine\.py:f:3.*\{ kind = \"mine\.py:f\", PARAMETER"):
+        parse("mine.py:f:3")
+
+
 @pytest.mark.parametrize("text", ["mine.py:", "mine.py:2f"])
 def test_a_source_must_name_file_and_function(text: str) -> None:
     with pytest.raises(ValueError, match=r"must be written path/to/file\.py:name"):

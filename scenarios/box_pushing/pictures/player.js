@@ -255,7 +255,8 @@
     pause();
     options(at("seed"), distinct(chosen("condition"), "seed"));
     const numbers = distinct(chosen("condition", "seed"), "number");
-    options(at("episode"), numbers, (n) => (numbers.length < 2 ? String(n) : n === numbers[0] ? `${n} (first)` : `${n} (last)`));
+    const places = new Map([[numbers[0], " (first)"], [numbers.at(-1), numbers.length > 1 ? " (last)" : ""]]);
+    options(at("episode"), numbers, (n) => `${n}${places.get(n) ?? ""}`);
     shown = await unpack(chosen("condition", "seed", "number")[0]);
     scrub.max = shown.steps;
     at("which").textContent = `${shown.condition}, seed ${shown.seed}, training episode ${shown.number}`;

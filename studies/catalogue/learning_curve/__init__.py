@@ -143,7 +143,6 @@ def draw(analysis: Analysis) -> Figures:
         else:
             axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.grid(axis="y", alpha=0.25)
-    for axes in panels.flat[len(followed) - panels.shape[1] : len(followed)]:
         f.as_episodes(axes)
     same = len(set(seeds.values())) == 1
     labels = [c if same else f"{c} ({n} seeds)" for c, n in seeds.items()]

@@ -75,6 +75,20 @@ def test_products_are_added_once_and_in_any_spelling() -> None:
     assert base.features(state)[0, 6:10] == pytest.approx([0.2, 0.6, 0.05, 0.15], abs=1e-15)
 
 
+def test_centers_by_variable() -> None:
+    settings = RuleBaseSettings(memberships=4, centers={"x1": (-2.0, 0.5, 3.0)})
+    base = RuleBase.build(space_of(2), settings)
+    assert [partition.size for partition in base.partitions] == [4, 3]
+    assert base.partitions[1].centers == (-2.0, 0.5, 3.0)
+
+
+@pytest.mark.parametrize("centers", [{"x2": (0.0, 1.0)}, {"x1": (0.0,)}, {"x1": (1.0, 0.0)}])
+def test_unsuitable_centers_are_refused_with_their_key(centers: dict) -> None:
+    (name,) = centers
+    with pytest.raises(ValueError, match=rf"^learner\.rule_base\.centers\.{name}: "):
+        RuleBase.build(space_of(2), RuleBaseSettings(centers=centers))
+
+
 def test_a_variables_own_centers_may_differ_in_number() -> None:
     space = StateSpace(
         "demo",

@@ -12,9 +12,9 @@ import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.laws.scaling import scaling_law
 from nested_agents.studies.presentation.growth import growth_figures
 from nested_agents.studies.results.results import from_arrays
-from nested_agents.studies.results.scaling_law import scaling_law
 from research import RESULTS
 
 SIZES = (2, 4, 8)
@@ -86,6 +86,11 @@ def test_a_predicted_size_out_of_range_is_refused(size) -> None:
         scaling_law(made_up({"chain": 1.0}), "steps", predict=[size])
 
 
+def test_a_truth_value_is_no_size() -> None:
+    with pytest.raises(SpecError, match="predict = True: allowed are sizes from 1"):
+        scaling_law(made_up({"chain": 1.0}), "steps", predict=[True])
+
+
 def test_a_law_beyond_the_range_of_a_measure_is_explained() -> None:
     law = scaling_law(made_up({"chain": 1.0}), "steps", predict=[4, 10**6])
     assert float(law.table[0].estimates["at 4 (90%)"].value) == pytest.approx(40.0)
@@ -143,7 +148,7 @@ def test_seeds_that_agree_do_not_make_a_law_certain() -> None:
 
 def test_figures_of_a_report_are_of_measures_with_a_law() -> None:
     results = made_up({"chain": 3.0, "star": 5.0})
-    assert list(growth_figures(results)) == ["growth of success"]
+    assert list(growth_figures(results)) == ["growth-of-success"]
     assert growth_figures(made_up({"chain": 3.0}, sizes=(2, 4))) == {}
 
 

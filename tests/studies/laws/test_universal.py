@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from nested_agents.studies.results.statistics import Estimate
-from nested_agents.studies.scalability.laws import (
+from nested_agents.studies.laws.universal import (
     Times,
     fit_universal_law,
     serial_fraction,
     speedups,
 )
+from nested_agents.studies.results.statistics import Estimate
 
 SIZES = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
 
