@@ -8,11 +8,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..numerics import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from .scenario import Transition
 
 
 @dataclass(frozen=True)
@@ -179,6 +182,15 @@ class EmbodiedPrediction(Prediction):
         Twists of moved objects come before those of bodies, see `Transition.twists`.
         """
         raise TypeError(f"{type(self).__name__} has no constants")
+
+    def pose_samples(
+        self, joint_action: IntArray, transition: Transition
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return features ``(m, f)`` and targets ``(m, t)`` of all regressions of poses.
+
+        See `Embodiment.regression_shapes`; the transition is that of the joint action ``(n,)``.
+        """
+        raise TypeError(f"{type(self).__name__} has no poses to learn")
 
 
 def first_alike(keys: IntArray | FloatArray) -> IntArray:

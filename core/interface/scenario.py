@@ -119,15 +119,6 @@ def checked_reward(reward: object, agents: Sequence[str]) -> float | FloatArray:
     return array if array.ndim else array.item()
 
 
-class Regression(NamedTuple):
-    """Symmetry of a linear regression: signs of its quantities in a mirror image."""
-
-    features: FloatArray
-    """``(f,)`` 1 or -1."""
-    targets: FloatArray
-    """``(t,)`` 1 or -1."""
-
-
 class Embodiment(ABC):
     """Bodies with actuators, for self-models, calibration and learned models of poses."""
 
@@ -138,22 +129,9 @@ class Embodiment(ABC):
     levers: FloatArray = np.zeros(0)
     """``(K + M,)`` speed per turning rate of moved objects and of bodies [m], with constants
     only."""
-
-    regressions: tuple[Regression, ...] = ()
-    """Linear regressions that predict poses; empty if `predict_poses` is not supported."""
-
-    def predict_poses(self, weights: Sequence[FloatArray], decisions: int) -> EmbodiedPrediction:
-        """Return the prediction by the weights ``(f, t)`` of all regressions.
-
-        The first joint action is held for a number of decisions.
-        """
-        raise TypeError(f"{type(self).__name__} predicts no poses by regression")
-
-    def pose_experience(
-        self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
-    ) -> list[tuple[FloatArray, FloatArray]]:
-        """Return features ``(m, f)`` and targets ``(m, t)`` of all regressions for one decision."""
-        raise TypeError(f"{type(self).__name__} predicts no poses by regression")
+    regression_shapes: tuple[tuple[int, int], ...] = ()
+    """Numbers of features and targets of the regressions that predict poses; empty if poses cannot
+    be learned."""
 
     @abstractmethod
     def predict_with(
@@ -163,6 +141,15 @@ class Embodiment(ABC):
 
         Constants are logarithms of factors on their nominal values.
         """
+
+    def predict_poses(
+        self, effects: Sequence[FloatArray], weights: Sequence[FloatArray], decisions: int
+    ) -> EmbodiedPrediction:
+        """Return the prediction for assumed effects and the weights ``(f, t)`` of all regressions.
+
+        The wheel speeds after the first joint action are held for a number of decisions.
+        """
+        raise TypeError(f"{type(self).__name__} has no poses to learn")
 
 
 class PolicyMap(ABC):

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Generic, Self, TypeVar
 
-from ..interface.experience import Observation
 from ..interface.prediction import Prediction
 from ..interface.scenario import Transition
 from ..numerics import FloatArray, IntArray
@@ -15,11 +14,11 @@ P = TypeVar("P", bound=Prediction)
 
 
 class DynamicsModel(ABC):
-    """Predicts instead of the scenario."""
+    """Predicts from states alone, instead of the scenario."""
 
     @abstractmethod
-    def predict(self, seen: Observation) -> Prediction:
-        """Predict from an observation."""
+    def predict(self, states: FloatArray) -> Prediction:
+        """Predict from states ``(n, d)``."""
 
 
 class Adaptive(ABC, Generic[P]):

@@ -20,7 +20,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..interface.experience import Observation
 from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
 from ..values.partitions import Partition
@@ -131,9 +130,9 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
                 self.divisors = a ** np.arange(n - w, -1, -w)
                 self.local = np.arange(a**n)[:, None] // self.divisors % a**w
 
-    def predict(self, seen: Observation) -> LearnedPrediction:
-        """Predict from the present states."""
-        return (TabulatedPrediction if len(self.joint) else LearnedPrediction)(self, seen.present)
+    def predict(self, states: FloatArray) -> LearnedPrediction:
+        """Predict from states ``(n, d)``."""
+        return (TabulatedPrediction if len(self.joint) else LearnedPrediction)(self, states)
 
     def adapt(
         self, prediction: LearnedPrediction, joint_action: IntArray, transition: Transition

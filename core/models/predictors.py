@@ -20,7 +20,6 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..interface.experience import Observation
 from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray, IntArray, njit
@@ -69,7 +68,11 @@ class LearnedPredictorSettings(PartSettings):
 
 
 class PosePredictorSettings(PartSettings):
-    """A model of poses learned online: outlines and kinematics are known, contacts are not."""
+    """A model of poses learned online, which knows outlines and kinematics of bodies.
+
+    It does not know masses, frictions and stiffness. A self-model may learn the effects of the
+    wheels, too.
+    """
 
     kind: Literal["poses"] = "poses"
     factory: ClassVar[str] = f"{__package__}.pose_model:PoseModel"
@@ -77,8 +80,6 @@ class PosePredictorSettings(PartSettings):
     """Number of decisions to predict; the first joint action is held."""
     ridge: Positive = 0.001
     """Penalty on squared weights, relative to squared errors [m2/s2]."""
-    mirrored: bool = True
-    """Whether to learn from the mirror image of every step, too."""
 
 
 Predictor = Annotated[
@@ -94,9 +95,9 @@ class Persistence(DynamicsModel):
     def __init__(self, settings: StaticPredictor, scenario: Scenario) -> None:
         pass
 
-    def predict(self, seen: Observation) -> StaticPrediction:
-        """Predict from the present states."""
-        return StaticPrediction(seen.present)
+    def predict(self, states: FloatArray) -> StaticPrediction:
+        """Predict from states ``(n, d)``."""
+        return StaticPrediction(states)
 
 
 class StaticPrediction(Prediction):

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.interface.environments import Transitions
-from ...core.interface.prediction import EmbodiedPrediction, Prediction
+from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Embodiment, Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
@@ -24,7 +24,7 @@ from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES
 from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap, model_of
-from .prediction.poses import REGRESSIONS, Bodies, LearnedPush, push_experience
+from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS, LearnedPush
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
@@ -72,7 +72,7 @@ class BoxPushing(Scenario, Embodiment):
     """
 
     measures = MEASURES
-    regressions = REGRESSIONS
+    regression_shapes = tuple((len(signs), len(TWIST_SIGNS)) for signs in (BOX_SIGNS, ROBOT_SIGNS))
     recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
@@ -225,13 +225,7 @@ class BoxPushing(Scenario, Embodiment):
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> BoxPrediction:
         """Predict with the given effects of the wheels and constants of the push."""
-        situation = PresentState(
-            self.world.robot_poses.copy(),
-            self.world.box_pose.copy(),
-            self._goal,
-            self._speeds,
-            tuple(effects),
-        )
+        situation = self._present_state(effects)
         model = self._model if constants is None else model_of(self._belief, constants)
         if self._playground is None or self._saved is None:
             return BoxPrediction(situation, model, self._prediction)
@@ -240,26 +234,23 @@ class BoxPushing(Scenario, Embodiment):
         )
         return ExactPrediction(situation, model, self._prediction, future)
 
-    def predict_poses(self, weights: Sequence[FloatArray], decisions: int) -> BoxPrediction:
+    def predict_poses(
+        self, effects: Sequence[FloatArray], weights: Sequence[FloatArray], decisions: int
+    ) -> BoxPrediction:
         """Predict by learned pushing, see `box_pushing.prediction.poses`."""
-        present = BoxPushing.predict(self).situation
         model = self._model._replace(learned=LearnedPush(self._period, *weights))
         settings = replace(self._prediction, horizon=decisions * self._period)
-        return BoxPrediction(present, model, settings)
+        return BoxPrediction(self._present_state(effects), model, settings)
 
-    def pose_experience(
-        self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
-    ) -> list[tuple[FloatArray, FloatArray]]:
-        """Return features and targets of the twist of the box and of the robots' deflections."""
-        assert isinstance(prediction, BoxPrediction)
-        before = np.vstack([prediction.situation.box, prediction.situation.robots])
-        after = np.vstack([transition.info["box_pose"], transition.info["robot_poses"]])
-        bodies = Bodies(self._model.shape, self._model.radii)
-        commands = prediction.twists(joint_action)
-        of_box, motion, of_robots, deflections = push_experience(
-            before, after, commands, self._period, bodies
+    def _present_state(self, effects: Sequence[FloatArray]) -> PresentState:
+        """Return the current state, with the given effects of the wheels."""
+        return PresentState(
+            self.world.robot_poses.copy(),
+            self.world.box_pose.copy(),
+            self._goal,
+            self._speeds,
+            tuple(effects),
         )
-        return [(of_box, motion), (of_robots, deflections)]
 
     def with_exact_prediction(self) -> BoxPushing:
         """Return an equal scenario that predicts one decision period by simulation."""

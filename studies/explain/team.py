@@ -200,10 +200,10 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         Of the trial.
     """
     agents = team.parts[0]
-    predictor = agents.model.predictor if isinstance(agents, FuzzyAgents) else None
-    if not isinstance(predictor, LearnedPredictor | PoseModel):
+    model = agents.model if isinstance(agents, FuzzyAgents) else None
+    if model is None or not isinstance(model.predictor, LearnedPredictor | PoseModel):
         return None
-    horizon = predictor.horizon
+    horizon = model.predictor.horizon
     errors: defaultdict[str, list[FloatArray]] = defaultdict(list)
     for episode in range(EVALUATION_WORLDS, EVALUATION_WORLDS + EPISODES):
         world = world_seed(seed, episode)
@@ -212,7 +212,9 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         for _ in range(DECISIONS):
             seen = Observation(states, scenario)
             joint = team.act(seen, explore=False).joint_action
-            guesses = {"learned": _states(predictor.predict(seen), joint), "persistence": states}
+            learned = model.predict(seen)
+            assert learned is not None
+            guesses = {"learned": _states(learned, joint), "persistence": states}
             given = scenario.predict() if scenario.horizon == horizon else None
             if given is not None:
                 guesses["given"] = _states(given, joint)

@@ -17,23 +17,24 @@ Known are the outline, the radii and the kinematics; unknown are masses, frictio
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ....core.interface.scenario import Regression
 from ....core.numerics import FloatArray, IntArray, njit
 from ...angles import rotate
-from ..world.geometry import NEAREST, ON_SURFACE_M, BoxShape, nearest_points
+from ..world.geometry import NEAREST, ON_SURFACE_M, nearest_points
 from .twists import Twist, mean_twists, move
+
+if TYPE_CHECKING:
+    from .push import PushModel
 
 TWIST_SIGNS = np.array([1.0, -1.0, -1.0])
 """Signs of speed ahead, speed to the left and turning rate in a mirror image."""
-REGRESSIONS = (
-    Regression(np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0]), TWIST_SIGNS),
-    Regression(np.array([1.0, -1.0, 1.0, -1.0, -1.0, -1.0, 1.0]), TWIST_SIGNS),
-)
-"""Regressions of the twist of the box, and of the deflection of a robot."""
+BOX_SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+"""Signs of the features of the box in a mirror image."""
+ROBOT_SIGNS = np.array([1.0, -1.0, 1.0, -1.0, -1.0, -1.0, 1.0])
+"""Signs of the features of a robot in a mirror image."""
 
 Records = np.ndarray[tuple[int], np.dtype[np.void]]
 """Records of nearest points."""
@@ -53,61 +54,47 @@ class LearnedPush(NamedTuple):
 NOTHING_LEARNED = LearnedPush(0.0, np.zeros((6, 3)), np.zeros((7, 3)))
 
 
-class Bodies(NamedTuple):
-    """Known geometry of robots and box."""
-
-    shape: BoxShape
-    """Outline of the box, and its friction radius rho."""
-    radii: FloatArray
-    """``(M,)`` robot radii [m]."""
-
-
 @njit(cache=True)
 def push_by_weights(
     robots: FloatArray,
     box: FloatArray,
     twists: FloatArray,
     choices: IntArray,
-    decisions: int,
-    bodies: Bodies,
-    learned: LearnedPush,
+    seconds: float,
+    model: PushModel,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Predict poses after some decisions; see `push` for arguments and results."""
+    """Predict poses by learned weights; see `push` for arguments and results."""
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     poses, commands, contacts = np.empty((n + 1, 3)), np.empty((n, 3)), np.empty((n, 8))
     blocks = np.zeros(1, NEAREST)
-    rho = bodies.shape.friction_radius
+    learned, rho = model.learned, model.shape.friction_radius
     for c in range(m):
         poses[0] = box
         poses[1:] = robots
         for r in range(n):
             commands[r] = twists[r, choices[r, c]]
-        for _ in range(decisions):
-            _touch(poses, commands, contacts, blocks, bodies, learned.period)
+        for _ in range(round(seconds / learned.period)):
+            _touch(poses, commands, learned.period, model, blocks, contacts)
             moved = _weighted(_sums(contacts), learned.box)
+            move(poses[0], (moved[0], moved[1], moved[2] / rho), learned.period)
             for r in range(n):
                 x, y, turn = _weighted(_features(contacts[r], moved), learned.robot)
                 command = commands[r]
-                twist = command[0] + x, command[1] + y, command[2] + turn / bodies.radii[r]
+                twist = command[0] + x, command[1] + y, command[2] + turn / model.radii[r]
                 move(poses[r + 1], twist, learned.period)
-            move(poses[0], (moved[0], moved[1], moved[2] / rho), learned.period)
         out_box[:, c] = poses[0]
-        cos, sin = np.cos(poses[0, 2]), np.sin(poses[0, 2])
         for r in range(n):
             out_robots[r, :, c] = poses[r + 1]
-            x, y = poses[r + 1, 0] - poses[0, 0], poses[r + 1, 1] - poses[0, 1]
-            blocks[0].x[0], blocks[0].y[0] = rotate(cos, -sin, x, y)
-            nearest_points(bodies.shape.edges, blocks[0], 1)
-            out_gaps[r, c] = blocks[0].distance[0] - bodies.shape.radius - bodies.radii[r]
+            _locate(poses[r + 1], poses[0], model, blocks)
+            out_gaps[r, c] = blocks[0].distance[0] - model.shape.radius - model.radii[r]
     return out_robots, out_box, out_gaps
 
 
-@njit(cache=True)
-def push_experience(
-    before: FloatArray, after: FloatArray, commands: FloatArray, seconds: float, bodies: Bodies
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return features and targets of both regressions for one decision.
+def samples_of(
+    before: FloatArray, after: FloatArray, commands: FloatArray, seconds: float, model: PushModel
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return features and targets of both regressions for one decision and its mirror image.
 
     Parameters
     ----------
@@ -117,55 +104,65 @@ def push_experience(
         ``(M, 3)`` commanded twists of the robots.
     seconds
         Duration of the decision [s].
-    bodies
-        Known geometry.
+    model
+        Its outline and radii are used.
 
     Returns
     -------
-    sums, motion, features, deflections : FloatArray
-        ``(1, 6)`` sums and the twist ``(1, 3)`` of the box; ``(M, 7)`` features and deflections
-        ``(M, 3)`` of the robots [m/s].
+    list of tuple of FloatArray
+        Sums ``(2, 6)`` and the twist ``(2, 3)`` of the box; features ``(2 M, 7)`` and deflections
+        ``(2 M, 3)`` of the robots [m/s].
     """
-    n = len(commands)
-    contacts, blocks = np.empty((n, 8)), np.zeros(1, NEAREST)
-    _touch(before, commands, contacts, blocks, bodies, seconds)
+    contacts = np.empty((len(commands), 8))
+    _touch(before, commands, seconds, model, np.zeros(1, NEAREST), contacts)
     twists = mean_twists(before, after, seconds)
-    twists[0, 2] *= bodies.shape.friction_radius
-    sums, features, deflections = np.empty((1, 6)), np.empty((n, 7)), twists[1:] - commands
-    sums[0] = _sums(contacts)
-    for r in range(n):
-        features[r] = _features(contacts[r], (twists[0, 0], twists[0, 1], twists[0, 2]))
-        deflections[r, 2] *= bodies.radii[r]
-    return sums, twists[:1].copy(), features, deflections
+    twists[0, 2] *= model.shape.friction_radius
+    deflections = twists[1:] - commands
+    deflections[:, 2] *= model.radii
+    sums = np.array([_sums(contacts)])
+    features = np.array([_features(contact, tuple(twists[0])) for contact in contacts])
+    return [
+        (np.vstack([sums, sums * BOX_SIGNS]), np.vstack([twists[:1], twists[:1] * TWIST_SIGNS])),
+        (
+            np.vstack([features, features * ROBOT_SIGNS]),
+            np.vstack([deflections, deflections * TWIST_SIGNS]),
+        ),
+    ]
+
+
+@njit(cache=True)
+def _locate(pose: FloatArray, box: FloatArray, model: PushModel, blocks: Records) -> None:
+    """Write the position of a robot in the frame of the box, and the nearest point of the box."""
+    cos, sin = np.cos(box[2]), np.sin(box[2])
+    x, y = rotate(cos, -sin, pose[0] - box[0], pose[1] - box[1])
+    blocks[0].x[0], blocks[0].y[0] = x, y
+    nearest_points(model.shape.edges, blocks[0], 1)
 
 
 @njit(cache=True)
 def _touch(
     poses: FloatArray,
     commands: FloatArray,
-    contacts: FloatArray,
-    blocks: Records,
-    bodies: Bodies,
     seconds: float,
+    model: PushModel,
+    blocks: Records,
+    contacts: FloatArray,
 ) -> None:
     """Write the contacts ``(M, 8)``: d, s, n, the levers of n and t over rho, cos a, sin a."""
-    shape = bodies.shape
-    box, free = poses[0], np.empty(3)
+    shape = model.shape
+    box, near, free = poses[0], blocks[0], np.empty(3)
     cos, sin = np.cos(box[2]), np.sin(box[2])
     for r in range(len(commands)):
-        pose, twist, radius = poses[r + 1], commands[r], bodies.radii[r]
+        pose, twist, radius = poses[r + 1], commands[r], model.radii[r]
         free[:] = pose
         move(free, (twist[0], twist[1], twist[2]), seconds)
-        x, y = rotate(cos, -sin, free[0] - box[0], free[1] - box[1])
-        near = blocks[0]
-        near.x[0], near.y[0] = x, y
-        nearest_points(shape.edges, near, 1)
+        _locate(free, box, model, blocks)
         depth = radius + shape.radius - near.distance[0]
         if depth <= 0.0:
             contacts[r] = 0.0
             continue
         scale = 1.0 / near.distance[0] if abs(near.distance[0]) > ON_SURFACE_M else 0.0
-        nx, ny = scale * (near.near_x[0] - x), scale * (near.near_y[0] - y)
+        nx, ny = scale * (near.near_x[0] - near.x[0]), scale * (near.near_y[0] - near.y[0])
         at_x, at_y = near.near_x[0] - shape.radius * nx, near.near_y[0] - shape.radius * ny
         way_x, way_y = rotate(cos, -sin, free[0] - pose[0], free[1] - pose[1])
         middle = 0.5 * (pose[2] + free[2]) - box[2]

@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
+from ....core.interface.scenario import Transition
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
 from ....core.search.best_response import RespondingPrediction, Responses, Search
@@ -24,6 +25,7 @@ from ..states.variables import progress_of
 from ..world.reward import Task, reward
 from ..world.settings import InfraredSettings
 from .calibration import PushBelief, outcomes
+from .poses import samples_of
 from .push import PushModel, push
 from .responses import Outlook, respond
 from .twists import mean_twists
@@ -273,7 +275,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         actions = self._robot_actions(joint_action[None])
         return speeds_of(actions, self.wheel_commands.speeds)[:, 0]
 
-    def twists(self, joint_action: IntArray) -> FloatArray:
+    def _twists(self, joint_action: IntArray) -> FloatArray:
         """Return the commanded twists ``(M, 3)`` of a joint action ``(n,)``."""
         actions = self._robot_actions(joint_action[None])[:, 0]
         return self.wheel_commands.twists[np.arange(len(actions)), actions]
@@ -282,15 +284,24 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         """Return the predicted change of the robots' mean twists by contact, ``(M, 3)``."""
         after = self.poses(joint_action[None]).robots[:, :, 0]
         moved = mean_twists(self.situation.robots, after, self.settings.period)
-        return moved - self.twists(joint_action)
+        return moved - self._twists(joint_action)
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return mean twists ``(k, M + 1, 3)``, the box's first, under constants ``(k, 3)``."""
         now = self.situation
         period = self.settings.period
-        twists = self.twists(joint_action)
+        twists = self._twists(joint_action)
         constants = np.ascontiguousarray(constants)
         return outcomes(now.robots, now.box, twists, period, self.settings.belief, constants)
+
+    def pose_samples(
+        self, joint_action: IntArray, transition: Transition
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return features and targets of the box's twist and of the robots' deflections."""
+        before = np.vstack([self.situation.box, self.situation.robots])
+        after = np.vstack([transition.info["box_pose"], transition.info["robot_poses"]])
+        commands = self._twists(joint_action)
+        return samples_of(before, after, commands, self.settings.period, self.model)
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""

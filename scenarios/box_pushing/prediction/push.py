@@ -24,7 +24,7 @@ import numpy as np
 from ....core.numerics import BoolArray, FloatArray, IntArray, njit
 from ...angles import cos_sin, rotate
 from ..world.geometry import LANES, NEAREST, ON_SURFACE_M, BoxShape, block_of, nearest_points
-from .poses import NOTHING_LEARNED, Bodies, LearnedPush, push_by_weights
+from .poses import NOTHING_LEARNED, LearnedPush, push_by_weights
 
 SUBSTEPS = 4
 SWEEPS = 4
@@ -114,9 +114,7 @@ def push(
         Robot poses ``(M, 3, m)``, box poses ``(3, m)`` and gaps ``(M, m)`` [m].
     """
     if model.learned.period > 0.0:
-        decisions = round(seconds / model.learned.period)
-        bodies = Bodies(model.shape, model.radii)
-        return push_by_weights(robots, box, twists, choices, decisions, bodies, model.learned)
+        return push_by_weights(robots, box, twists, choices, seconds, model)
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     bodies, boxes, blocks = np.zeros(n, ROBOT), np.zeros(1, BOX), np.zeros(1, NEAREST)

@@ -10,7 +10,6 @@ from acting import fuzzy, look
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
-from nested_agents.core.interface.experience import Observation
 from nested_agents.core.interface.prediction import states_by_group
 from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
@@ -88,7 +87,7 @@ def test_a_linear_world_is_predicted_to_rounding(roles: tuple[str, ...]) -> None
     rng = np.random.default_rng(1)
     for _ in range(5):
         joint = rng.integers(4, size=3)
-        prediction = predictor.predict(Observation(states, Rails()))
+        prediction = predictor.predict(states)
         guessed = np.array([prediction.states(i, joint[None])[0] for i in range(3)])
         states = scenario.step(joint).states
         assert guessed == pytest.approx(states, abs=1e-4)
@@ -97,7 +96,7 @@ def test_a_linear_world_is_predicted_to_rounding(roles: tuple[str, ...]) -> None
 def test_what_is_held_goes_on_and_angles_wrap() -> None:
     scenario = Rails(1)
     predictor, _ = trained(scenario, LEARNED.model_copy(update={"horizon": 3}))
-    ahead = predictor.predict(Observation(np.array([[0.5, 4.0, 0.5]]), Rails())).states(0, np.array([[0], [3]]))
+    ahead = predictor.predict(np.array([[0.5, 4.0, 0.5]])).states(0, np.array([[0], [3]]))
     # At 1 m/s for three decisions from 4 m: 7 m, which is -3; braked to a stand: where it was.
     assert ahead == pytest.approx(np.array([[1.0, -3.0, 1.0], [0.0, 4.0, 0.0]]), abs=1e-3)
 
@@ -125,7 +124,7 @@ def test_what_moves_what_is_taken_from_the_middle_of_the_way() -> None:
         settings = LEARNED.model_copy(update={"midpoint": midpoint})
         predictor, _ = trained(Springs(1), settings)
         # From 1 m at 1 m/s: (1 + 0.2 * 1.2) / 0.96 = 1.2917 m.
-        ahead = predictor.predict(Observation(np.array([[0.5, 1.0, 0.5]]), Rails())).states(0, np.array([[0]]))
+        ahead = predictor.predict(np.array([[0.5, 1.0, 0.5]])).states(0, np.array([[0]]))
         errors[midpoint] = abs(ahead[0, 1] - 1.2917)
     assert errors[True] < 2e-4 < 2e-3 < errors[False]
 
@@ -134,7 +133,7 @@ def test_before_any_experience_nothing_changes() -> None:
     states = np.array([[0.5, 4.0, 0.2], [0.0, 1.0, 0.2]])
     joint = np.array([[0, 1], [2, 3]])
     for predictor in (LearnedPredictor(LEARNED, Rails()), Persistence(StaticPredictor(), Rails())):
-        prediction = predictor.predict(Observation(states, Rails()))
+        prediction = predictor.predict(states)
         for agent in range(2):
             assert prediction.states(agent, joint) == pytest.approx(states[[agent] * 2])
 
@@ -148,7 +147,7 @@ def test_the_smaller_residual_decides_between_change_and_value() -> None:
 def test_what_was_not_seen_is_not_predicted() -> None:
     predictor, _ = trained(Rails(limit=0.5))
     assert predictor.memory["seen"][:, 2].tolist() == [-1.0, 1.0]
-    ahead = predictor.predict(Observation(np.array([[1.0, 0.0, 0.9], [1.0, 0.0, 0.9]]), Rails()))
+    ahead = predictor.predict(np.array([[1.0, 0.0, 0.9], [1.0, 0.0, 0.9]]))
     assert ahead.states(0, np.array([[0, 0]]))[0, 2] <= 1.0
 
 
@@ -171,7 +170,7 @@ class Predicting(Scenario):
         for name in ("agents", "state_space", "action_set", "groups"):
             if hasattr(scenario, name):
                 setattr(self, name, getattr(scenario, name))
-        self.prediction = predictor.predict(Observation(states, Rails()))
+        self.prediction = predictor.predict(states)
 
     def reset(self, seed: Any, episode: int = 0) -> Any:
         raise NotImplementedError
@@ -199,7 +198,7 @@ def test_predictions_agree_with_each_other_in_any_world(world: str) -> None:
 
 def test_actions_that_reach_the_same_are_alike() -> None:
     predictor, _ = trained(Rails())
-    alike = predictor.predict(Observation(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]]), Rails())).alike
+    alike = predictor.predict(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])).alike
     # At rest maintaining and zeroing are one; at the limit increasing and maintaining.
     assert alike.tolist() == [[0, 1, 2, 2], [0, 1, 0, 3]]
 
@@ -247,7 +246,7 @@ def test_more_bodies_go_on_with_what_fewer_have_learned() -> None:
     predictor, _ = trained(Rails(2))
     larger = LearnedPredictor(LEARNED, Rails(4))
     larger.warm_start(predictor)
-    ahead = larger.predict(Observation(np.zeros((4, 3)), Rails(4))).states(0, np.array([[0, 0, 2, 2]]))
+    ahead = larger.predict(np.zeros((4, 3))).states(0, np.array([[0, 0, 2, 2]]))
     assert ahead[0] == pytest.approx([0.5, 0.9 * 0.5 + 0.1 * 1.0, 1.0], abs=1e-4)
     of_others = LearnedPredictor(LEARNED, LineUpSettings(carts=2).build())
     of_others.warm_start(predictor)
@@ -305,5 +304,5 @@ def test_rewards_are_not_predicted() -> None:
 def test_states_by_group_are_those_of_all() -> None:
     predictor, states = trained(Rails(3))
     joint = np.array([[0, 1, 2], [3, 3, 0]])
-    own, shared = states_by_group(predictor.predict(Observation(states, Rails())), joint, Rails(3).groups, 1)  # type: ignore[arg-type]
+    own, shared = states_by_group(predictor.predict(states), joint, Rails(3).groups, 1)  # type: ignore[arg-type]
     assert own.shape, shared.shape == ((3, 2, 1), (3, 2, 2))
