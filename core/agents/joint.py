@@ -15,7 +15,7 @@ remain the same.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Literal
@@ -295,7 +295,7 @@ class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
         return self._bodies.outcomes(self._joint.actions(joint_action), constants)
 
     def pose_samples(
-        self, joint_action: IntArray, transition: Transition
+        self, joint_action: IntArray, info: Mapping[str, FloatArray]
     ) -> list[tuple[FloatArray, FloatArray]]:
         """Return features and targets of all regressions of poses."""
-        return self._bodies.pose_samples(self._joint.actions(joint_action), transition)
+        return self._bodies.pose_samples(self._joint.actions(joint_action), info)

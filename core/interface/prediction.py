@@ -6,16 +6,14 @@ Arrays follow the conventions of `spaces`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..numerics import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from .scenario import Transition
 
 
 @dataclass(frozen=True)
@@ -184,11 +182,12 @@ class EmbodiedPrediction(Prediction):
         raise TypeError(f"{type(self).__name__} has no constants")
 
     def pose_samples(
-        self, joint_action: IntArray, transition: Transition
+        self, joint_action: IntArray, info: Mapping[str, FloatArray]
     ) -> list[tuple[FloatArray, FloatArray]]:
         """Return features ``(m, f)`` and targets ``(m, t)`` of all regressions of poses.
 
-        See `Embodiment.regression_shapes`; the transition is that of the joint action ``(n,)``.
+        See `Embodiment.regression_shapes`; `info` holds measurements after the joint action
+        ``(n,)``, see `Transition`.
         """
         raise TypeError(f"{type(self).__name__} has no poses to learn")
 

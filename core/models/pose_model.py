@@ -61,7 +61,8 @@ class PoseModel(Adaptive[EmbodiedPrediction]):
         self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
     ) -> None:
         """Add the outcome of a joint action to the sums."""
-        for i, (features, targets) in enumerate(prediction.pose_samples(joint_action, transition)):
+        samples = prediction.pose_samples(joint_action, transition.info)
+        for i, (features, targets) in enumerate(samples):
             self.memory[f"gram{i}"] += features.T @ features
             self.memory[f"moment{i}"] += features.T @ targets
         self.memory["decisions"] += 1

@@ -24,7 +24,8 @@ from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES
 from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap, model_of
-from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS, LearnedPush
+from .prediction.models import LearnedPush
+from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings

@@ -16,7 +16,8 @@ import numpy as np
 from ....core.numerics import FloatArray, njit
 from ..world.robots import resistance
 from ..world.settings import RobotSettings
-from .push import PushModel, push
+from .models import PushModel
+from .push import push
 from .twists import twist_between
 
 CONSTANTS = ("load per stiffness", "load per grip", "contact friction")

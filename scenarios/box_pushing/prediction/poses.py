@@ -17,17 +17,13 @@ Known are the outline, the radii and the kinematics; unknown are masses, frictio
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
-
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit
 from ...angles import rotate
 from ..world.geometry import NEAREST, ON_SURFACE_M, nearest_points
+from .models import PushModel
 from .twists import Twist, mean_twists, move
-
-if TYPE_CHECKING:
-    from .push import PushModel
 
 TWIST_SIGNS = np.array([1.0, -1.0, -1.0])
 """Signs of speed ahead, speed to the left and turning rate in a mirror image."""
@@ -38,20 +34,6 @@ ROBOT_SIGNS = np.array([1.0, -1.0, 1.0, -1.0, -1.0, -1.0, 1.0])
 
 Records = np.ndarray[tuple[int], np.dtype[np.void]]
 """Records of nearest points."""
-
-
-class LearnedPush(NamedTuple):
-    """Weights of learned pushing; lengths of turning are the friction radius and the radius."""
-
-    period: float
-    """Duration of a decision [s]; 0: nothing is learned."""
-    box: FloatArray
-    """``(6, 3)`` twist of the box per sum of contacts."""
-    robot: FloatArray
-    """``(7, 3)`` deflection of a robot per feature."""
-
-
-NOTHING_LEARNED = LearnedPush(0.0, np.zeros((6, 3)), np.zeros((7, 3)))
 
 
 @njit(cache=True)

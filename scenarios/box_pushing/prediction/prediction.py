@@ -7,6 +7,7 @@ state spaces with the wheel speed as the only own variable that is exact.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import ClassVar
@@ -14,7 +15,6 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
-from ....core.interface.scenario import Transition
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
 from ....core.search.best_response import RespondingPrediction, Responses, Search
@@ -25,8 +25,9 @@ from ..states.variables import progress_of
 from ..world.reward import Task, reward
 from ..world.settings import InfraredSettings
 from .calibration import PushBelief, outcomes
+from .models import PushModel
 from .poses import samples_of
-from .push import PushModel, push
+from .push import push
 from .responses import Outlook, respond
 from .twists import mean_twists
 from .wheel_commands import WheelCommands, robot_actions, speeds_of, twist_table, wheel_commands_of
@@ -295,11 +296,11 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         return outcomes(now.robots, now.box, twists, period, self.settings.belief, constants)
 
     def pose_samples(
-        self, joint_action: IntArray, transition: Transition
+        self, joint_action: IntArray, info: Mapping[str, FloatArray]
     ) -> list[tuple[FloatArray, FloatArray]]:
         """Return features and targets of the box's twist and of the robots' deflections."""
         before = np.vstack([self.situation.box, self.situation.robots])
-        after = np.vstack([transition.info["box_pose"], transition.info["robot_poses"]])
+        after = np.vstack([info["box_pose"], info["robot_poses"]])
         commands = self._twists(joint_action)
         return samples_of(before, after, commands, self.settings.period, self.model)
 

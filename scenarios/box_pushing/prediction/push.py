@@ -17,14 +17,13 @@ instructions of the processor. The reference in plain Python is in the tests, `p
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ....core.numerics import BoolArray, FloatArray, IntArray, njit
 from ...angles import cos_sin, rotate
-from ..world.geometry import LANES, NEAREST, ON_SURFACE_M, BoxShape, block_of, nearest_points
-from .poses import NOTHING_LEARNED, LearnedPush, push_by_weights
+from ..world.geometry import LANES, NEAREST, ON_SURFACE_M, block_of, nearest_points
+from .models import PushModel
+from .poses import push_by_weights
 
 SUBSTEPS = 4
 SWEEPS = 4
@@ -62,24 +61,6 @@ Compliance = tuple[float, float, float, float, float, float]
 """Upper triangle of a compliance matrix."""
 _EXACT = {"contract", "nsz"}
 """Floating-point liberties: fused multiply-add, and zeros without sign."""
-
-
-class PushModel(NamedTuple):
-    """Model of ``M`` robots and a box."""
-
-    shape: BoxShape
-    """Outline of the box, and its friction radius rho."""
-    radii: FloatArray
-    """``(M,)`` robot radii [m]."""
-    compliance: FloatArray
-    """``(M, 3, 3)`` symmetric; twist per wrench in the robot frame [m/s, rad/s per N, Nm]; zero:
-    rigid."""
-    friction_force: float
-    """Maximum ground friction of the box, F [N]."""
-    contact_friction: float
-    """Coefficient of friction between robot and box."""
-    learned: LearnedPush = NOTHING_LEARNED
-    """Learned weights that replace all constants but the geometry, see `poses`."""
 
 
 @njit(cache=True)

@@ -24,11 +24,11 @@ from nested_agents.core.models.team_model import TeamModel
 from nested_agents.core.numerics import FloatArray
 from nested_agents.core.plugins.settings import PartSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.prediction.models import LearnedPush
 from nested_agents.scenarios.box_pushing.prediction.poses import (
     BOX_SIGNS,
     ROBOT_SIGNS,
     TWIST_SIGNS,
-    LearnedPush,
     samples_of,
 )
 from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
