@@ -352,9 +352,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             reward = self.mirror.reward(reward)
             left = self.mirror.states(left)
             taken = np.tile(taken, 2)
-        terminated = transition.terminated
-        outcome = states, reward, terminated, experience.duration
-        self.count(self.learner.observe_decision(left, taken, *outcome))
+        # Only the leader's learner needs to know durations.
+        lasting = {"duration": experience.duration} if experience.duration > 1 else {}
+        outcome = states, reward, transition.terminated
+        self.count(self.learner.observe_decision(left, taken, *outcome, **lasting))
         if experience.last:
             self.end_episode()
 

@@ -54,7 +54,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     world = checked_scenario(settings.scenario.build())
     scenario, hierarchy = settings.arrange(world)
     if world.options is not None and scenario is not world:
-        key = "scenario.perception" if settings.scenario.perception else "topology.agents"
+        key = "scenario.perception" if settings.scenario.perception else "agents"
         raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
     failures = settings.topology.failures
     team = Team(settings.learner, scenario, hierarchy, policy_seed(seed), failures)
