@@ -354,8 +354,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             taken = np.tile(taken, 2)
         # Only the leader's learner needs to know durations.
         lasting = {"duration": experience.duration} if experience.duration > 1 else {}
-        outcome = states, reward, transition.terminated
-        self.count(self.learner.observe_decision(left, taken, *outcome, **lasting))
+        ended = transition.terminated
+        self.count(self.learner.observe_decision(left, taken, states, reward, ended, **lasting))
         if experience.last:
             self.end_episode()
 
