@@ -189,7 +189,7 @@ def test_a_team_that_no_memory_holds_is_refused_in_a_world_of_ones_own(
     (tmp_path / "tank.py").write_text(tank.read_text(encoding="utf-8"))
     (tmp_path / "spec.toml").write_text('scenario = { kind = "tank.py:Tank", pumps = 100_000 }')
     assert main(["plan", "spec.toml", "--no-timed"]) == 2
-    assert "scenario: has 100000 agents: a worker would hold 2.8" in capsys.readouterr().err
+    assert "scenario: has 100000 agents: needs an estimated 2.8" in capsys.readouterr().err
 
 
 def test_a_file_that_cannot_be_written_is_called_by_its_own_name(

@@ -122,7 +122,7 @@ def test_other_weights_are_another_trial(kept: Path) -> None:
             r"weights of roles .* fit teams of other sizes",
         ),
         (LEARNER, b"PK nothing", r"learner\.parts\[0\]\.team = .*"),
-        (LEARNER, b"text", r"trained\.npz: is no file of a team"),
+        (LEARNER, b"text", r"trained\.npz: is not a saved team"),
     ],
 )
 def test_a_file_that_holds_no_such_weights_is_refused(kept, learner, content, complaint) -> None:
