@@ -15,7 +15,7 @@ remain the same.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Literal
@@ -258,12 +258,20 @@ class JointEmbodiment(Embodiment):
         self.nominal_effects = bodies.nominal_effects
         self.constants = bodies.constants
         self.levers = bodies.levers
+        self.regression_shapes = bodies.regression_shapes
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> EmbodiedPrediction:
         """Return the prediction for assumed effects and constants."""
         return JointBodiesPrediction(self._bodies.predict_with(effects, constants), self._joint)
+
+    def predict_poses(
+        self, effects: Sequence[FloatArray], weights: Sequence[FloatArray], decisions: int
+    ) -> EmbodiedPrediction:
+        """Return the prediction by learned weights."""
+        prediction = self._bodies.predict_poses(effects, weights, decisions)
+        return JointBodiesPrediction(prediction, self._joint)
 
 
 class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
@@ -285,3 +293,9 @@ class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return predicted twists for choices of constants."""
         return self._bodies.outcomes(self._joint.actions(joint_action), constants)
+
+    def pose_samples(
+        self, joint_action: IntArray, info: Mapping[str, FloatArray]
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return features and targets of all regressions of poses."""
+        return self._bodies.pose_samples(self._joint.actions(joint_action), info)

@@ -121,7 +121,8 @@ class Views:
         self._broadcast = 0.0 if settings.values_actions else float(perceived.sum())
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
-            bodies = context.scenario.embodiment() if settings.decision.errors.constants else None
+            needs_constants = settings.decision.errors.constants and model.predictor is None
+            bodies = context.scenario.embodiment() if needs_constants else None
             valued = concerned(hierarchy, settings.decision.value_of)
             n_constants = 0 if bodies is None else len(bodies.constants)
             self._errors = Errors(

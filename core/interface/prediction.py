@@ -6,6 +6,7 @@ Arrays follow the conventions of `spaces`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -179,6 +180,16 @@ class EmbodiedPrediction(Prediction):
         Twists of moved objects come before those of bodies, see `Transition.twists`.
         """
         raise TypeError(f"{type(self).__name__} has no constants")
+
+    def pose_samples(
+        self, joint_action: IntArray, info: Mapping[str, FloatArray]
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return features ``(m, f)`` and targets ``(m, t)`` of all regressions of poses.
+
+        See `Embodiment.regression_shapes`; `info` holds measurements after the joint action
+        ``(n,)``, see `Transition`.
+        """
+        raise TypeError(f"{type(self).__name__} has no poses to learn")
 
 
 def first_alike(keys: IntArray | FloatArray) -> IntArray:

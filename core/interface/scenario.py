@@ -120,7 +120,7 @@ def checked_reward(reward: object, agents: Sequence[str]) -> float | FloatArray:
 
 
 class Embodiment(ABC):
-    """Bodies with actuators, for self-models and calibration."""
+    """Bodies with actuators, for self-models, calibration and learned models of poses."""
 
     nominal_effects: tuple[FloatArray, ...]
     """Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body."""
@@ -129,6 +129,9 @@ class Embodiment(ABC):
     levers: FloatArray = np.zeros(0)
     """``(K + M,)`` speed per turning rate of moved objects and of bodies [m], with constants
     only."""
+    regression_shapes: tuple[tuple[int, int], ...] = ()
+    """Numbers of features and targets of the regressions that predict poses; empty if poses cannot
+    be learned."""
 
     @abstractmethod
     def predict_with(
@@ -138,6 +141,15 @@ class Embodiment(ABC):
 
         Constants are logarithms of factors on their nominal values.
         """
+
+    def predict_poses(
+        self, effects: Sequence[FloatArray], weights: Sequence[FloatArray], decisions: int
+    ) -> EmbodiedPrediction:
+        """Return the prediction for assumed effects and the weights ``(f, t)`` of all regressions.
+
+        The wheel speeds after the first joint action are held for a number of decisions.
+        """
+        raise TypeError(f"{type(self).__name__} has no poses to learn")
 
 
 class PolicyMap(ABC):

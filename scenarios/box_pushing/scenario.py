@@ -7,6 +7,7 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,10 +23,13 @@ from ...core.numerics import FloatArray, IntArray, stream_of, working_seconds, w
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES
-from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap, model_of
+from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap, model_of
+from .prediction.models import LearnedPush
+from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
+from .prediction.twists import mean_twists
 from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
 from .states.variables import progress_of
@@ -69,6 +73,7 @@ class BoxPushing(Scenario, Embodiment):
     """
 
     measures = MEASURES
+    regression_shapes = tuple((len(signs), len(TWIST_SIGNS)) for signs in (BOX_SIGNS, ROBOT_SIGNS))
     recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
@@ -221,13 +226,7 @@ class BoxPushing(Scenario, Embodiment):
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> BoxPrediction:
         """Predict with the given effects of the wheels and constants of the push."""
-        situation = PresentState(
-            self.world.robot_poses.copy(),
-            self.world.box_pose.copy(),
-            self._goal,
-            self._speeds,
-            tuple(effects),
-        )
+        situation = self._present_state(effects)
         model = self._model if constants is None else model_of(self._belief, constants)
         if self._playground is None or self._saved is None:
             return BoxPrediction(situation, model, self._prediction)
@@ -235,6 +234,24 @@ class BoxPushing(Scenario, Embodiment):
             self._playground, self._saved, self._failures, self._step, self.settings.action_repeat
         )
         return ExactPrediction(situation, model, self._prediction, future)
+
+    def predict_poses(
+        self, effects: Sequence[FloatArray], weights: Sequence[FloatArray], decisions: int
+    ) -> BoxPrediction:
+        """Predict by learned pushing, see `box_pushing.prediction.poses`."""
+        model = self._model._replace(learned=LearnedPush(self._period, *weights))
+        settings = replace(self._prediction, horizon=decisions * self._period)
+        return BoxPrediction(self._present_state(effects), model, settings)
+
+    def _present_state(self, effects: Sequence[FloatArray]) -> PresentState:
+        """Return the current state, with the given effects of the wheels."""
+        return PresentState(
+            self.world.robot_poses.copy(),
+            self.world.box_pose.copy(),
+            self._goal,
+            self._speeds,
+            tuple(effects),
+        )
 
     def with_exact_prediction(self) -> BoxPushing:
         """Return an equal scenario that predicts one decision period by simulation."""
