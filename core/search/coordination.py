@@ -234,8 +234,6 @@ class CrossEntropy(Aggregation):
             for k, joint in enumerate(tried):
                 onward = seen.after(joint)
                 if onward is None:
-                    raise ValueError(
-                        f"{type(seen).__name__} cannot predict several decisions; use another evaluator"
-                    )
+                    raise ValueError(f"{type(seen).__name__} predicts a single decision only")
                 waiting.append((onward, rows[which == k], step + 1))
         return worths

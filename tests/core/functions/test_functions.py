@@ -110,7 +110,7 @@ def test_several_agents_are_asked_in_one_call_if_the_function_says_so() -> None:
         (
             "plain",
             {},
-            r"agent 'cart1': f\.py:plain returns costs\.tokens: unknown cost, learner\.costs allows no",
+            r"f\.py:plain returns costs\.tokens: unknown cost, learner\.costs allows no",
         ),
     ],
 )
